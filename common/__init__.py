@@ -1,0 +1,1 @@
+"""What every program of the project shares: configuration files, errors for people, logging, exit codes."""

@@ -1,0 +1,94 @@
+"""One YAML file per program, checked before anything starts; environment variables override it."""
+
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+from common.errors import ExitCode, UserError
+
+
+class Section(BaseModel):
+    """A part of a configuration file: unknown keys are errors, values don't change after the start."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Settings(BaseSettings):
+    """A whole configuration file.
+
+    A program's settings derive from this and set `env_prefix` in their own `model_config`; with the prefix
+    `GATEWAY__`, the variable `GATEWAY__GRPC__PORT` overrides the key `port` under `grpc`.
+    """
+
+    model_config: ClassVar[SettingsConfigDict] = SettingsConfigDict(
+        extra="forbid", frozen=True, env_nested_delimiter="__", nested_model_default_partial_update=True
+    )
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """The environment first, then the file: the one place where the order is decided."""
+        return env_settings, init_settings
+
+
+SettingsT = TypeVar("SettingsT", bound=Settings)
+
+
+def load(settings_type: type[SettingsT], path: Path | None) -> SettingsT:
+    """Reads and checks a configuration file; without a path the defaults and the environment count.
+
+    Raises:
+        UserError: the file can't be read, is not YAML, or has an unknown key or a bad value. The one line
+            names the file, the key, the value and what is allowed.
+    """
+    values = _read(path) if path else {}
+    try:
+        return settings_type(**values)
+    except ValidationError as error:
+        prefix = settings_type.model_config.get("env_prefix", "")
+        raise UserError(
+            f"configuration {path or 'from the environment'}: {_first_problem(error)}",
+            f"Correct it in the file or in the {prefix}* environment variable",
+            exit_code=ExitCode.USAGE,
+        ) from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(
+            f"configuration {path} can't be read: {error}",
+            "Name a readable file with --config",
+            exit_code=ExitCode.USAGE,
+        ) from error
+    except yaml.YAMLError as error:
+        raise UserError(f"configuration {path} is not YAML: {error}", exit_code=ExitCode.USAGE) from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        raise UserError(
+            f"configuration {path} holds a {type(values).__name__} at its top",
+            "Write keys and values, 'grpc:' for example",
+            exit_code=ExitCode.USAGE,
+        )
+    return values
+
+
+def _first_problem(error: ValidationError) -> str:
+    problems = error.errors(include_url=False)
+    first = problems[0]
+    key = ".".join(str(part) for part in first["loc"]) or "(top)"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    if first["type"] == "extra_forbidden":
+        return f"unknown key '{key}'{more}"
+    return f"key '{key}' is {first['input']!r}: {first['msg']}{more}"

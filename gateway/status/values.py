@@ -1,0 +1,72 @@
+"""What can be known of the robot: one frozen value per source, in SI units, free of ROS and of the wire.
+
+A value that is not known is None. Numbers are finite: readers drop NaN and infinity before they get here.
+"""
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """How the robot moves, in its own frame: x forward, y left, z up."""
+
+    vx_mps: float
+    vy_mps: float
+    wz_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Vision:
+    """What the vision process says of itself."""
+
+    producer_fps: float
+    consumer_fps: float
+    last_infer_ms: float
+    infer_error_count: int
+    capture_fatal_error_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One object, its box in pixels of the source image: x right, y down, origin upper left."""
+
+    class_id: int
+    class_name: str
+    score: float
+    track_id: str
+    center_x_px: float
+    center_y_px: float
+    width_px: float
+    height_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """The objects of one image. `count` is how many there were; `items` may hold fewer when capped."""
+
+    source_width_px: int
+    source_height_px: int
+    count: int
+    items: tuple[Detection, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """One battery."""
+
+    present: bool
+    voltage_v: float | None
+    charge_percent: float | None
+    charging: bool | None
+
+
+ValueT_co = TypeVar("ValueT_co", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Received(Generic[ValueT_co]):
+    """A value and when it was received, in seconds on the gateway's monotonic clock."""
+
+    value: ValueT_co
+    at_s: float

@@ -1,0 +1,1 @@
+"""The video side: GStreamer pipelines on demand, served over SRT."""

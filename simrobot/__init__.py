@@ -1,0 +1,1 @@
+"""A simulated robot: real ROS 2 publishers at realistic rates, with faults on demand."""
