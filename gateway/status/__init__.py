@@ -1,1 +1,1 @@
-"""What the gateway knows and what follows from it. Pure: no ROS, no gRPC, no protobuf, no clock of its own."""
+"""What the gateway knows and what follows from it. Pure: no ROS, no gRPC, no protobuf, no clock."""

@@ -1,0 +1,35 @@
+"""The only import of `gi` in the project: whoever needs GStreamer gets it here.
+
+Importing this module fails with a `UserError` that says what to install, where GStreamer or PyGObject is
+missing; so it is imported late, by the part that is about to build a pipeline.
+"""
+
+from typing import Any, Final
+
+from common.errors import UserError
+
+try:
+    import gi
+
+    gi.require_version("Gst", "1.0")
+    gi.require_version("GstVideo", "1.0")
+    from gi.repository import Gio as _Gio
+    from gi.repository import GLib as _GLib
+    from gi.repository import GObject as _GObject
+    from gi.repository import Gst as _Gst
+    from gi.repository import GstVideo as _GstVideo
+except (ImportError, ValueError) as error:
+    raise UserError(
+        f"GStreamer can't be used from Python ({error})",
+        "Type: scripts/setup, or install gir1.2-gstreamer-1.0, gir1.2-gst-plugins-base-1.0 and PyGObject",
+    ) from error
+
+# gi builds these at run time from typelibs; no stub describes them well enough to be worth having.
+Gst: Final[Any] = _Gst
+GstVideo: Final[Any] = _GstVideo
+GLib: Final[Any] = _GLib
+GObject: Final[Any] = _GObject
+# Needed for reading socket addresses out of srtsink's statistics.
+Gio: Final[Any] = _Gio
+
+Gst.init(None)

@@ -1,0 +1,13 @@
+"""Logging for all programs: one line per event, on standard error."""
+
+import logging
+import sys
+
+_FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+
+
+def configure(level: str) -> None:
+    """Sends all log records from `level` ("debug", "info", "warning", "error") up to standard error."""
+    logging.basicConfig(level=level.upper(), format=_FORMAT, stream=sys.stderr, force=True)
+    # asyncio's debug chatter says nothing about the robot.
+    logging.getLogger("asyncio").setLevel(logging.WARNING)

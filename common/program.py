@@ -1,0 +1,55 @@
+"""How a program of ours runs: one asyncio loop until SIGINT or SIGTERM, and one line on an error."""
+
+import asyncio
+import signal
+import sys
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any, NoReturn
+
+import uvloop
+
+from common.errors import UserError
+
+
+def run_to_exit(work: Callable[[], None]) -> None:
+    """Calls `work`; a `UserError` out of it becomes one line on standard error and the exit code it names."""
+    try:
+        work()
+    except UserError as error:
+        end_with(error)
+
+
+def end_with(error: UserError) -> NoReturn:
+    """Ends the program with one line and the exit code that the error names."""
+    print(f"error: {error}", file=sys.stderr)
+    raise SystemExit(int(error.exit_code))
+
+
+def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
+    """Runs `main(stop)` on a fresh uvloop; `stop` is set by the first SIGINT or SIGTERM.
+
+    `main` is expected to return soon after `stop` is set. A second signal while it is still at it cancels it.
+    """
+    uvloop.run(_with_signals(main))
+
+
+async def _with_signals(main: Callable[[asyncio.Event], Awaitable[None]]) -> None:
+    stop = asyncio.Event()
+    task = asyncio.ensure_future(main(stop))
+
+    def on_signal() -> None:
+        if stop.is_set():
+            task.cancel()
+        stop.set()
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, on_signal)
+    try:
+        await task
+    except asyncio.CancelledError:
+        if not stop.is_set():
+            raise
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)
