@@ -55,6 +55,6 @@ DEFAULT_SOURCES = (
 class GatewaySettings(Settings):
     """Everything the gateway can be told. The defaults suit the first robot."""
 
-    model_config = SettingsConfigDict(Settings.model_config, env_prefix="GATEWAY__")
+    model_config = SettingsConfigDict(env_prefix="GATEWAY__")
 
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
