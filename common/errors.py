@@ -34,3 +34,18 @@ class UserError(Exception):
         """One line, however many the parts had."""
         text = f"{self.what}. {self.remedy}" if self.remedy else self.what
         return " ".join(text.split())
+
+
+class DomainError(Exception):
+    """What a caller asked for can't be done. Knows no transport; common.rpc tells it to gRPC callers.
+
+    The text is for the caller to read and says what to do.
+    """
+
+
+class InvalidRequestError(DomainError):
+    """The request makes no sense as it stands; sending it again won't help. Nothing was changed."""
+
+
+class NotNowError(DomainError):
+    """The request is in order, but the state of things forbids it; it may work later."""

@@ -1,0 +1,127 @@
+"""What every gRPC server of the project shares: its limits, and how a domain error becomes a status code.
+
+common.listen binds what `new_server` makes to a TCP port or a Unix socket.
+"""
+
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from typing import Any, Final
+
+import grpc
+
+from common.errors import DomainError, InvalidRequestError, NotNowError
+
+_log = logging.getLogger(__name__)
+
+STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
+    InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
+    NotNowError: grpc.StatusCode.FAILED_PRECONDITION,
+}
+"""Total: a test walks the subclasses of DomainError. Every other exception is a defect, so INTERNAL."""
+
+STOP_GRACE_S: Final = 0.5
+"""How long a server lets running calls finish when it stops."""
+
+_SERVER_OPTIONS: Final = (
+    # A second program on the same port is an error, never half of the calls.
+    ("grpc.so_reuseport", 0),
+    # Requests are small; nobody fills the robot's memory through this door.
+    ("grpc.max_receive_message_length", 256 * 1024),
+    ("grpc.max_send_message_length", 4 * 1024 * 1024),
+    ("grpc.max_concurrent_streams", 64),
+    # A peer that left without a word is noticed after 10 + 5 s.
+    ("grpc.keepalive_time_ms", 10_000),
+    ("grpc.keepalive_timeout_ms", 5_000),
+    ("grpc.keepalive_permit_without_calls", 1),
+    # Clients may look as often themselves without being sent away.
+    ("grpc.http2.min_recv_ping_interval_without_data_ms", 4_000),
+)
+_MAX_CONCURRENT_CALLS: Final = 256
+
+
+def new_server(interceptors: Sequence[grpc.aio.ServerInterceptor] = ()) -> grpc.aio.Server:
+    """A server with the project's limits that answers domain errors with their codes.
+
+    Args:
+        interceptors: more of them, innermost last; they see domain errors before these become codes.
+    """
+    return grpc.aio.server(
+        interceptors=(ErrorInterceptor(), *interceptors),
+        options=_SERVER_OPTIONS,
+        maximum_concurrent_rpcs=_MAX_CONCURRENT_CALLS,
+    )
+
+
+class ErrorInterceptor(grpc.aio.ServerInterceptor):
+    """Ends a call whose handler raised with the code of STATUS_CODES and the error's own words.
+
+    An exception that is no DomainError is a defect of ours: it is logged whole, and the caller learns
+    nothing but that.
+    """
+
+    def __init__(self) -> None:
+        # One entry per method that exists, so the wrapping is paid once, not per call.
+        self._guarded: dict[str, grpc.RpcMethodHandler[Any, Any]] = {}
+
+    async def intercept_service(
+        self,
+        continuation: Callable[[grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]],
+        handler_call_details: grpc.HandlerCallDetails,
+    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+        """Wraps the method's handler."""
+        method = handler_call_details.method
+        if method not in self._guarded:
+            handler = await continuation(handler_call_details)
+            if handler is None:
+                return None
+            self._guarded[method] = _guarded(handler, method)
+        return self._guarded[method]
+
+
+def _guarded(handler: grpc.RpcMethodHandler[Any, Any], method: str) -> grpc.RpcMethodHandler[Any, Any]:
+    if handler.unary_unary:
+        return grpc.unary_unary_rpc_method_handler(
+            _guarded_unary(handler.unary_unary, method),
+            handler.request_deserializer,
+            handler.response_serializer,
+        )
+    if handler.unary_stream:
+        return grpc.unary_stream_rpc_method_handler(
+            _guarded_stream(handler.unary_stream, method),
+            handler.request_deserializer,
+            handler.response_serializer,
+        )
+    raise TypeError(f"{method}: a stream of requests has no guard yet")
+
+
+def _guarded_unary(behavior: Any, method: str) -> Any:
+    async def call(request: Any, context: grpc.aio.ServicerContext[Any, Any]) -> Any:
+        try:
+            return await behavior(request, context)
+        except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
+            await _end(context, error, method)
+
+    return call
+
+
+def _guarded_stream(behavior: Any, method: str) -> Any:
+    async def call(request: Any, context: grpc.aio.ServicerContext[Any, Any]) -> AsyncIterator[Any]:
+        try:
+            async for response in behavior(request, context):
+                yield response
+        except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
+            await _end(context, error, method)
+
+    return call
+
+
+async def _end(context: grpc.aio.ServicerContext[Any, Any], error: Exception, method: str) -> None:
+    """Raises grpc's own AbortError, always."""
+    if isinstance(error, grpc.aio.AbortError):
+        raise error
+    code = STATUS_CODES.get(type(error)) if isinstance(error, DomainError) else None
+    if code is None:
+        _log.error("%s failed", method, exc_info=error)
+        await context.abort(grpc.StatusCode.INTERNAL, "internal error; the robot's log says more")
+    else:
+        await context.abort(code, str(error))
