@@ -1,0 +1,107 @@
+"""House rules on who may import whom, read from the source; see docs/architecture.md for the picture."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+OURS = ("common", "gateway", "preview", "console", "simrobot")
+
+
+@dataclass(frozen=True)
+class Import:
+    """`importer` (a file below the root) imports `module`."""
+
+    importer: str
+    line: int
+    module: str
+
+
+def imports_below(package: str) -> Iterator[Import]:
+    for path in sorted((ROOT / package).rglob("*.py")):
+        file = str(path.relative_to(ROOT))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            match node:
+                case ast.Import(names=names):
+                    for name in names:
+                        yield Import(file, node.lineno, name.name)
+                case ast.ImportFrom(module=str(module), names=names):
+                    # `from gateway import ros` imports gateway.ros as well.
+                    yield Import(file, node.lineno, module)
+                    for name in names:
+                        yield Import(file, node.lineno, f"{module}.{name.name}")
+
+
+ALL = [found for package in OURS for found in imports_below(package)]
+
+
+def is_within(module: str, prefix: str) -> bool:
+    return module == prefix or module.startswith(prefix + ".")
+
+
+def offenders(importer: str, forbidden: tuple[str, ...]) -> list[str]:
+    return [
+        f"{found.importer}:{found.line} imports {found.module}"
+        for found in ALL
+        if found.importer.startswith(importer) and any(is_within(found.module, bad) for bad in forbidden)
+    ]
+
+
+HEAVY = ("rclpy", "gi", "PySide6")
+WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
+
+
+@pytest.mark.parametrize(
+    ("importer", "forbidden"),
+    [
+        ("common/", ("gateway", "preview", "console", "simrobot")),
+        ("gateway/", ("preview", "console", "simrobot")),
+        ("preview/", ("gateway", "console", "simrobot", "omniseer.gateway")),
+        ("console/", ("gateway", "preview", "simrobot", "omniseer.preview")),
+        ("simrobot/", ("gateway", "preview", "console")),
+        ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
+        ("gateway/ros/", ("gateway.rpc", "gateway.preview_link", *WIRE)),
+        ("gateway/rpc/", ("gateway.ros",)),
+        ("gateway/preview_link", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
+        (
+            "preview/lifecycle.py",
+            (*HEAVY, *WIRE, "asyncio", "common.gst", "preview.pipeline", "preview.encoders"),
+        ),
+        ("preview/rpc/", ("common.gst",)),
+        ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+    ],
+)
+def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) -> None:
+    assert any(found.importer.startswith(importer) for found in ALL), f"nothing is left of {importer}"
+    assert not offenders(importer, forbidden)
+
+
+@pytest.mark.parametrize(
+    ("library", "homes"),
+    [
+        ("rclpy", ("gateway/ros/", "simrobot/")),
+        ("gi", ("common/gst.py",)),
+        ("PySide6", ("console/monitor/",)),
+        ("psutil", ("gateway/platform",)),
+        ("yaml", ("common/config.py",)),
+        ("google.protobuf", ("gateway/rpc/", "gateway/preview_link", "preview/rpc/", "console/client/")),
+        ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
+        ("omniseer.preview", ("gateway/preview_link", "preview/rpc/")),
+    ],
+)
+def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:
+    strangers = [
+        f"{found.importer}:{found.line}"
+        for found in ALL
+        if is_within(found.module, library) and not found.importer.startswith(homes)
+    ]
+    assert not strangers
+
+
+def test_the_fence_sees_what_it_should() -> None:
+    """A fence that reads no imports would let everybody through."""
+    assert offenders("common/gst.py", ("gi",))
+    assert len({found.importer for found in ALL}) > 20

@@ -1,0 +1,385 @@
+"""Bytes written by hand from the locked numbers, decoded by the generated code.
+
+The field numbers stand here a second time, on purpose: a schema and a test that were both made from a wrong
+number would agree with each other. A field is (number, wire type, value) as protobuf's encoding lays it down.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from google.protobuf.message import Message
+
+from omniseer.gateway.v1 import overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, system_status_pb2
+
+VARINT, LENGTH, FIXED32 = 0, 2, 5
+
+
+def varint(value: int) -> bytes:
+    value &= (1 << 64) - 1
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])
+
+
+def tag(number: int, wire_type: int) -> bytes:
+    return varint(number << 3 | wire_type)
+
+
+def uint(number: int, value: int) -> bytes:
+    return tag(number, VARINT) + varint(value)
+
+
+def flt(number: int, value: float) -> bytes:
+    return tag(number, FIXED32) + struct.pack("<f", value)
+
+
+def text(number: int, value: str) -> bytes:
+    return sub(number, value.encode())
+
+
+def sub(number: int, *parts: bytes) -> bytes:
+    body = b"".join(parts)
+    return tag(number, LENGTH) + varint(len(body)) + body
+
+
+@dataclass(frozen=True)
+class Case:
+    message: type[Message]
+    wire: bytes
+    fields: dict[str, Any]
+
+
+# Floats are multiples of 1/4, which binary floating point holds exactly.
+COMPUTE = (
+    uint(1, 1)
+    + uint(2, 1)
+    + uint(3, 300)
+    + flt(4, 12.5)
+    + uint(5, 1)
+    + flt(6, 61.25)
+    + uint(7, 1)
+    + uint(8, 1)
+) + (uint(9, 1 << 33) + uint(10, 1 << 34) + flt(11, 50.0) + uint(12, 1) + flt(13, 75.5))
+NETWORK = (
+    uint(1, 1) + uint(2, 1) + uint(3, 7) + uint(4, 1) + text(5, "wlan0") + uint(6, 1) + uint(7, -67)
+) + (uint(8, 1) + uint(9, 80))
+BATTERY = (
+    uint(1, 1) + uint(2, 1) + uint(3, 9) + text(4, "lipo") + uint(5, 1) + uint(6, 1) + flt(7, 14.75)
+) + (uint(8, 1) + flt(9, 82.5) + uint(10, 1) + uint(11, 1))
+DETECTION = (
+    uint(1, -3) + text(2, "person") + flt(3, 0.75) + text(4, "t7") + flt(5, 640.0) + flt(6, 360.0)
+) + (flt(7, 100.5) + flt(8, 200.25))
+
+CASES = [
+    Case(
+        system_status_pb2.SystemStatus,
+        text(1, "lab")
+        + text(2, "1.2.3")
+        + sub(3, uint(1, 2))
+        + sub(4, uint(1, 1))
+        + sub(5, uint(1, 1))
+        + sub(6, uint(1, 1))
+        + sub(7, sub(1, uint(1, 1)))
+        + sub(8, uint(1, 1)),
+        {
+            "gateway_name": "lab",
+            "gateway_version": "1.2.3",
+            "preview": preview_pb2.PreviewStatus(state="PREVIEW_RUNNING"),
+            "vision": system_status_pb2.VisionStatus(available=True),
+            "health": system_status_pb2.RobotHealth(state="ROBOT_HEALTH_OK"),
+            "teleop": system_status_pb2.TeleopStatus(state="TELEOP_DISABLED"),
+            "platform": platform_pb2.PlatformStatus(compute=platform_pb2.ComputeStatus(available=True)),
+            "effective_command": system_status_pb2.EffectiveCommand(available=True),
+        },
+    ),
+    Case(
+        robot_gateway_pb2.SetPreviewModeRequest,
+        uint(1, 1) + uint(2, 3),
+        {"enabled": True, "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY},
+    ),
+    Case(
+        robot_gateway_pb2.SetPreviewModeResponse,
+        uint(1, 1) + text(2, "running") + sub(3, uint(2, 1)),
+        {
+            "accepted": True,
+            "message": "running",
+            "preview": preview_pb2.PreviewStatus(profile="PREVIEW_PROFILE_LOW_BW"),
+        },
+    ),
+    Case(
+        preview_pb2.PreviewStatus,
+        uint(1, 5) + uint(2, 2) + text(3, "no camera"),
+        {"state": 5, "profile": preview_pb2.PREVIEW_PROFILE_BALANCED, "last_error": "no camera"},
+    ),
+    Case(
+        system_status_pb2.VisionStatus,
+        uint(1, 1) + uint(2, 1) + flt(3, 30.0) + flt(4, 29.5) + flt(5, 12.25) + uint(6, 300) + uint(7, 2),
+        {
+            "available": True,
+            "stale": True,
+            "producer_fps": 30.0,
+            "consumer_fps": 29.5,
+            "last_infer_ms": 12.25,
+            "infer_error_count": 300,
+            "capture_fatal_error_count": 2,
+        },
+    ),
+    Case(
+        system_status_pb2.RobotHealth,
+        uint(1, 2)
+        + uint(2, 1)
+        + text(3, "odometry stale")
+        + uint(4, 1)
+        + uint(5, 1)
+        + flt(6, 1.25)
+        + flt(7, 0.5)
+        + uint(8, 1500)
+        + flt(9, 1.0)
+        + flt(10, -0.75)
+        + flt(11, -0.5),
+        {
+            "state": 2,
+            "ready": True,
+            "summary": "odometry stale",
+            "odom_available": True,
+            "odom_stale": True,
+            "linear_speed_mps": 1.25,
+            "angular_speed_rad_s": 0.5,
+            "odom_age_ms": 1500,
+            "measured_vx_mps": 1.0,
+            "measured_vy_mps": -0.75,
+            "measured_wz_rad_s": -0.5,
+        },
+    ),
+    Case(
+        system_status_pb2.TeleopStatus,
+        uint(1, 2)
+        + uint(2, 1)
+        + uint(4, 40)
+        + flt(5, 1.5)
+        + flt(6, 2.0)
+        + text(7, "too fast")
+        + flt(8, 0.25)
+        + flt(9, 0.5)
+        + flt(10, 0.75)
+        + uint(11, 1)
+        + uint(12, 1),
+        {
+            "state": 2,
+            "enabled": True,
+            "last_command_age_ms": 40,
+            "max_linear_mps": 1.5,
+            "max_angular_rad_s": 2.0,
+            "last_error": "too fast",
+            "last_command_vx_mps": 0.25,
+            "last_command_vy_mps": 0.5,
+            "last_command_wz_rad_s": 0.75,
+            "last_command_available": True,
+            "last_command_stale": True,
+        },
+    ),
+    Case(
+        system_status_pb2.EffectiveCommand,
+        uint(1, 1) + uint(2, 1) + uint(3, 20) + flt(4, 1.0) + flt(5, 2.0) + flt(6, 3.0) + text(7, "keyboard"),
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 20,
+            "vx_mps": 1.0,
+            "vy_mps": 2.0,
+            "wz_rad_s": 3.0,
+            "active_source": "keyboard",
+        },
+    ),
+    Case(
+        platform_pb2.ComputeStatus,
+        COMPUTE,
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 300,
+            "cpu_percent": 12.5,
+            "cpu_temperature_available": True,
+            "cpu_temperature_c": 61.25,
+            "thermal_throttled_available": True,
+            "thermal_throttled": True,
+            "ram_used_bytes": 1 << 33,
+            "ram_total_bytes": 1 << 34,
+            "ram_used_percent": 50.0,
+            "disk_available": True,
+            "disk_used_percent": 75.5,
+        },
+    ),
+    Case(
+        platform_pb2.NetworkStatus,
+        NETWORK,
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 7,
+            "connected": True,
+            "interface_name": "wlan0",
+            "wifi_signal_available": True,
+            "wifi_signal_dbm": -67,
+            "link_quality_available": True,
+            "link_quality_percent": 80,
+        },
+    ),
+    Case(
+        platform_pb2.BatteryStatus,
+        BATTERY,
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 9,
+            "source": "lipo",
+            "present": True,
+            "voltage_available": True,
+            "voltage": 14.75,
+            "percentage_available": True,
+            "percentage": 82.5,
+            "charging_available": True,
+            "charging": True,
+        },
+    ),
+    Case(
+        platform_pb2.PowerStatus,
+        sub(1, uint(3, 1)) + sub(2, uint(3, 2)),
+        {
+            "lipo_battery": platform_pb2.BatteryStatus(age_ms=1),
+            "onboard_battery": platform_pb2.BatteryStatus(age_ms=2),
+        },
+    ),
+    Case(
+        platform_pb2.PlatformStatus,
+        sub(1, uint(3, 1)) + sub(2, uint(3, 2)) + sub(3, sub(1, uint(3, 3))),
+        {
+            "compute": platform_pb2.ComputeStatus(age_ms=1),
+            "network": platform_pb2.NetworkStatus(age_ms=2),
+            "power": platform_pb2.PowerStatus(lipo_battery=platform_pb2.BatteryStatus(age_ms=3)),
+        },
+    ),
+    Case(
+        overlay_pb2.OverlaySnapshot,
+        sub(1, text(1, "lab")) + sub(2, uint(6, 3)) + sub(3, uint(1, 1)) + sub(3, uint(1, 2)),
+        {
+            "status": system_status_pb2.SystemStatus(gateway_name="lab"),
+            "detections": overlay_pb2.DetectionOverlayStatus(detection_count=3),
+            "events": [overlay_pb2.OperatorEvent(sequence=1), overlay_pb2.OperatorEvent(sequence=2)],
+        },
+    ),
+    Case(
+        overlay_pb2.DetectionOverlayStatus,
+        uint(1, 1)
+        + uint(2, 1)
+        + uint(3, 66)
+        + uint(4, 1280)
+        + uint(5, 720)
+        + uint(6, 2)
+        + sub(7, uint(1, 1))
+        + sub(7, uint(1, 2)),
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 66,
+            "source_width_px": 1280,
+            "source_height_px": 720,
+            "detection_count": 2,
+            "detections": [
+                overlay_pb2.OverlayDetection(class_id=1),
+                overlay_pb2.OverlayDetection(class_id=2),
+            ],
+        },
+    ),
+    Case(
+        overlay_pb2.OverlayDetection,
+        DETECTION,
+        {
+            "class_id": -3,
+            "class_name": "person",
+            "score": 0.75,
+            "track_id": "t7",
+            "bbox_center_x_px": 640.0,
+            "bbox_center_y_px": 360.0,
+            "bbox_width_px": 100.5,
+            "bbox_height_px": 200.25,
+        },
+    ),
+    Case(
+        overlay_pb2.OperatorEvent,
+        uint(1, 12) + uint(2, 3400) + text(3, "preview running"),
+        {"sequence": 12, "age_ms": 3400, "message": "preview running"},
+    ),
+    Case(robot_gateway_pb2.GetSystemStatusRequest, b"", {}),
+    Case(robot_gateway_pb2.GetOverlaySnapshotRequest, b"", {}),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.message.DESCRIPTOR.name)
+def test_bytes_by_hand_mean_what_the_locked_contract_says(case: Case) -> None:
+    message = case.message.FromString(case.wire)
+
+    assert {field.name for field, _ in message.ListFields()} == set(case.fields)
+    for name, expected in case.fields.items():
+        value = getattr(message, name)
+        assert (list(value) if isinstance(expected, list) else value) == expected, name
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.message.DESCRIPTOR.name)
+def test_every_locked_field_has_its_byte_string(case: Case) -> None:
+    locked = {field.name for field in case.message.DESCRIPTOR.fields if field.number < 16}
+    assert set(case.fields) == locked
+
+
+@pytest.mark.parametrize(
+    ("enum", "numbers"),
+    [
+        (
+            "omniseer.gateway.v1.PreviewState",
+            {
+                "PREVIEW_STATE_UNSPECIFIED": 0,
+                "PREVIEW_DISABLED": 1,
+                "PREVIEW_RUNNING": 2,
+                "PREVIEW_STARTING": 3,
+                "PREVIEW_STOPPING": 4,
+                "PREVIEW_FAULTED": 5,
+            },
+        ),
+        (
+            "omniseer.gateway.v1.PreviewProfile",
+            {
+                "PREVIEW_PROFILE_UNSPECIFIED": 0,
+                "PREVIEW_PROFILE_LOW_BW": 1,
+                "PREVIEW_PROFILE_BALANCED": 2,
+                "PREVIEW_PROFILE_HIGH_QUALITY": 3,
+            },
+        ),
+        (
+            "omniseer.gateway.v1.RobotHealthState",
+            {"ROBOT_HEALTH_STATE_UNSPECIFIED": 0, "ROBOT_HEALTH_OK": 1, "ROBOT_HEALTH_DEGRADED": 2},
+        ),
+        (
+            "omniseer.gateway.v1.TeleopState",
+            {"TELEOP_STATE_UNSPECIFIED": 0, "TELEOP_DISABLED": 1, "TELEOP_ENABLED": 2},
+        ),
+    ],
+)
+def test_enum_values_keep_their_numbers(enum: str, numbers: dict[str, int]) -> None:
+    pool = system_status_pb2.DESCRIPTOR.pool
+    assert {value.name: value.number for value in pool.FindEnumTypeByName(enum).values} == numbers
+
+
+def test_methods_keep_their_paths() -> None:
+    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+    assert service.full_name == "omniseer.gateway.v1.RobotGateway"
+    locked = {
+        "GetSystemStatus": ("GetSystemStatusRequest", "SystemStatus"),
+        "SetPreviewMode": ("SetPreviewModeRequest", "SetPreviewModeResponse"),
+        "GetOverlaySnapshot": ("GetOverlaySnapshotRequest", "OverlaySnapshot"),
+    }
+    found = {method.name: (method.input_type.name, method.output_type.name) for method in service.methods}
+    assert locked.items() <= found.items()
