@@ -59,7 +59,8 @@ def _table(rows: list[Row]) -> Table:
     for row in rows:
         reference = "" if row.reference is None else f"{row.reference:.4g} {row.unit}"
         ratio = "" if row.ratio is None else f"{row.ratio:.3f}"
-        bar = f"{'<=' if row.better == 'lower' else '>='} {row.bar:g}{' x' if row.ratio is not None else ' ' + row.unit}"
+        sign = "<=" if row.better == "lower" else ">="
+        bar = f"{sign} {row.bar:g} {row.unit if row.ratio is None else 'x'}"
         value = f"{row.value:.4g} {row.unit}"
         table.add_row(row.name, row.what, value, reference, ratio, bar, "yes" if row.ok else "NO")
     return table
