@@ -4,9 +4,18 @@ Importing this module fails with a `UserError` that says what to install, where 
 missing; so it is imported late, by the part that is about to build a pipeline.
 """
 
+import ctypes
+from contextlib import suppress
 from typing import Any, Final
 
 from common.errors import UserError
+
+# GStreamer's core brings libunwind, which defines the same _Unwind_* symbols as libgcc_s. In a process that
+# loaded the C++ runtime before GStreamer (importing grpc does), libsrt would throw its exceptions with one
+# of the two and catch them with the other, which aborts the process when an SRT element stops. With
+# libgcc_s in the global scope everybody finds the same one, whatever was imported first.
+with suppress(OSError):
+    ctypes.CDLL("libgcc_s.so.1", mode=ctypes.RTLD_GLOBAL)
 
 try:
     import gi
