@@ -70,3 +70,30 @@ class Received(Generic[ValueT_co]):
 
     value: ValueT_co
     at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Compute:
+    """The robot's computer: load, heat, memory, disk."""
+
+    cpu_percent: float
+    cpu_temperature_c: float | None
+    thermal_throttled: bool | None
+    ram_used_bytes: int
+    ram_total_bytes: int
+    disk_used_percent: float | None
+
+    @property
+    def ram_used_percent(self) -> float:
+        """Memory in use, in percent of the installed."""
+        return 100.0 * self.ram_used_bytes / self.ram_total_bytes if self.ram_total_bytes else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """The network interface that leads to the operator; its name is empty when there is none."""
+
+    interface_name: str
+    connected: bool
+    wifi_signal_dbm: int | None
+    link_quality_percent: int | None

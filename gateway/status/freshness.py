@@ -1,0 +1,42 @@
+"""Whether a value was ever received, and whether it is too old to rely on."""
+
+from dataclasses import dataclass
+from typing import Final, Generic
+
+from gateway.status.values import Received, ValueT_co
+
+
+@dataclass(frozen=True, slots=True)
+class Freshness:
+    """How far a value can be relied on; `age_ms` is 0 when none was received."""
+
+    available: bool
+    stale: bool
+    age_ms: int
+
+    @property
+    def fresh(self) -> bool:
+        """Received, and not too old."""
+        return self.available and not self.stale
+
+
+NEVER: Final = Freshness(available=False, stale=False, age_ms=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sample(Generic[ValueT_co]):
+    """A value as it stood at one instant: None exactly when it is not available."""
+
+    value: ValueT_co | None
+    freshness: Freshness
+
+
+def sample(received: Received[ValueT_co] | None, stale_after_ms: int, now_s: float) -> Sample[ValueT_co]:
+    """The value at `now_s`; stale when strictly older than `stale_after_ms`.
+
+    A value that was handed over after `now_s` was read has the age 0.
+    """
+    if received is None:
+        return Sample(None, NEVER)
+    age_ms = max(0, int((now_s - received.at_s) * 1000))
+    return Sample(received.value, Freshness(available=True, stale=age_ms > stale_after_ms, age_ms=age_ms))

@@ -1,0 +1,99 @@
+"""One instant of everything: the newest values, their freshness and the verdict that follows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from gateway.status.board import Board, SourceKind
+from gateway.status.events import Event
+from gateway.status.freshness import Freshness, Sample, sample
+from gateway.status.health import Health, assess
+from gateway.status.preview import Measurement, PreviewView
+from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Vision
+
+MEASUREMENT_STALE_AFTER_MS: Final = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Which gateway speaks, and whether anybody on the network may listen in."""
+
+    name: str
+    version: str
+    insecure: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SourceRule:
+    """What is expected of one source."""
+
+    stale_after_ms: int
+    required: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What is expected of everything. A kind that is not in `sources` is not configured."""
+
+    sources: Mapping[SourceKind, SourceRule]
+    platform_stale_after_ms: int
+
+    def stale_after_ms(self, kind: SourceKind) -> int:
+        """The limit of a source; 0 for one that is not configured, and so never has a value."""
+        rule = self.sources.get(kind)
+        return rule.stale_after_ms if rule else 0
+
+    def if_required(self, kind: SourceKind, freshness: Freshness) -> Freshness | None:
+        """The freshness where the robot's health depends on it, else None."""
+        rule = self.sources.get(kind)
+        return freshness if rule and rule.required else None
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Everything at `at_s`."""
+
+    at_s: float
+    identity: Identity
+    health: Health
+    odometry: Sample[Odometry]
+    vision: Sample[Vision]
+    detections: Sample[Detections]
+    battery: Sample[Battery]
+    compute: Sample[Compute]
+    network: Sample[Network]
+    onboard_battery: Sample[Battery]
+    preview: PreviewView
+    preview_measured: Sample[Measurement]
+    events: tuple[Event, ...]
+
+
+def take(
+    identity: Identity,
+    rules: Rules,
+    board: Board,
+    preview: PreviewView,
+    events: tuple[Event, ...],
+    now_s: float,
+) -> Snapshot:
+    """What is true at `now_s`, from the newest values alone."""
+    odometry = sample(board.odometry, rules.stale_after_ms(SourceKind.ODOMETRY), now_s)
+    vision = sample(board.vision, rules.stale_after_ms(SourceKind.VISION), now_s)
+    return Snapshot(
+        at_s=now_s,
+        identity=identity,
+        health=assess(
+            rules.if_required(SourceKind.ODOMETRY, odometry.freshness),
+            rules.if_required(SourceKind.VISION, vision.freshness),
+        ),
+        odometry=odometry,
+        vision=vision,
+        detections=sample(board.detections, rules.stale_after_ms(SourceKind.DETECTIONS), now_s),
+        battery=sample(board.battery, rules.stale_after_ms(SourceKind.BATTERY), now_s),
+        compute=sample(board.compute, rules.platform_stale_after_ms, now_s),
+        network=sample(board.network, rules.platform_stale_after_ms, now_s),
+        onboard_battery=sample(board.onboard_battery, rules.platform_stale_after_ms, now_s),
+        preview=preview,
+        preview_measured=sample(preview.measured, MEASUREMENT_STALE_AFTER_MS, now_s),
+        events=events,
+    )
