@@ -1,0 +1,61 @@
+"""Talks to a robot's gateway from Python, blocking or with asyncio; knows neither ROS nor GStreamer.
+
+    from console.client import GatewayClient, PreviewProfile
+
+    with GatewayClient("robot.local") as robot:
+        status = robot.status()
+        print(status.health.summary, status.odometry.linear_speed_mps)
+
+Every call has a deadline, is tried again for a moment while the robot can't be reached, and either returns a
+frozen value of `console.client.results` or raises a `GatewayError` that says what to do.
+"""
+
+from console.client.aio import AsyncGatewayClient
+from console.client.blocking import GatewayClient
+from console.client.errors import (
+    Cancelled,
+    DeadlineExceeded,
+    GatewayError,
+    GatewayFailed,
+    InvalidRequest,
+    NotAllowed,
+    Overloaded,
+    Refused,
+    Unreachable,
+    Unsupported,
+)
+from console.client.options import Backoff, ClientOptions
+from console.client.results import (
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    PreviewState,
+    PreviewStatus,
+    SystemStatus,
+)
+from console.client.target import DEFAULT_TARGET, parse_target
+
+__all__ = [
+    "DEFAULT_TARGET",
+    "AsyncGatewayClient",
+    "Backoff",
+    "Cancelled",
+    "ClientOptions",
+    "DeadlineExceeded",
+    "GatewayClient",
+    "GatewayError",
+    "GatewayFailed",
+    "InvalidRequest",
+    "NotAllowed",
+    "OverlaySnapshot",
+    "Overloaded",
+    "PreviewChange",
+    "PreviewProfile",
+    "PreviewState",
+    "PreviewStatus",
+    "Refused",
+    "SystemStatus",
+    "Unreachable",
+    "Unsupported",
+    "parse_target",
+]

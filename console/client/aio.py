@@ -1,0 +1,118 @@
+"""The client for asyncio: the same methods, to be awaited."""
+
+import asyncio
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import grpc
+
+from console.client.error_table import error_from
+from console.client.errors import Cancelled, GatewayError
+from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
+from console.client.mapping.methods import METHODS, PreviewWish
+from console.client.options import ClientOptions
+from console.client.results import OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from console.client.target import DEFAULT_TARGET, parse_target
+
+ResultT = TypeVar("ResultT")
+
+
+class AsyncGatewayClient:
+    """A robot's gateway, for one asyncio loop. Make it inside the loop that uses it.
+
+    The connection is made at the first call and made again whenever it breaks. Cancelling a task that waits
+    for an answer cancels the call.
+
+    Example:
+        async with AsyncGatewayClient("robot.local") as robot:
+            status, overlay = await asyncio.gather(robot.status(), robot.overlay())
+
+    Args:
+        target: HOST or HOST:PORT.
+        options: how patient to be.
+
+    Raises:
+        UserError: the target is not an address. Every method raises a `GatewayError`.
+    """
+
+    def __init__(self, target: str = DEFAULT_TARGET, options: ClientOptions | None = None) -> None:
+        options = options or ClientOptions()
+        self.target = parse_target(target)
+        self._exchanges = Exchanges(options)
+        self._closed = asyncio.Event()
+        self._channel = grpc.aio.insecure_channel(self.target, options=options.channel_options())
+        self._calls = {
+            method.name: self._channel.unary_unary(
+                method.path, request_serializer=method.encode, response_deserializer=method.decode
+            )
+            for method in METHODS
+        }
+
+    @property
+    def retries(self) -> int:
+        """Attempts beyond the first, of all calls together."""
+        return self._exchanges.retries
+
+    async def status(self) -> SystemStatus:
+        """Everything the gateway knows about the robot."""
+        return await self._run(self._exchanges.status())
+
+    async def overlay(self) -> OverlaySnapshot:
+        """Status, detections and the newest events, at one instant."""
+        return await self._run(self._exchanges.overlay())
+
+    async def enable_preview(
+        self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
+    ) -> PreviewChange:
+        """As `GatewayClient.enable_preview`."""
+        return await self._run(self._exchanges.set_preview(PreviewWish(True, profile), settle_within_s))
+
+    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
+        """As `GatewayClient.disable_preview`."""
+        return await self._run(self._exchanges.set_preview(PreviewWish(False), settle_within_s))
+
+    async def close(self) -> None:
+        """Ends the connection. Calls under way in other tasks end with `Cancelled`."""
+        self._closed.set()
+        await self._channel.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        await self.close()
+
+    async def _run(self, exchange: Exchange[ResultT]) -> ResultT:
+        step = advance(exchange, None)
+        while not isinstance(step, Done):
+            step = advance(exchange, await self._carry_out(step))
+        return step.result
+
+    async def _carry_out(self, step: Step) -> Any:
+        if self._closed.is_set():
+            return Cancelled("this client is closed")
+        if isinstance(step, Pause):
+            await asyncio.sleep(step.seconds)
+            return None
+        return await self._send(step)
+
+    async def _send(self, step: Send[Any, Any]) -> Any | GatewayError:
+        try:
+            return await self._calls[step.method.name](step.request, timeout=step.timeout_s)
+        except grpc.RpcError as failure:
+            return error_from(failure, self.target, step.timeout_s)
+        except asyncio.CancelledError:
+            # gRPC says so, too, when another task closed the channel under this call.
+            if not self._closed.is_set() or _being_cancelled():
+                raise
+            return Cancelled("this client was closed")
+
+
+def _being_cancelled() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

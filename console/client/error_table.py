@@ -1,0 +1,99 @@
+"""One total table: what each gRPC status code means to someone who asked a robot."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, Protocol, cast
+
+import grpc
+
+from console.client.errors import (
+    Cancelled,
+    DeadlineExceeded,
+    GatewayError,
+    GatewayFailed,
+    InvalidRequest,
+    NotAllowed,
+    Overloaded,
+    Refused,
+    Unreachable,
+    Unsupported,
+)
+
+ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
+    {
+        # An error that carries OK is itself out of order.
+        grpc.StatusCode.OK: GatewayFailed,
+        grpc.StatusCode.CANCELLED: Cancelled,
+        grpc.StatusCode.UNKNOWN: GatewayFailed,
+        grpc.StatusCode.INVALID_ARGUMENT: InvalidRequest,
+        grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineExceeded,
+        grpc.StatusCode.NOT_FOUND: Refused,
+        grpc.StatusCode.ALREADY_EXISTS: Refused,
+        grpc.StatusCode.PERMISSION_DENIED: NotAllowed,
+        grpc.StatusCode.RESOURCE_EXHAUSTED: Overloaded,
+        grpc.StatusCode.FAILED_PRECONDITION: Refused,
+        grpc.StatusCode.ABORTED: Refused,
+        grpc.StatusCode.OUT_OF_RANGE: InvalidRequest,
+        grpc.StatusCode.UNIMPLEMENTED: Unsupported,
+        grpc.StatusCode.INTERNAL: GatewayFailed,
+        grpc.StatusCode.UNAVAILABLE: Unreachable,
+        grpc.StatusCode.DATA_LOSS: GatewayFailed,
+        grpc.StatusCode.UNAUTHENTICATED: NotAllowed,
+    }
+)
+
+# gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
+_PLAIN_WORDS: Final = (
+    ("connection refused", "nothing listens there"),
+    ("dns resolution failed", "the name does not resolve"),
+    ("dns query cancelled", "the name does not resolve"),
+    ("domain name not found", "the name does not resolve"),
+    ("keepalive", "the link went silent"),
+    ("ping timeout", "the link went silent"),
+    ("no route to host", "no route to this host"),
+    ("network is unreachable", "no network leads there"),
+    ("fd shutdown", "no answer"),
+    ("timeout occurred", "no answer"),
+    ("timed out", "no answer"),
+    ("socket closed", "the connection was closed"),
+    ("connection reset", "the connection was closed"),
+    ("failed parsing http/2", "what listens there does not speak gRPC"),
+    ("before receiving settings", "something listens there, but it does not answer as a gateway"),
+)
+
+
+class _Coded(Protocol):
+    """What the errors of both flavours of gRPC carry; they share no class that says so."""
+
+    def code(self) -> grpc.StatusCode: ...
+
+    def details(self) -> str | None: ...
+
+
+def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> GatewayError:
+    """The family member for a failed call.
+
+    Args:
+        failure: what gRPC raised; it carries a code and details.
+        target: the robot's address, for the message.
+        timeout_s: how long the call was allowed to take.
+    """
+    coded = cast("_Coded", failure)
+    code = coded.code()
+    family = ERRORS[code]
+    return family(_sentence(family, coded.details() or code.name, target, timeout_s))
+
+
+def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: float) -> str:
+    if family is Unreachable:
+        return f"no robot gateway reached at {target}: {_in_plain_words(details)}"
+    if family is DeadlineExceeded:
+        return f"the robot gateway at {target} did not answer within {timeout_s:.1f} s"
+    if issubclass(family, Refused | InvalidRequest):
+        return f"the robot gateway at {target} refused: {details}"
+    return f"the call to the robot gateway at {target} failed: {details}"
+
+
+def _in_plain_words(details: str) -> str:
+    lowered = details.lower()
+    return next((plain for fragment, plain in _PLAIN_WORDS if fragment in lowered), details)

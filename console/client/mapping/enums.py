@@ -1,0 +1,96 @@
+"""The contract's enumerations. A number this client has no word for reads UNKNOWN, never an error."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from console.client.results import (
+    HealthState,
+    PreviewProfile,
+    PreviewState,
+    StreamContainer,
+    StreamTransport,
+    TeleopState,
+    VideoCodec,
+)
+from omniseer.gateway.v1 import preview_pb2 as preview
+from omniseer.gateway.v1 import states_pb2 as states
+
+_PREVIEW_STATES: Final[Mapping[int, PreviewState]] = {
+    states.PREVIEW_STATE_UNSPECIFIED: PreviewState.UNKNOWN,
+    states.PREVIEW_DISABLED: PreviewState.DISABLED,
+    states.PREVIEW_RUNNING: PreviewState.RUNNING,
+    states.PREVIEW_STARTING: PreviewState.STARTING,
+    states.PREVIEW_STOPPING: PreviewState.STOPPING,
+    states.PREVIEW_FAULTED: PreviewState.FAULTED,
+}
+_HEALTH_STATES: Final[Mapping[int, HealthState]] = {
+    states.ROBOT_HEALTH_STATE_UNSPECIFIED: HealthState.UNKNOWN,
+    states.ROBOT_HEALTH_OK: HealthState.OK,
+    states.ROBOT_HEALTH_DEGRADED: HealthState.DEGRADED,
+}
+_TELEOP_STATES: Final[Mapping[int, TeleopState]] = {
+    states.TELEOP_STATE_UNSPECIFIED: TeleopState.UNKNOWN,
+    states.TELEOP_DISABLED: TeleopState.DISABLED,
+    states.TELEOP_ENABLED: TeleopState.ENABLED,
+}
+_CODECS: Final[Mapping[int, VideoCodec]] = {
+    preview.VIDEO_CODEC_UNSPECIFIED: VideoCodec.UNKNOWN,
+    preview.VIDEO_CODEC_H264: VideoCodec.H264,
+    preview.VIDEO_CODEC_H265: VideoCodec.H265,
+}
+_TRANSPORTS: Final[Mapping[int, StreamTransport]] = {
+    preview.STREAM_TRANSPORT_UNSPECIFIED: StreamTransport.UNKNOWN,
+    preview.STREAM_TRANSPORT_SRT: StreamTransport.SRT,
+}
+_CONTAINERS: Final[Mapping[int, StreamContainer]] = {
+    preview.STREAM_CONTAINER_UNSPECIFIED: StreamContainer.UNKNOWN,
+    preview.STREAM_CONTAINER_MPEG_TS: StreamContainer.MPEG_TS,
+}
+# Both directions are needed: answers carry a profile, and so do requests.
+_PROFILE_NUMBERS: Final[Mapping[PreviewProfile, preview.PreviewProfile.ValueType]] = {
+    PreviewProfile.UNKNOWN: preview.PREVIEW_PROFILE_UNSPECIFIED,
+    PreviewProfile.LOW_BW: preview.PREVIEW_PROFILE_LOW_BW,
+    PreviewProfile.BALANCED: preview.PREVIEW_PROFILE_BALANCED,
+    PreviewProfile.HIGH_QUALITY: preview.PREVIEW_PROFILE_HIGH_QUALITY,
+}
+_PROFILES: Final[Mapping[int, PreviewProfile]] = {word: own for own, word in _PROFILE_NUMBERS.items()}
+
+
+def preview_state(number: int) -> PreviewState:
+    """The preview's state."""
+    return _PREVIEW_STATES.get(number, PreviewState.UNKNOWN)
+
+
+def health_state(number: int) -> HealthState:
+    """The robot's health."""
+    return _HEALTH_STATES.get(number, HealthState.UNKNOWN)
+
+
+def teleop_state(number: int) -> TeleopState:
+    """Whether the robot takes operator commands."""
+    return _TELEOP_STATES.get(number, TeleopState.UNKNOWN)
+
+
+def video_codec(number: int) -> VideoCodec:
+    """How pictures are compressed."""
+    return _CODECS.get(number, VideoCodec.UNKNOWN)
+
+
+def stream_transport(number: int) -> StreamTransport:
+    """How the stream is carried."""
+    return _TRANSPORTS.get(number, StreamTransport.UNKNOWN)
+
+
+def stream_container(number: int) -> StreamContainer:
+    """What the stream is packed in."""
+    return _CONTAINERS.get(number, StreamContainer.UNKNOWN)
+
+
+def preview_profile(number: int) -> PreviewProfile:
+    """The profile in an answer."""
+    return _PROFILES.get(number, PreviewProfile.UNKNOWN)
+
+
+def profile_number(profile: PreviewProfile) -> preview.PreviewProfile.ValueType:
+    """The profile in a request."""
+    return _PROFILE_NUMBERS[profile]

@@ -1,0 +1,93 @@
+"""The contract's methods: bytes out of a request's values, a result out of the answer's bytes.
+
+gRPC moves bytes; it is told here how they are made and read, so that everything above speaks results only.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Generic, TypeVar
+
+from console.client.mapping.enums import profile_number
+from console.client.mapping.overlay import overlay_snapshot
+from console.client.mapping.preview import preview
+from console.client.mapping.status import system_status
+from console.client.results import OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2, system_status_pb2
+
+_SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+
+RequestT = TypeVar("RequestT")
+ResultT = TypeVar("ResultT")
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewWish:
+    """What the operator wants of the preview. A profile that is UNKNOWN keeps the current one."""
+
+    enabled: bool
+    profile: PreviewProfile = PreviewProfile.UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Method(Generic[RequestT, ResultT]):
+    """One method of the contract.
+
+    Args:
+        name: as in the schema.
+        encode: request value to message bytes.
+        decode: message bytes to result.
+        idempotent: whether asking twice does the same as asking once, so that a lost answer may be asked
+            for again.
+    """
+
+    name: str
+    encode: Callable[[RequestT], bytes]
+    decode: Callable[[bytes], ResultT]
+    idempotent: bool
+
+    @property
+    def path(self) -> str:
+        """The method's address on the wire."""
+        return f"/{_SERVICE.full_name}/{_SERVICE.methods_by_name[self.name].name}"
+
+
+def _encode_status_request(_: None) -> bytes:
+    return robot_gateway_pb2.GetSystemStatusRequest().SerializeToString()
+
+
+def _encode_overlay_request(_: None) -> bytes:
+    return robot_gateway_pb2.GetOverlaySnapshotRequest().SerializeToString()
+
+
+def _encode_preview_wish(wish: PreviewWish) -> bytes:
+    request = robot_gateway_pb2.SetPreviewModeRequest(
+        enabled=wish.enabled, profile=profile_number(wish.profile)
+    )
+    return request.SerializeToString()
+
+
+def _decode_status(data: bytes) -> SystemStatus:
+    return system_status(system_status_pb2.SystemStatus.FromString(data))
+
+
+def _decode_overlay(data: bytes) -> OverlaySnapshot:
+    return overlay_snapshot(overlay_pb2.OverlaySnapshot.FromString(data))
+
+
+def _decode_preview_change(data: bytes) -> PreviewChange:
+    answer = robot_gateway_pb2.SetPreviewModeResponse.FromString(data)
+    return PreviewChange(accepted=answer.accepted, message=answer.message, preview=preview(answer.preview))
+
+
+GET_SYSTEM_STATUS: Final[Method[None, SystemStatus]] = Method(
+    "GetSystemStatus", _encode_status_request, _decode_status, idempotent=True
+)
+# A wish names the state that is wanted, not a change: to wish twice is to wish once.
+SET_PREVIEW_MODE: Final[Method[PreviewWish, PreviewChange]] = Method(
+    "SetPreviewMode", _encode_preview_wish, _decode_preview_change, idempotent=True
+)
+GET_OVERLAY_SNAPSHOT: Final[Method[None, OverlaySnapshot]] = Method(
+    "GetOverlaySnapshot", _encode_overlay_request, _decode_overlay, idempotent=True
+)
+METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT)
+"""Every method of the contract (a test compares with the schema)."""

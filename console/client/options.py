@@ -1,0 +1,63 @@
+"""How patient a client is: deadlines, retries, and how soon a dead link is noticed."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+_MS_PER_S = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Backoff:
+    """Pauses between attempts: they grow, up to a limit, and never go on for ever."""
+
+    first_s: float = 0.1
+    factor: float = 2.0
+    longest_s: float = 0.4
+    give_up_after_s: float = 1.0
+    """No attempt is begun later than this after the first one."""
+
+    def pauses(self) -> Iterator[float]:
+        """The pause before each further attempt, in seconds."""
+        pause_s = self.first_s
+        while True:
+            yield pause_s
+            pause_s = min(pause_s * self.factor, self.longest_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClientOptions:
+    """Everything a client can be told. A robot that is not there is reported in about 2 s by default."""
+
+    answer_within_s: float = 2.0
+    """Deadline of a status or overlay call, retries included. The gateway answers from memory."""
+    preview_within_s: float = 8.0
+    """Deadline of a preview call: the robot may wait for the pipeline before it answers."""
+    settle_poll_s: float = 0.1
+    """Pause between looks at a preview that is starting or stopping."""
+    connect_within_s: float = 1.0
+    """Deadline of one attempt to connect, name look-up included separately with the same deadline."""
+    backoff: Backoff = field(default_factory=Backoff)
+    keepalive_every_s: float = 2.0
+    """Pause between pings on a silent connection."""
+    keepalive_within_s: float = 2.0
+    """Deadline of a ping's answer. A half-dead link is noticed after the sum of both at the latest."""
+
+    def channel_options(self) -> list[tuple[str, int]]:
+        """The same for gRPC's channel, which counts in ms."""
+        connect_ms = round(self.connect_within_s * _MS_PER_S)
+        return [
+            # The shortest pause between attempts is also how long gRPC lets one attempt take.
+            ("grpc.initial_reconnect_backoff_ms", round(self.backoff.first_s * _MS_PER_S)),
+            ("grpc.min_reconnect_backoff_ms", connect_ms),
+            ("grpc.max_reconnect_backoff_ms", connect_ms),
+            ("grpc.dns_ares_query_timeout", connect_ms),
+            ("grpc.keepalive_time_ms", round(self.keepalive_every_s * _MS_PER_S)),
+            ("grpc.keepalive_timeout_ms", round(self.keepalive_within_s * _MS_PER_S)),
+            # Between calls, too: the next call then finds a new connection instead of a dead one.
+            ("grpc.keepalive_permit_without_calls", 1),
+            ("grpc.http2.max_pings_without_data", 0),
+            # A robot is never behind the office's web proxy.
+            ("grpc.enable_http_proxy", 0),
+            # Clients share nothing: closing one never hurts another.
+            ("grpc.use_local_subchannel_pool", 1),
+        ]

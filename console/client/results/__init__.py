@@ -1,0 +1,69 @@
+"""What a robot's gateway answers, as frozen values with units in their names; free of the wire format.
+
+None means "not known". Enumerations have a member `UNKNOWN`: the gateway did not say, or it is newer than
+this client and said something this client has no word for.
+"""
+
+from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
+from console.client.results.platform import Battery, Compute, Network, Platform, Power
+from console.client.results.preview import (
+    Encoder,
+    PreviewChange,
+    PreviewCounters,
+    PreviewMeasurement,
+    PreviewProfile,
+    PreviewState,
+    PreviewStatus,
+    StreamContainer,
+    StreamEndpoint,
+    StreamTransport,
+    VideoCodec,
+    VideoFormat,
+)
+from console.client.results.sample import Freshness, Sample
+from console.client.results.status import (
+    EffectiveCommand,
+    Health,
+    HealthState,
+    Odometry,
+    SystemStatus,
+    Teleop,
+    TeleopCommand,
+    TeleopState,
+    Vision,
+)
+
+__all__ = [
+    "Battery",
+    "Compute",
+    "Detection",
+    "Detections",
+    "EffectiveCommand",
+    "Encoder",
+    "Freshness",
+    "Health",
+    "HealthState",
+    "Network",
+    "Odometry",
+    "OperatorEvent",
+    "OverlaySnapshot",
+    "Platform",
+    "Power",
+    "PreviewChange",
+    "PreviewCounters",
+    "PreviewMeasurement",
+    "PreviewProfile",
+    "PreviewState",
+    "PreviewStatus",
+    "Sample",
+    "StreamContainer",
+    "StreamEndpoint",
+    "StreamTransport",
+    "SystemStatus",
+    "Teleop",
+    "TeleopCommand",
+    "TeleopState",
+    "VideoCodec",
+    "VideoFormat",
+    "Vision",
+]
