@@ -20,6 +20,12 @@ class SourceSettings(Section):
     stale_after_ms: int = Field(gt=0)
     required: bool = False
     """Whether the robot counts as degraded without this source (odometry and vision only)."""
+    image_width_px: int = Field(default=1280, gt=0)
+    """Width of the picture that detection boxes refer to (detections only); the messages don't tell."""
+    image_height_px: int = Field(default=720, gt=0)
+    """Height of the same picture."""
+    max_items: int = Field(default=100, ge=1, le=1000)
+    """How many detections of one picture are kept; all are counted."""
 
 
 DEFAULT_SOURCES = (
