@@ -1,0 +1,70 @@
+"""One decoded picture."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+
+class Pixels(Protocol):
+    """Memory of a picture; a Gst.Buffer is one."""
+
+    def extract_dup(self, offset: int, size: int, /) -> bytes:
+        """Copies `size` bytes from `offset` on out of the picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """Where one component of a picture lies in its memory.
+
+    Args:
+        offset: of the first row, in bytes.
+        stride: from one row to the next, in bytes; at least the plane's width.
+        rows: number of rows.
+    """
+
+    offset: int
+    stride: int
+    rows: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A decoded picture in I420: a plane of luma, then two of chroma at half the size.
+
+    The pixels stay in GStreamer's memory until they are asked for, and are copied once then.
+
+    Args:
+        width: in pixels.
+        height: in pixels.
+        codec: what it was compressed with, "h264" or "h265".
+        pts_ns: the sender's presentation time as the demultiplexer gives it; None when it gave none.
+        arrival_s: when the decoder handed it out, on `time.monotonic()`.
+        corrupt: whether the decoder had to guess parts of it, because packets were lost.
+        planes: luma, Cb, Cr.
+        pixels: the memory.
+    """
+
+    width: int
+    height: int
+    codec: str
+    pts_ns: int | None
+    arrival_s: float
+    corrupt: bool
+    planes: tuple[Plane, Plane, Plane] = field(repr=False)
+    pixels: Pixels = field(repr=False)
+
+    def plane(self, index: int) -> bytes:
+        """All rows of a plane, `planes[index].stride` bytes each (0 is luma, 1 Cb, 2 Cr)."""
+        return self._rows(self.planes[index], 0, self.planes[index].rows)
+
+    def luma_rows(self, first: int, count: int) -> bytes:
+        """Some rows of luma, `planes[0].stride` bytes each; cheaper than the whole plane.
+
+        Raises:
+            IndexError: rows outside the picture.
+        """
+        if first < 0 or count < 0 or first + count > self.height:
+            raise IndexError(f"rows {first} to {first + count} of a picture with {self.height}")
+        return self._rows(self.planes[0], first, count)
+
+    def _rows(self, plane: Plane, first: int, count: int) -> bytes:
+        return self.pixels.extract_dup(plane.offset + first * plane.stride, count * plane.stride)
