@@ -9,7 +9,7 @@ from common.gst import GLib, Gst
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.inbox import Inbox
-from console.receiver.trouble import Undecodable, ended, from_srt
+from console.receiver.errors import UndecodableError, ended, from_srt
 
 _STOP = "stop"
 _BRANCH_GONE = "branch-gone"
@@ -19,7 +19,7 @@ class Connection:
     """Calls the robot, fills the inbox, and ends it with a reason when the connection is over.
 
     GStreamer runs everything up to the decoder on the source's one thread; a second thread, ours, reads the
-    bus. A change of codec makes the demultiplexer offer a new pad: it gets its own decoder, the old one leaves.
+    bus. A change of codec makes the demultiplexer offer a new pad: it gets a decoder, the old one leaves.
 
     Args:
         address: what to call.
@@ -85,7 +85,7 @@ class Connection:
         try:
             branch = DecodingBranch(codec, self._inbox.put)
         except UserError as error:
-            self._inbox.end(Undecodable(error.what, error.remedy, final=True))
+            self._inbox.end(UndecodableError(error.what, error.remedy, final=True))
             return
         self._branches[pad.get_name()] = branch
         branch.attach(self._pipeline, pad)
@@ -127,8 +127,8 @@ class Connection:
         )
 
 
-def _undecodable(address: StreamAddress, what: str) -> Undecodable:
-    return Undecodable(
+def _undecodable(address: StreamAddress, what: str) -> UndecodableError:
+    return UndecodableError(
         f"{address.uri} sends {what}, which this receiver can't decode",
         "It takes H.264 and H.265 in an MPEG transport stream: is this the robot's preview port",
         final=True,

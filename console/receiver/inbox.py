@@ -5,7 +5,7 @@ import time
 from collections import deque
 
 from console.receiver.frame import Frame
-from console.receiver.trouble import StreamError
+from console.receiver.errors import StreamError
 
 
 class Inbox:

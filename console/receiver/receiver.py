@@ -10,7 +10,7 @@ from typing import Protocol, Self
 from console.receiver.address import StreamAddress
 from console.receiver.frame import Frame
 from console.receiver.inbox import Inbox
-from console.receiver.trouble import CLOSED, StreamError, nothing_within
+from console.receiver.errors import CLOSED, StreamError, nothing_within
 
 
 class Call(Protocol):
@@ -24,7 +24,7 @@ Dial = Callable[[StreamAddress, Inbox], Call]
 
 
 def _dial(address: StreamAddress, inbox: Inbox) -> Call:
-    # Imported here so that a program without GStreamer fails, with a clear error, only when asked for pictures.
+    # Imported here so that a program without GStreamer fails only when it is asked for pictures.
     from console.receiver.connection import Connection  # noqa: PLC0415
 
     return Connection(address, inbox)
@@ -82,7 +82,7 @@ class Receiver:
     Args:
         address: what to call.
         queue_size: how many decoded pictures may wait for the caller.
-        reconnect: call again when the connection is lost, inside `next_frame`; None raises the reason instead.
+        reconnect: call again when the connection is lost, inside `next_frame`; None raises the reason.
         dial: makes connections; only tests give another one.
 
     Raises:
@@ -132,8 +132,8 @@ class Receiver:
         """The oldest picture that waits, or the next one to come.
 
         Raises:
-            NoPicture: none came within `timeout_s` seconds; asking again is fine.
-            ReceiverClosed: somebody closed the receiver.
+            NoPictureError: none came within `timeout_s` seconds; asking again is fine.
+            ReceiverClosedError: somebody closed the receiver.
             StreamError: the stream was refused, ended or can't be decoded. With `reconnect`, only what
                 calling again can't mend; without, the same again at every further call.
         """
@@ -159,7 +159,7 @@ class Receiver:
         raise CLOSED
 
     def close(self) -> None:
-        """Hangs up; somebody who waits in `next_frame` gets `ReceiverClosed`. Closing again does nothing."""
+        """Hangs up; somebody who waits in `next_frame` gets `ReceiverClosedError`. Closing again does nothing."""
         with self._changing_call:
             if self._closing.is_set():
                 return

@@ -18,27 +18,27 @@ class StreamError(UserError):
         self.final = final
 
 
-class NoPicture(StreamError):
+class NoPictureError(StreamError):
     """No picture in the time the caller gave. The receiver goes on; asking again is fine."""
 
 
-class StreamEnded(StreamError):
+class StreamEndedError(StreamError):
     """The connection is over: the robot ended it, or it was lost."""
 
 
-class StreamRefused(StreamError):
+class StreamRefusedError(StreamError):
     """The connection never came about."""
 
 
-class Undecodable(StreamError):
+class UndecodableError(StreamError):
     """The stream arrives, but this machine can't make pictures of it."""
 
 
-class ReceiverClosed(StreamError):
+class ReceiverClosedError(StreamError):
     """The receiver was closed while, or before, somebody waited for a picture."""
 
 
-CLOSED = ReceiverClosed("the receiver is closed", "Make a new one", final=True)
+CLOSED = ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
 
 
 def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamError:
@@ -51,7 +51,7 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
     """
     reason = detail.strip().rsplit("\n", maxsplit=1)[-1]
     if "assword" in reason or "passphrase" in reason.lower():
-        return StreamRefused(
+        return StreamRefusedError(
             f"{address.uri} did not accept the passphrase"
             if address.passphrase
             else f"{address.uri} asks for a passphrase",
@@ -60,25 +60,25 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
         )
     if had_data:
         return ended(address, reason)
-    return StreamRefused(
+    return StreamRefusedError(
         f"no SRT listener answers at {address.uri} ({reason})",
         "Switch the preview on (robotctl preview on) and let UDP through to that port",
     )
 
 
-def ended(address: StreamAddress, reason: str = "") -> StreamEnded:
+def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     """The stream was there and is over."""
     why = f" ({reason})" if reason else ""
-    return StreamEnded(
+    return StreamEndedError(
         f"the stream from {address.uri} ended{why}",
         "The robot ended it or the connection was lost: look at robotctl status",
     )
 
 
-def nothing_within(address: StreamAddress, timeout_s: float, last: StreamError | None) -> NoPicture:
+def nothing_within(address: StreamAddress, timeout_s: float, last: StreamError | None) -> NoPictureError:
     """The caller's time is up."""
     why = f" ({last.what})" if last else ""
-    return NoPicture(
+    return NoPictureError(
         f"no picture from {address.uri} within {timeout_s:g} s{why}",
         "Check robotctl status: is the preview RUNNING, does it encode frames, is a passphrase needed",
     )
