@@ -69,6 +69,7 @@ class Snapshot:
 
 
 def take(
+    *,
     identity: Identity,
     rules: Rules,
     board: Board,
