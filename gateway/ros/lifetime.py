@@ -1,0 +1,69 @@
+"""How long the gateway is part of the ROS 2 graph: exactly as long as a `with` block.
+
+Domain, middleware and discovery range come from the environment (ROS_DOMAIN_ID, RMW_IMPLEMENTATION,
+ROS_AUTOMATIC_DISCOVERY_RANGE), as everywhere in ROS 2. Nothing of the process is touched: own context, no
+signal handlers, no log files, none of the services an ordinary node offers.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from common.errors import ExitCode, UserError
+
+try:
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
+except ImportError as error:
+    raise UserError(
+        f"ROS 2 can't be used from Python ({error})",
+        "Type: scripts/setup, or source the setup.bash of a ROS 2 installation first",
+    ) from error
+
+# Beyond it, the ports that DDS computes from the domain do not exist, and Fast DDS ends the process.
+_LAST_DOMAIN = 232
+
+
+@contextmanager
+def ros_node(name: str) -> Iterator[Any]:
+    """A node named `name` that only ever reads; gone from the graph when the block ends.
+
+    Raises:
+        UserError: the environment names an impossible domain, or the middleware can't start.
+    """
+    _check_domain()
+    context = Context()
+    try:
+        context.init(args=[], initialize_logging=False)
+    except RuntimeError as error:
+        raise UserError(
+            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION in the environment"
+        ) from error
+    try:
+        node = Node(
+            name,
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+    finally:
+        context.shutdown()
+        context.destroy()
+
+
+def _check_domain() -> None:
+    domain = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (domain.isascii() and domain.isdigit() and int(domain) <= _LAST_DOMAIN):
+        raise UserError(
+            f"ROS_DOMAIN_ID is '{domain}'",
+            f"Set it to a number from 0 to {_LAST_DOMAIN}",
+            exit_code=ExitCode.USAGE,
+        )

@@ -1,0 +1,24 @@
+"""nav_msgs/msg/Odometry: only the twist is read; it is in the robot's own frame (child_frame_id)."""
+
+from typing import Any
+
+from gateway.config import SourceSettings
+from gateway.ros.readers.plain import finite
+from gateway.ros.readers.registry import reads
+from gateway.status.board import SourceKind
+from gateway.status.values import Odometry
+
+
+@reads("nav_msgs/msg/Odometry", SourceKind.ODOMETRY)
+def from_odometry(message: Any, source: SourceSettings) -> Odometry | None:
+    """How the robot moves. None when a speed is not a finite number: the filter has lost itself."""
+    twist = message.twist.twist
+    return planar(twist.linear.x, twist.linear.y, twist.angular.z)
+
+
+def planar(vx_mps: Any, vy_mps: Any, wz_rad_s: Any) -> Odometry | None:
+    """A value out of three speeds, for readers of other types, too. None when one of them is not finite."""
+    vx, vy, wz = finite(vx_mps), finite(vy_mps), finite(wz_rad_s)
+    if vx is None or vy is None or wz is None:
+        return None
+    return Odometry(vx_mps=vx, vy_mps=vy, wz_rad_s=wz)

@@ -1,0 +1,44 @@
+"""Which function reads which message type."""
+
+from collections.abc import Callable
+from typing import Any
+
+from common.errors import ExitCode, UserError
+from gateway.config import SourceSettings
+from gateway.status.board import SourceKind
+from gateway.status.values import Battery, Detections, Odometry, Vision
+
+Value = Odometry | Vision | Detections | Battery
+Reader = Callable[[Any, SourceSettings], Value | None]
+"""Turns a message into a value; None when the message holds nothing that can be used."""
+
+_readers: dict[tuple[str, SourceKind], Reader] = {}
+
+
+def reads(message_type: str, kind: SourceKind) -> Callable[[Reader], Reader]:
+    """Registers the decorated function for a message type ("nav_msgs/msg/Odometry") and what it tells."""
+
+    def register(reader: Reader) -> Reader:
+        if (message_type, kind) in _readers:
+            raise ValueError(f"two readers for {message_type} as {kind.value}")
+        _readers[message_type, kind] = reader
+        return reader
+
+    return register
+
+
+def reader_for(source: SourceSettings) -> Reader:
+    """The reader of a configured source.
+
+    Raises:
+        UserError: no reader is known for this type; the line names those that are.
+    """
+    reader = _readers.get((source.type, source.kind))
+    if reader is None:
+        known = sorted(name for name, kind in _readers if kind is source.kind)
+        raise UserError(
+            f"source '{source.kind.value}' ({source.topic}) has type {source.type}, which no reader knows",
+            f"Use one of {', '.join(known)}, or add a reader (gateway/ros/readers)",
+            exit_code=ExitCode.USAGE,
+        )
+    return reader
