@@ -8,8 +8,8 @@ from common.errors import UserError
 from common.gst import GLib, Gst
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
-from console.receiver.inbox import Inbox
 from console.receiver.errors import UndecodableError, ended, from_srt
+from console.receiver.inbox import Inbox
 
 _STOP = "stop"
 _BRANCH_GONE = "branch-gone"

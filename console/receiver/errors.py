@@ -38,7 +38,9 @@ class ReceiverClosedError(StreamError):
     """The receiver was closed while, or before, somebody waited for a picture."""
 
 
-CLOSED = ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
+def closed() -> ReceiverClosedError:
+    """There will be no more pictures, because the caller wanted no more."""
+    return ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
 
 
 def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamError:

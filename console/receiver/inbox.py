@@ -4,8 +4,8 @@ import threading
 import time
 from collections import deque
 
-from console.receiver.frame import Frame
 from console.receiver.errors import StreamError
+from console.receiver.frame import Frame
 
 
 class Inbox:

@@ -8,9 +8,9 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from console.receiver.address import StreamAddress
+from console.receiver.errors import StreamError, closed, nothing_within
 from console.receiver.frame import Frame
 from console.receiver.inbox import Inbox
-from console.receiver.errors import CLOSED, StreamError, nothing_within
 
 
 class Call(Protocol):
@@ -148,7 +148,7 @@ class Receiver:
             if news is None:
                 raise nothing_within(self._address, timeout_s, self._last_trouble)
             if self._redialling is None or news.final:
-                raise news
+                raise news.with_traceback(None)
             self._last_trouble = news
             due_s = self._redialling.due_s()
             if not self._closing.wait(max(0.0, min(due_s, deadline_s) - time.monotonic())):
@@ -156,15 +156,15 @@ class Receiver:
                     raise nothing_within(self._address, timeout_s, news)
                 self._redialling.called()
                 self._call_again()
-        raise CLOSED
+        raise closed()
 
     def close(self) -> None:
-        """Hangs up; somebody who waits in `next_frame` gets `ReceiverClosedError`. Closing again does nothing."""
+        """Hangs up; who waits in `next_frame` gets a `ReceiverClosedError`. Closing again does nothing."""
         with self._changing_call:
             if self._closing.is_set():
                 return
             self._closing.set()
-            self._inbox.end(CLOSED)
+            self._inbox.end(closed())
             self._call.close()
 
     def _call_again(self) -> None:

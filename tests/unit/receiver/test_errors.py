@@ -1,0 +1,58 @@
+import pytest
+
+from common.errors import ExitCode
+from console.receiver.address import StreamAddress
+from console.receiver.errors import (
+    NoPictureError,
+    StreamEndedError,
+    StreamError,
+    StreamRefusedError,
+    closed,
+    ended,
+    from_srt,
+    nothing_within,
+)
+
+OPEN = StreamAddress("robot", 7100)
+LOCKED = StreamAddress("robot", 7100, passphrase="the wrong one")
+WHERE = "../ext/srt/gstsrtsrc.c(206): gst_srt_src_fill (): /GstPipeline:pipeline0/GstSRTSrc:s:\n"
+
+
+@pytest.mark.parametrize(
+    ("address", "reason", "had_data", "kind", "told", "final"),
+    [
+        (
+            OPEN,
+            "Error on SRT socket: Connection timeout",
+            False,
+            StreamRefusedError,
+            "no SRT listener",
+            False,
+        ),
+        (OPEN, "Failed to authenticate: Password required", False, StreamRefusedError, "asks for a", True),
+        (LOCKED, "Failed to authenticate: Incorrect password", False, StreamRefusedError, "not accept", True),
+        (OPEN, "Error on SRT socket: Connection was broken", True, StreamEndedError, "ended", False),
+    ],
+)
+def test_an_error_of_the_source_in_plain_words(
+    *, address: StreamAddress, reason: str, had_data: bool, kind: type[StreamError], told: str, final: bool
+) -> None:
+    error = from_srt(address, WHERE + reason, had_data=had_data)
+    assert type(error) is kind
+    assert told in error.what
+    assert "srt://robot:7100" in error.what
+    assert error.final is final
+    assert error.remedy
+    assert "gst" not in str(error)
+
+
+@pytest.mark.parametrize("error", [closed(), ended(OPEN), nothing_within(OPEN, 2, None)])
+def test_they_all_mean_unreachable(error: StreamError) -> None:
+    assert error.exit_code == ExitCode.UNREACHABLE
+
+
+def test_waiting_in_vain_names_the_time_and_the_last_trouble() -> None:
+    error = nothing_within(OPEN, 2.5, ended(OPEN, "Connection was broken"))
+    assert isinstance(error, NoPictureError)
+    assert "within 2.5 s" in error.what
+    assert "Connection was broken" in error.what
