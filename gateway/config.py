@@ -1,11 +1,15 @@
 """The gateway's settings: one YAML file, overridden by `GATEWAY__...` environment variables."""
 
+import ipaddress
+from collections import Counter
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
-from common.config import Section, Settings
+from common.config import Section, Settings, load
+from common.errors import ExitCode, UserError
 from gateway.status.board import SourceKind
 
 
@@ -58,9 +62,96 @@ DEFAULT_SOURCES = (
 )
 
 
+class GrpcSettings(Section):
+    """Where operators call."""
+
+    host: str = Field(default="127.0.0.1", min_length=1)
+    port: int = Field(default=50051, ge=0, le=65535)
+    """0 takes any free one; the log tells which."""
+
+
+class SecuritySettings(Section):
+    """Who may call."""
+
+    insecure: bool = False
+    """Whether everybody who reaches the address may read and switch everything, unencrypted."""
+
+
+class PreviewSettings(Section):
+    """The way to the preview service, and from the viewers to its stream."""
+
+    socket: Path = Path("/run/robot-gateway/preview.sock")
+    settle_ms: int = Field(default=4000, ge=0, le=60_000)
+    """How long a request to switch waits for the new state before it is answered with the present one."""
+    advertised_host: str | None = Field(default=None, min_length=1)
+    """The address viewers are sent to; by default the one by which the caller reached the gateway."""
+    encrypted: bool = False
+    """Whether each session gets a passphrase of its own; the preview's configuration says how strong."""
+
+
+class PlatformSettings(Section):
+    """How the robot's computer is watched."""
+
+    interval_ms: int = Field(default=1000, ge=100)
+    stale_after_ms: int = Field(default=3000, gt=0)
+    disk_path: Path = Path("/")
+    """A path on the file system whose fill level counts."""
+    interface: str | None = Field(default=None, min_length=1)
+    """The network interface that leads to the operator; by default the one of the default route."""
+
+
 class GatewaySettings(Settings):
     """Everything the gateway can be told. The defaults suit the first robot."""
 
     model_config = SettingsConfigDict(env_prefix="GATEWAY__")
 
+    name: str = Field(default="robot-gateway", min_length=1, max_length=64)
+    """What operators see as this robot's gateway."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    grpc: GrpcSettings = GrpcSettings()
+    security: SecuritySettings = SecuritySettings()
+    preview: PreviewSettings = PreviewSettings()
+    platform: PlatformSettings = PlatformSettings()
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
+    """None at all makes a gateway that needs no ROS."""
+
+
+def load_settings(path: Path | None) -> GatewaySettings:
+    """Reads and checks the configuration, the parts alone and together.
+
+    Raises:
+        UserError: it can't be read, or something in it is wrong.
+    """
+    settings = load(GatewaySettings, path)
+    _check_exposure(settings)
+    _check_sources(settings)
+    return settings
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach the address. A name other than localhost may lead anywhere."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def _check_exposure(settings: GatewaySettings) -> None:
+    if not settings.security.insecure and not is_loopback(settings.grpc.host):
+        raise UserError(
+            f"grpc.host is {settings.grpc.host}: everybody on that network could read and switch everything",
+            "Use 127.0.0.1 and a tunnel, or accept it with 'security: {insecure: true}'",
+            exit_code=ExitCode.USAGE,
+        )
+
+
+def _check_sources(settings: GatewaySettings) -> None:
+    kind, count = next(iter(Counter(source.kind for source in settings.sources).most_common(1)), (None, 0))
+    if kind and count > 1:
+        raise UserError(
+            f"sources lists {count} of kind '{kind.value}'",
+            "Keep one topic for each kind",
+            exit_code=ExitCode.USAGE,
+        )
