@@ -1,7 +1,7 @@
 """What can go wrong between a client and a robot: one small family, each member with what to do.
 
-They are named by what happened, without the word "error". None knows gRPC: `console.client.error_table` is the
-one place that turns a gRPC code into one of these.
+They are named by what happened, without the word "error". None knows gRPC: `console.client.error_table` is
+the one place that turns a gRPC code into one of these.
 """
 
 # ruff: noqa: N818 - `except Unreachable` reads as what it is.

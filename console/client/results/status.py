@@ -91,7 +91,7 @@ class EffectiveCommand(Sample):
     vy_mps: float | None
     wz_rad_s: float | None
     active_source: str | None
-    """ "keyboard", "autonomy", "navigation" or "unknown"."""
+    """One of "keyboard", "autonomy", "navigation" or "unknown"."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

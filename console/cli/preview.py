@@ -1,0 +1,95 @@
+"""robotctl preview on|off."""
+
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+
+from common.errors import UserError
+from console.cli.json_form import json_form
+from console.cli.options import JsonOption, TargetOption, session_of
+from console.cli.rows import preview_rows
+from console.cli.session import Session
+from console.cli.tables import rows_table
+from console.client import PreviewChange, PreviewProfile, PreviewState
+
+preview_app = typer.Typer(help="Turn the live preview on or off.", pretty_exceptions_enable=False)
+
+
+class ProfileWord(StrEnum):
+    """The profiles that can be asked for."""
+
+    LOW_BW = "low-bw"
+    BALANCED = "balanced"
+    HIGH_QUALITY = "high-quality"
+
+
+ProfileOption = Annotated[
+    ProfileWord | None,
+    typer.Option("--profile", help="Bandwidth to spend.", show_default="the current one, or balanced"),
+]
+WaitOption = Annotated[
+    float,
+    typer.Option("--wait", min=0, max=120, metavar="SECONDS", help="How long to watch it come about."),
+]
+
+
+@preview_app.command("on")
+def preview_on(
+    context: typer.Context,
+    profile: ProfileOption = None,
+    wait_s: WaitOption = 10.0,
+    target: TargetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn the preview on, or change its profile while it runs.
+
+    Ends 0 when frames leave the robot, 1 when the preview can't start (with the robot's reason).
+    """
+    session = session_of(context, target, as_json)
+    wanted = PreviewProfile(profile.value) if profile else PreviewProfile.UNKNOWN
+    with session.connect() as robot:
+        change = robot.enable_preview(wanted, settle_within_s=wait_s)
+    _finish(session, change, PreviewState.RUNNING, wait_s)
+
+
+@preview_app.command("off")
+def preview_off(
+    context: typer.Context,
+    wait_s: WaitOption = 10.0,
+    target: TargetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn the preview off. Ends 0 when it is off, whether it was on or not."""
+    session = session_of(context, target, as_json)
+    with session.connect() as robot:
+        change = robot.disable_preview(settle_within_s=wait_s)
+    _finish(session, change, PreviewState.DISABLED, wait_s)
+
+
+def _finish(session: Session, change: PreviewChange, wanted: PreviewState, wait_s: float) -> None:
+    trouble = _trouble(change, wanted, wait_s)
+    if session.as_json:
+        session.print_json({"ok": trouble is None, **json_form(change)})
+    elif trouble is None:
+        session.out.print(change.message)
+        session.out.print(rows_table(preview_rows(change.preview)))
+    if trouble:
+        raise trouble
+
+
+def _trouble(change: PreviewChange, wanted: PreviewState, wait_s: float) -> UserError | None:
+    state = change.preview.state
+    if not change.accepted:
+        return UserError(f"the robot refused: {change.message}")
+    if state is wanted:
+        return None
+    if state is PreviewState.FAULTED:
+        return UserError(f"the preview is faulted: {change.preview.last_error or change.message}")
+    if wait_s == 0:
+        # Nobody wanted to wait: taking note is all that was asked for.
+        return None
+    return UserError(
+        f"the preview is {state.value}, not {wanted.value}, after {wait_s:g} s",
+        "Look again with: robotctl status",
+    )

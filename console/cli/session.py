@@ -1,0 +1,71 @@
+"""What all commands of one run share: which robot, which form of output."""
+
+import json
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import Console
+
+from common.errors import ExitCode, UserError
+from console.client import DEFAULT_TARGET, GatewayClient, GatewayError
+
+# Where nobody looks at columns, lines are left long rather than broken.
+_WIDTH_OF_A_FILE = 160
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One run of robotctl.
+
+    Args:
+        target: the robot's gateway, HOST:PORT.
+        as_json: print JSON instead of tables.
+        out: standard output; without colours where it is no terminal or NO_COLOR is set.
+    """
+
+    target: str
+    as_json: bool
+    out: Console
+
+    def connect(self) -> GatewayClient:
+        """A client for this run, to be used in a `with` block."""
+        return GatewayClient(self.target)
+
+    def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
+        """One JSON document, out at once."""
+        text = json.dumps(value, indent=None if on_one_line else 2, allow_nan=False, ensure_ascii=False)
+        print(text, file=self.out.file, flush=True)
+
+
+def open_session(target: str | None, as_json: bool) -> Session:
+    """A session on standard output."""
+    piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
+    out = Console(highlight=False, markup=False, emoji=False, width=_WIDTH_OF_A_FILE if piped else None)
+    return Session(target or DEFAULT_TARGET, as_json, out)
+
+
+def error_as_json(error: UserError) -> dict[str, Any]:
+    """An error as scripts read it."""
+    return {
+        "kind": _kind(error),
+        "what": " ".join(error.what.split()),
+        "remedy": error.remedy,
+        "exit_code": int(error.exit_code),
+    }
+
+
+def report(error: UserError) -> None:
+    """One line on standard error; JSON where the command line asks for JSON."""
+    if "--json" in sys.argv[1:]:
+        print(json.dumps({"error": error_as_json(error)}, ensure_ascii=False), file=sys.stderr)
+    else:
+        print(f"error: {error}", file=sys.stderr)
+
+
+def _kind(error: UserError) -> str:
+    if isinstance(error, GatewayError):
+        return error.kind
+    return "usage" if error.exit_code is ExitCode.USAGE else "failed"

@@ -1,0 +1,46 @@
+"""A status on one line: for logs and pipes."""
+
+from console.cli.words import age, plural, quantity, signed
+from console.client.results import Freshness, PreviewState, PreviewStatus, Sample, SystemStatus
+
+
+def watch_line(status: SystemStatus) -> str:
+    """Health, motion, vision and preview, with ages; stale values say so."""
+    odometry = status.odometry
+    vision = status.vision
+    motion = f"{quantity(odometry.linear_speed_mps, 'm/s', 2)} {signed(odometry.wz_rad_s)} rad/s"
+    return "  ".join(
+        [
+            f"health {status.health.state.value} ({status.health.summary})",
+            _part("motion", odometry, motion),
+            _part("vision", vision, quantity(vision.consumer_fps, "fps")),
+            _preview(status.preview),
+        ]
+    )
+
+
+def _part(label: str, sample: Sample, text: str) -> str:
+    match sample.freshness:
+        case Freshness.MISSING:
+            return f"{label} no data"
+        case Freshness.STALE:
+            return f"{label} STALE {text} ({age(sample.age_ms)})"
+        case Freshness.FRESH:
+            return f"{label} {text} ({age(sample.age_ms)})"
+
+
+def _preview(preview: PreviewStatus) -> str:
+    words = f"preview {preview.state.value}"
+    if preview.state is PreviewState.FAULTED:
+        return f"{words} ({preview.last_error})"
+    if preview.state is PreviewState.RUNNING and preview.measured.available:
+        measured = preview.measured
+        return " ".join(
+            [
+                words,
+                quantity(measured.fps, "fps"),
+                quantity(measured.bitrate_kbps, "kbit/s", 0),
+                plural(measured.viewer_count, "viewer"),
+            ]
+        )
+    return words
