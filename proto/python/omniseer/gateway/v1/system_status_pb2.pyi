@@ -36,10 +36,15 @@ class SystemStatus(_message.Message):
     TELEOP_FIELD_NUMBER: _builtins.int
     PLATFORM_FIELD_NUMBER: _builtins.int
     EFFECTIVE_COMMAND_FIELD_NUMBER: _builtins.int
+    INSECURE_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
     """The gateway's software version (MAJOR.MINOR.PATCH)."""
+    insecure: _builtins.bool
+    """Whether the gateway is configured to serve everybody who reaches its address, unencrypted and
+    without asking who they are. False on loopback.
+    """
     @_builtins.property
     def preview(self) -> _preview_pb2.PreviewStatus:
         """The live preview."""
@@ -75,10 +80,11 @@ class SystemStatus(_message.Message):
         teleop: Global___TeleopStatus | None = ...,
         platform: _platform_pb2.PlatformStatus | None = ...,
         effective_command: Global___EffectiveCommand | None = ...,
+        insecure: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
