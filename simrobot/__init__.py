@@ -1,1 +1,1 @@
-"""A simulated robot: real ROS 2 publishers at realistic rates, with faults on demand."""
+"""A simulated robot: real rclpy publishers at realistic rates, with faults on demand."""

@@ -18,8 +18,8 @@ def received_at(stamp_ns: int, now: Instant, emptied_at_s: float) -> float:
 
     The stamp and `now` are of the same clock of the same machine, so their difference is the message's age,
     unless somebody set that clock in between. What we know for certain bounds the error: the message was not
-    there when the queue was last found empty, at `emptied_at_s`, and it is here now. So even a clock that jumps
-    by years costs at most one sampling period.
+    there when the queue was last found empty, at `emptied_at_s`, and it is here now. So even a clock that
+    jumps by years costs at most one sampling period.
     """
     age_s = (now.system_ns - stamp_ns) / _NS_PER_S
     return min(max(now.monotonic_s - age_s, emptied_at_s), now.monotonic_s)

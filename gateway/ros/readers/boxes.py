@@ -11,7 +11,7 @@ from gateway.status.values import Detection, Detections
 def detections(
     items: Sequence[Any], source: SourceSettings, read: Callable[[Any], Detection | None]
 ) -> Detections:
-    """The first `max_items` objects of a picture. All are counted; those without a usable box are left out."""
+    """The first `max_items` objects of a picture; all are counted, those without a usable box left out."""
     kept = (read(item) for item in items[: source.max_items])
     return Detections(
         source_width_px=source.image_width_px,

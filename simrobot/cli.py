@@ -1,0 +1,112 @@
+"""The command line of the simulated robot: `simrobot run`, and `simrobot control` for a running one."""
+
+import json
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from common import program
+from simrobot import control as control_socket
+from simrobot.behaviour import Behaviour, Topic
+from simrobot.rates import DEFAULT_RATES_HZ
+
+app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+
+ControlPath = Annotated[
+    Path | None,
+    typer.Option("--control", help="The control socket. By default one per user and ROS domain."),
+]
+
+
+def _rate(topic: Topic) -> Any:
+    return typer.Option(min=0.0, max=2000.0, help=f"How often {topic.value} is published; 0: not at all.")
+
+
+@app.command()
+def run(  # noqa: PLR0917 - typer makes the command line from the signature
+    odometry_hz: Annotated[float, _rate(Topic.ODOMETRY)] = DEFAULT_RATES_HZ[Topic.ODOMETRY],
+    vision_hz: Annotated[float, _rate(Topic.VISION)] = DEFAULT_RATES_HZ[Topic.VISION],
+    detections_hz: Annotated[float, _rate(Topic.DETECTIONS)] = DEFAULT_RATES_HZ[Topic.DETECTIONS],
+    battery_hz: Annotated[float, _rate(Topic.BATTERY)] = DEFAULT_RATES_HZ[Topic.BATTERY],
+    diagnostics_hz: Annotated[float, _rate(Topic.DIAGNOSTICS)] = DEFAULT_RATES_HZ[Topic.DIAGNOSTICS],
+    behaviour: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FIELD=VALUE]...", help="How it behaves; 'simrobot control' lists the fields."
+        ),
+    ] = None,
+    control: ControlPath = None,
+) -> None:
+    """Publishes odometry, vision, detections, battery and diagnostics until SIGINT or SIGTERM."""
+    rates_hz = {
+        Topic.ODOMETRY: odometry_hz,
+        Topic.VISION: vision_hz,
+        Topic.DETECTIONS: detections_hz,
+        Topic.BATTERY: battery_hz,
+        Topic.DIAGNOSTICS: diagnostics_hz,
+    }
+
+    def work() -> None:
+        start = Behaviour().changed(_fields(behaviour or []))
+        # Late, so that --help and a wrong option need no ROS 2.
+        from simrobot.app import run_robot  # noqa: PLC0415
+
+        program.run(lambda stop: run_robot(stop, start, rates_hz, control or control_socket.default_path()))
+
+    program.run_to_exit(work)
+
+
+class Fault(Enum):
+    """What `simrobot control` does with the words that follow."""
+
+    SHOW = "show"
+    SILENCE = "silence"
+    RESUME = "resume"
+    SET = "set"
+
+
+@app.command("control")
+def change(
+    what: Annotated[Fault, typer.Argument(help="silence and resume take topics, set takes FIELD=VALUE.")],
+    words: Annotated[list[str] | None, typer.Argument(metavar="[TOPIC | FIELD=VALUE]...")] = None,
+    control: ControlPath = None,
+) -> None:
+    """Changes a running robot and prints how it now behaves, as JSON.
+
+    Fields: silent, not_a_number (topics, separated by commas), speed_mps, turn_rad_s, infer_errors_per_s,
+    detection_count, battery_percent, battery_drain_percent_per_s.
+    """
+
+    def work() -> None:
+        path = control or control_socket.default_path()
+        print(json.dumps(control_socket.ask(path, _wish(what, words or [], path)), indent=2))
+
+    program.run_to_exit(work)
+
+
+def _wish(what: Fault, words: list[str], path: Path) -> dict[str, Any]:
+    if what is Fault.SHOW:
+        return {}
+    if what is Fault.SET:
+        return _fields(words)
+    silent = set(control_socket.ask(path, {})["silent"])
+    return {"silent": sorted(silent | set(words) if what is Fault.SILENCE else silent - set(words))}
+
+
+def _fields(words: list[str]) -> dict[str, Any]:
+    """FIELD=VALUE pairs as JSON values; pydantic turns texts into numbers and refuses what is wrong."""
+    fields: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if not equals:
+            raise typer.BadParameter(f"'{word}' is not FIELD=VALUE")
+        is_set = name in {"silent", "not_a_number"}
+        fields[name] = [item for item in value.split(",") if item] if is_set else value
+    return fields
+
+
+def main() -> None:
+    """The entry point."""
+    app()

@@ -1,0 +1,59 @@
+"""The simulated robot in the ROS 2 graph: one node, one publisher per topic."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from common.errors import UserError
+from simrobot.behaviour import Topic
+from simrobot.messages import WHAT_IS_PUBLISHED
+from simrobot.robot import Robot
+
+try:
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.qos import QoSProfile
+except ImportError as error:
+    raise UserError(f"ROS 2 can't be used from Python ({error})", "Type: scripts/setup") from error
+
+_DEPTH = 10
+
+
+@contextmanager
+def publishing(robot: Robot, topics: frozenset[Topic]) -> Iterator[Mapping[Topic, Callable[[], None]]]:
+    """Gives a function per topic that publishes the message of this moment, or nothing while it is silent.
+
+    Raises:
+        UserError: the middleware can't start.
+    """
+    context = Context()
+    try:
+        context.init(args=[], initialize_logging=False)
+    except RuntimeError as error:
+        raise UserError(
+            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION"
+        ) from error
+    try:
+        node = Node("simulated_robot", context=context, use_global_arguments=False, enable_rosout=False)
+        try:
+            yield {topic: _publisher(node, robot, topic) for topic in topics}
+        finally:
+            node.destroy_node()
+    finally:
+        context.shutdown()
+        context.destroy()
+
+
+def _publisher(node: Any, robot: Robot, topic: Topic) -> Callable[[], None]:
+    name, message_type, _ = WHAT_IS_PUBLISHED[topic]
+    publisher = node.create_publisher(message_type, name, QoSProfile(depth=_DEPTH))
+    return partial(_publish, node.get_clock(), publisher, robot, topic)
+
+
+def _publish(clock: Any, publisher: Any, robot: Robot, topic: Topic) -> None:
+    if topic in robot.behaviour.silent:
+        return
+    _, _, build = WHAT_IS_PUBLISHED[topic]
+    publisher.publish(build(robot, time.monotonic(), clock.now().to_msg()))
