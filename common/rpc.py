@@ -5,11 +5,18 @@ common.listen binds what `new_server` makes to a TCP port or a Unix socket.
 
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import grpc
 
 from common.errors import DomainError, InvalidRequestError, NotNowError
+
+if TYPE_CHECKING:
+    Handler: TypeAlias = grpc.RpcMethodHandler[Any, Any]
+    Context: TypeAlias = grpc.aio.ServicerContext[Any, Any]
+else:
+    # grpc's classes are generic in its stubs only.
+    Handler, Context = grpc.RpcMethodHandler, grpc.aio.ServicerContext
 
 _log = logging.getLogger(__name__)
 
@@ -61,13 +68,13 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
 
     def __init__(self) -> None:
         # One entry per method that exists, so the wrapping is paid once, not per call.
-        self._guarded: dict[str, grpc.RpcMethodHandler[Any, Any]] = {}
+        self._guarded: dict[str, Handler] = {}
 
     async def intercept_service(
         self,
-        continuation: Callable[[grpc.HandlerCallDetails], Awaitable[grpc.RpcMethodHandler[Any, Any] | None]],
+        continuation: Callable[[grpc.HandlerCallDetails], Awaitable[Handler | None]],
         handler_call_details: grpc.HandlerCallDetails,
-    ) -> grpc.RpcMethodHandler[Any, Any] | None:
+    ) -> Handler | None:
         """Wraps the method's handler."""
         method = handler_call_details.method
         if method not in self._guarded:
@@ -78,7 +85,7 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
         return self._guarded[method]
 
 
-def _guarded(handler: grpc.RpcMethodHandler[Any, Any], method: str) -> grpc.RpcMethodHandler[Any, Any]:
+def _guarded(handler: Handler, method: str) -> Handler:
     if handler.unary_unary:
         return grpc.unary_unary_rpc_method_handler(
             _guarded_unary(handler.unary_unary, method),
@@ -95,7 +102,7 @@ def _guarded(handler: grpc.RpcMethodHandler[Any, Any], method: str) -> grpc.RpcM
 
 
 def _guarded_unary(behavior: Any, method: str) -> Any:
-    async def call(request: Any, context: grpc.aio.ServicerContext[Any, Any]) -> Any:
+    async def call(request: Any, context: Context) -> Any:
         try:
             return await behavior(request, context)
         except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
@@ -105,7 +112,7 @@ def _guarded_unary(behavior: Any, method: str) -> Any:
 
 
 def _guarded_stream(behavior: Any, method: str) -> Any:
-    async def call(request: Any, context: grpc.aio.ServicerContext[Any, Any]) -> AsyncIterator[Any]:
+    async def call(request: Any, context: Context) -> AsyncIterator[Any]:
         try:
             async for response in behavior(request, context):
                 yield response
@@ -115,7 +122,7 @@ def _guarded_stream(behavior: Any, method: str) -> Any:
     return call
 
 
-async def _end(context: grpc.aio.ServicerContext[Any, Any], error: Exception, method: str) -> None:
+async def _end(context: Context, error: Exception, method: str) -> None:
     """Raises grpc's own AbortError, always."""
     if isinstance(error, grpc.aio.AbortError):
         raise error

@@ -1,6 +1,5 @@
 """Answers the operator: takes the wish, waits for what becomes of it as long as it may, and says so."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from gateway.preview_link.link import PreviewLink
@@ -9,14 +8,6 @@ from gateway.status.preview import PreviewState, PreviewView, Profile
 
 DEADLINE_MARGIN_S: Final = 0.2
 """How long before the caller's deadline the answer leaves, so that it still arrives."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of a request, for a person to read, and the preview after it."""
-
-    message: str
-    preview: PreviewView
 
 
 class PreviewControl:
@@ -30,24 +21,27 @@ class PreviewControl:
         self._link = link
         self._settle_s = settle_s
 
-    async def switch(self, *, enabled: bool, profile: Profile | None, remaining_s: float | None) -> Outcome:
+    async def switch(self, *, enabled: bool, profile: Profile | None, remaining_s: float | None) -> str:
         """Makes it the newest wish, unless it already is.
 
         Args:
             enabled: whether there shall be a preview.
             profile: None keeps the current one.
             remaining_s: until the caller's deadline; None when there is none.
+
+        Returns:
+            What became of it, for a person to read. The link's view tells the same to programs.
         """
         wish = self._link.wish
         same = wish.enabled == enabled and (not enabled or profile in {None, wish.profile})
         state = self._link.view.state
         if same and state is PreviewState.RUNNING and self._link.settled(wish):
-            return Outcome(f"preview is already running, {_name(wish)}; nothing was touched", self._link.view)
+            return f"preview is already running, {_name(wish)}; nothing was touched"
         # Asking again for a preview that is faulted is worth an attempt now.
         if not same or (enabled and state is PreviewState.FAULTED):
             wish = self._link.ask(enabled=enabled, profile=profile)
         await self._link.wait_until_settled(wish, self._patience_s(remaining_s))
-        return Outcome(_sentence(wish, self._link.wish, self._link.view), self._link.view)
+        return _sentence(wish, self._link.wish, self._link.view)
 
     def _patience_s(self, remaining_s: float | None) -> float:
         if remaining_s is None:

@@ -5,7 +5,7 @@ import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import grpc
 
@@ -19,7 +19,11 @@ from omniseer.preview.v1.preview_service_pb2 import (
     WatchActualStateRequest,
     WatchActualStateResponse,
 )
-from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceAsyncStub, PreviewServiceStub
+from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceStub
+
+if TYPE_CHECKING:
+    # Exists in the generated stubs alone: the name that a type checker knows the asyncio form by.
+    from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceAsyncStub
 
 _log = logging.getLogger(__name__)
 
@@ -116,7 +120,7 @@ class PreviewLink:
                 return troubles.exceptions[0]
         raise AssertionError("a session has no quiet end")
 
-    async def _listen(self, stub: PreviewServiceAsyncStub) -> None:
+    async def _listen(self, stub: "PreviewServiceAsyncStub") -> None:
         stream = stub.WatchActualState(WatchActualStateRequest())
         while True:
             async with asyncio.timeout(SILENCE_S):
@@ -125,7 +129,7 @@ class PreviewLink:
                 raise UnknownSpeechError("it ended its report without a word")
             self._take(message.actual)
 
-    async def _keep_applied(self, stub: PreviewServiceAsyncStub) -> None:
+    async def _keep_applied(self, stub: "PreviewServiceAsyncStub") -> None:
         rounds = 0
         while True:
             await self.news.wait_until(lambda: self._reconciler.pending() is not None)
@@ -138,7 +142,7 @@ class PreviewLink:
             if rounds:
                 await self._pause(rounds)
 
-    async def _apply(self, stub: PreviewServiceAsyncStub, wish: Wish) -> None:
+    async def _apply(self, stub: "PreviewServiceAsyncStub", wish: Wish) -> None:
         try:
             reply = await stub.ApplyDesiredState(to_wire(wish), timeout=APPLY_DEADLINE_S)
         except grpc.aio.AioRpcError as error:

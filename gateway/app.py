@@ -1,0 +1,118 @@
+"""The gateway as a whole: builds the parts, starts them in order, stops them in reverse."""
+
+import asyncio
+import logging
+import secrets
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from common.version import project_version
+from gateway.config import GatewaySettings, SourceSettings
+from gateway.platform.sampler import PlatformSampler
+from gateway.preview_link.control import PreviewControl
+from gateway.preview_link.link import PreviewLink
+from gateway.preview_link.reconciler import Reconciler
+from gateway.rpc.answers import Answers
+from gateway.rpc.caller import Callers
+from gateway.rpc.server import serving
+from gateway.rpc.servicer import RobotGateway
+from gateway.status.board import Board
+from gateway.status.events import EventLog
+from gateway.status.observer import Observer
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+
+_log = logging.getLogger(__name__)
+
+OBSERVE_EVERY_S: Final = 0.2
+"""How often the gateway looks for events by itself."""
+_PASSPHRASE_BYTES: Final = 24
+"""Gives 32 characters, and more chance than AES-256 can use of its key."""
+
+
+async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
+    """Serves until `stop` is set.
+
+    Raises:
+        UserError: a part can't start.
+    """
+    if settings.security.insecure:
+        _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
+    board, events = Board(), EventLog()
+    link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
+    snapshot = _snapshots(settings, board, events, link)
+    gateway = RobotGateway(
+        snapshot,
+        Answers(snapshot, lambda: link.view, time.monotonic),
+        PreviewControl(link, settings.preview.settle_ms / 1000),
+        Callers(settings.preview.advertised_host),
+    )
+    with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
+        async with (
+            asyncio.TaskGroup() as timers,
+            serving(gateway, settings.grpc.host, settings.grpc.port),
+        ):
+            background = [
+                timers.create_task(link.run(), name="preview-link"),
+                timers.create_task(_observe(snapshot, events), name="observer"),
+            ]
+            await stop.wait()
+            for task in background:
+                task.cancel()
+    _log.info("stopped")
+
+
+def _reconciler(encrypted: bool) -> Reconciler:
+    # Milliseconds since this machine's start: a later gateway's revisions are larger than an earlier one's.
+    first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
+    return Reconciler(first_revision, _new_passphrase if encrypted else None)
+
+
+def _new_passphrase() -> str:
+    return secrets.token_urlsafe(_PASSPHRASE_BYTES)
+
+
+def _snapshots(
+    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink
+) -> Callable[[], Snapshot]:
+    identity = Identity(settings.name, project_version(), settings.security.insecure)
+    rules = Rules(
+        sources={
+            source.kind: SourceRule(source.stale_after_ms, source.required) for source in settings.sources
+        },
+        platform_stale_after_ms=settings.platform.stale_after_ms,
+    )
+    return lambda: take(
+        identity=identity,
+        rules=rules,
+        board=board,
+        preview=link.view,
+        events=events.newest(),
+        now_s=time.monotonic(),
+    )
+
+
+@contextmanager
+def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[None]:
+    """Reads ROS while the block lasts. A gateway without sources needs no ROS at all."""
+    if not sources:
+        _log.info("no sources are configured; ROS is not used")
+        yield
+        return
+    # Late, because whoever needs no ROS need not have it installed.
+    from gateway.ros.intake import intake  # noqa: PLC0415
+
+    with intake(sources, board):
+        yield
+
+
+async def _observe(snapshot: Callable[[], Snapshot], events: EventLog) -> None:
+    """Notes what changes, whether or not anybody asks."""
+    observer = Observer()
+    while True:
+        now = snapshot()
+        for message in observer.observe(now):
+            _log.info("event: %s", message)
+            events.add(message, now.at_s)
+        await asyncio.sleep(OBSERVE_EVERY_S)

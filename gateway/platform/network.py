@@ -1,0 +1,74 @@
+"""The network interface that leads to the operator."""
+
+import socket
+from pathlib import Path
+from typing import Final
+
+import psutil
+
+from gateway.status.values import Network
+
+_DEFAULT_ROUTE: Final = "00000000"
+_QUALITY_SCALE: Final = 70
+"""What Linux drivers count their link quality up to."""
+_LEAST_FIELDS: Final = 4
+"""Columns of /proc/net/wireless up to the signal."""
+
+
+def read(interface: str | None, proc: Path = Path("/proc")) -> Network:
+    """What is true now.
+
+    Args:
+        interface: the one to look at; None takes that of the default route.
+        proc: where the kernel shows its tables.
+    """
+    name = interface or default_interface(proc)
+    if name is None:
+        return Network(interface_name="", connected=False, wifi_signal_dbm=None, link_quality_percent=None)
+    quality, signal = wireless(name, proc)
+    return Network(
+        interface_name=name,
+        connected=_is_up(name) and _has_address(name),
+        wifi_signal_dbm=signal,
+        link_quality_percent=quality,
+    )
+
+
+def default_interface(proc: Path) -> str | None:
+    """The interface of the default route with the smallest metric; None when no route leads out."""
+    routes = [line.split() for line in _lines(proc / "net/route")[1:]]
+    out = [(int(route[6]), route[0]) for route in routes if len(route) > 6 and route[1] == _DEFAULT_ROUTE]
+    return min(out)[1] if out else None
+
+
+def wireless(name: str, proc: Path) -> tuple[int | None, int | None]:
+    """Link quality in percent and signal in dBm; None for each that the driver doesn't tell."""
+    for line in _lines(proc / "net/wireless"):
+        fields = line.split()
+        if len(fields) >= _LEAST_FIELDS and fields[0] == f"{name}:":
+            quality, signal = (float(field) for field in fields[2:4])
+            return (
+                min(100, round(100 * quality / _QUALITY_SCALE)) if quality >= 0 else None,
+                int(signal) if signal < 0 else None,
+            )
+    return None, None
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return []
+
+
+def _is_up(name: str) -> bool:
+    stats = psutil.net_if_stats().get(name)
+    return stats is not None and stats.isup
+
+
+def _has_address(name: str) -> bool:
+    return any(
+        address.family == socket.AF_INET
+        or (address.family == socket.AF_INET6 and not address.address.startswith("fe80:"))
+        for address in psutil.net_if_addrs().get(name, [])
+    )

@@ -1,0 +1,76 @@
+"""Samples the robot's computer about once a second, in a thread of its own.
+
+A thread, because a question to the file system can hang (a network share that is gone). Then the values
+grow stale, which is the truth, and nothing else waits. A daemon, so that a hanging one can't keep the gateway
+from ending.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Final, Self
+
+from gateway.config import PlatformSettings
+from gateway.platform import battery, compute, network
+from gateway.status.board import Board
+from gateway.status.values import Received
+
+_log = logging.getLogger(__name__)
+
+_STOP_WITHIN_S: Final = 1.0
+
+
+class PlatformSampler:
+    """Writes `compute`, `network` and `onboard_battery` of the board, from `__enter__` to `__exit__`.
+
+    Args:
+        settings: how often, and what to look at.
+        board: where the values go.
+        clock: seconds, monotonic.
+    """
+
+    def __init__(
+        self, settings: PlatformSettings, board: Board, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._settings = settings
+        self._board = board
+        self._clock = clock
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="platform-sampler", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        self._thread.join(_STOP_WITHIN_S)
+        if self._thread.is_alive():
+            _log.warning("the platform sampler hangs in a question to the system; leaving it behind")
+
+    def sample(self) -> None:
+        """Takes every value once."""
+        self._board.compute = Received(compute.read(self._settings.disk_path), self._clock())
+        self._board.network = Received(network.read(self._settings.interface), self._clock())
+        onboard = battery.read()
+        if onboard:
+            self._board.onboard_battery = Received(onboard, self._clock())
+
+    def _run(self) -> None:
+        interval_s = self._settings.interval_ms / 1000
+        failing = False
+        while True:
+            try:
+                self.sample()
+                failing = False
+            except (OSError, RuntimeError, ValueError, IndexError) as error:
+                # What the kernel's tables hold differs between machines; one bad answer must not end it.
+                if not failing:
+                    _log.warning("the computer's own state can't be read: %s", error)
+                failing = True
+            if self._stop.wait(interval_s):
+                return

@@ -1,0 +1,1 @@
+"""What operators speak to: the contract, its answers and the server."""

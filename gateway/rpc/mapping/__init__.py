@@ -1,0 +1,1 @@
+"""Between the domain and the contract; nothing else in the gateway knows the contract's messages."""

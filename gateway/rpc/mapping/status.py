@@ -1,0 +1,106 @@
+"""The whole status, and the overlay, as the contract tells them."""
+
+import math
+
+from gateway.rpc.caller import Caller
+from gateway.rpc.mapping.enums import HEALTH_STATES
+from gateway.rpc.mapping.platform import platform_status
+from gateway.rpc.mapping.preview import preview_status
+from gateway.status.events import Event
+from gateway.status.freshness import Sample
+from gateway.status.snapshot import Snapshot
+from gateway.status.values import Detection, Detections, Odometry, Vision
+from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
+
+
+def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.SystemStatus:
+    """Everything but detections and events.
+
+    `teleop` and `effective_command` stay unset: this gateway has no such values, and unset reads as
+    "not available" by their own fields.
+    """
+    return system_status_pb2.SystemStatus(
+        gateway_name=snapshot.identity.name,
+        gateway_version=snapshot.identity.version,
+        preview=preview_status(snapshot.preview, snapshot.preview_measured, caller),
+        vision=_vision(snapshot.vision),
+        health=_health(snapshot),
+        platform=platform_status(snapshot),
+        insecure=snapshot.identity.insecure,
+    )
+
+
+def overlay_snapshot(snapshot: Snapshot, caller: Caller) -> overlay_pb2.OverlaySnapshot:
+    """Everything, from the same instant."""
+    return overlay_pb2.OverlaySnapshot(
+        status=system_status(snapshot, caller),
+        detections=_detections(snapshot.detections),
+        events=[_event(event, snapshot.at_s) for event in snapshot.events],
+    )
+
+
+def _vision(sample: Sample[Vision]) -> system_status_pb2.VisionStatus:
+    value = sample.value
+    if value is None:
+        return system_status_pb2.VisionStatus()
+    return system_status_pb2.VisionStatus(
+        available=True,
+        stale=sample.freshness.stale,
+        producer_fps=value.producer_fps,
+        consumer_fps=value.consumer_fps,
+        last_infer_ms=value.last_infer_ms,
+        infer_error_count=value.infer_error_count,
+        capture_fatal_error_count=value.capture_fatal_error_count,
+        age_ms=sample.freshness.age_ms,
+    )
+
+
+def _health(snapshot: Snapshot) -> system_status_pb2.RobotHealth:
+    health, freshness = snapshot.health, snapshot.odometry.freshness
+    motion = snapshot.odometry.value or Odometry(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
+    return system_status_pb2.RobotHealth(
+        state=HEALTH_STATES[health.state],
+        ready=health.ready,
+        summary=health.summary,
+        odom_available=freshness.available,
+        odom_stale=freshness.stale,
+        linear_speed_mps=math.hypot(motion.vx_mps, motion.vy_mps),
+        angular_speed_rad_s=abs(motion.wz_rad_s),
+        odom_age_ms=freshness.age_ms,
+        measured_vx_mps=motion.vx_mps,
+        measured_vy_mps=motion.vy_mps,
+        measured_wz_rad_s=motion.wz_rad_s,
+    )
+
+
+def _detections(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatus:
+    value = sample.value
+    if value is None:
+        return overlay_pb2.DetectionOverlayStatus()
+    return overlay_pb2.DetectionOverlayStatus(
+        available=True,
+        stale=sample.freshness.stale,
+        age_ms=sample.freshness.age_ms,
+        source_width_px=value.source_width_px,
+        source_height_px=value.source_height_px,
+        detection_count=value.count,
+        detections=[_detection(item) for item in value.items],
+    )
+
+
+def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
+    return overlay_pb2.OverlayDetection(
+        class_id=item.class_id,
+        class_name=item.class_name,
+        score=item.score,
+        track_id=item.track_id,
+        bbox_center_x_px=item.center_x_px,
+        bbox_center_y_px=item.center_y_px,
+        bbox_width_px=item.width_px,
+        bbox_height_px=item.height_px,
+    )
+
+
+def _event(event: Event, now_s: float) -> overlay_pb2.OperatorEvent:
+    age_ms = max(0, int((now_s - event.at_s) * 1000))
+    return overlay_pb2.OperatorEvent(sequence=event.sequence, age_ms=age_ms, message=event.message)
