@@ -46,6 +46,15 @@ class Connection:
         self._tell_watcher(_STOP)
         self._watcher.join()
         self._pipeline.set_state(Gst.State.NULL)
+        # GStreamer's objects hold our handlers and we hold them: without this no collector frees either, nor
+        # the sockets they keep.
+        for branch in (*self._branches.values(), *self._leaving):
+            branch.detach(self._pipeline)
+        self._branches.clear()
+        if self._probe is not None:
+            self._way_in.remove_probe(self._probe)
+        for handler in self._handlers:
+            self._demuxer.disconnect(handler)
 
     def _build(self) -> None:
         # The URI first: setting it resets the source's other properties.
@@ -60,10 +69,14 @@ class Connection:
         }.items():
             if value is not None and source.find_property(name):
                 source.set_property(name, value)
-        source.get_static_pad("src").add_probe(Gst.PadProbeType.BUFFER, self._on_first_data)
+        self._way_in = source.get_static_pad("src")
+        self._probe: int | None = self._way_in.add_probe(Gst.PadProbeType.BUFFER, self._on_first_data)
         demuxer = element("tsdemux", latency=0)
-        demuxer.connect("pad-added", self._on_pad_added)
-        demuxer.connect("pad-removed", self._on_pad_removed)
+        self._demuxer = demuxer
+        self._handlers = [
+            demuxer.connect("pad-added", self._on_pad_added),
+            demuxer.connect("pad-removed", self._on_pad_removed),
+        ]
         for one in (source, demuxer):
             self._pipeline.add(one)
         source.link(demuxer)
@@ -72,6 +85,7 @@ class Connection:
 
     def _on_first_data(self, _pad: Any, _info: Any) -> Any:
         self._had_data = True
+        self._probe = None
         return Gst.PadProbeReturn.REMOVE
 
     def _on_pad_added(self, _demuxer: Any, pad: Any) -> None:

@@ -95,7 +95,8 @@ class DecodingBranch:
         sink = element(
             "appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps="video/x-raw,format=I420"
         )
-        sink.connect("new-sample", self._on_sample)
+        self._sink = sink
+        self._handler = sink.connect("new-sample", self._on_sample)
         self._elements = [
             element("capssetter", caps=f"{codec.caps},alignment=au"),
             element(codec.parser),
@@ -116,6 +117,7 @@ class DecodingBranch:
 
     def detach(self, pipeline: Any) -> None:
         """Leaves the pipeline. Not on a GStreamer thread."""
+        self._sink.disconnect(self._handler)
         for one in self._elements:
             one.set_locked_state(True)
             one.set_state(Gst.State.NULL)

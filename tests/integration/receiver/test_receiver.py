@@ -1,0 +1,200 @@
+"""The receiver against real SRT and real codecs; the test sends every picture itself."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from console.receiver.address import StreamAddress
+from console.receiver.errors import (
+    NoPictureError,
+    StreamEndedError,
+    StreamRefusedError,
+    UndecodableError,
+)
+from console.receiver.receiver import Receiver, Reconnect
+from tests.support.ports import free_udp_port
+from tests.support.streams import SrtSender, encode
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.gst
+
+PATIENCE_S = 20
+
+
+@pytest.fixture
+def port() -> int:
+    return free_udp_port()
+
+
+@pytest.fixture
+def sender(port: int) -> Iterator[SrtSender]:
+    with SrtSender(port) as sender:
+        yield sender
+
+
+def viewer(port: int, **options: object) -> Receiver:
+    return Receiver(StreamAddress("127.0.0.1", port, latency_ms=20), **options)  # type: ignore[arg-type]
+
+
+def joined(sender: SrtSender) -> None:
+    assert sender.viewer_joined.wait(PATIENCE_S), "the viewer did not get through"
+    sender.viewer_joined.clear()
+
+
+@pytest.mark.parametrize("codec", ["h264", "h265"])
+def test_a_picture_does_not_wait_for_the_next_one(sender: SrtSender, port: int, codec: str) -> None:
+    pieces = encode(codec, 12)
+    with viewer(port) as receiver:
+        joined(sender)
+        for number, piece in enumerate(pieces, start=1):
+            sender.send(piece)
+            frame = receiver.next_frame(PATIENCE_S)
+            assert (frame.width, frame.height, frame.codec) == (320, 240, codec)
+            assert not frame.corrupt
+            assert receiver.received == number
+
+
+def test_pictures_differ_and_times_grow(sender: SrtSender, port: int) -> None:
+    pieces = encode("h264", 10)
+    with viewer(port, queue_size=10) as receiver:
+        joined(sender)
+        for piece in pieces:
+            sender.send(piece)
+        frames = [receiver.next_frame(PATIENCE_S) for _ in pieces]
+    assert len({frame.plane(0) for frame in frames}) == 10
+    times_ns = [frame.pts_ns for frame in frames if frame.pts_ns is not None]
+    assert len(times_ns) == 10
+    assert times_ns == sorted(set(times_ns))
+
+
+def test_a_slow_caller_gets_the_newest_pictures(sender: SrtSender, port: int) -> None:
+    pieces = encode("h264", 10)
+    with viewer(port, queue_size=1) as receiver:
+        joined(sender)
+        sender.send(pieces[0])
+        first = receiver.next_frame(PATIENCE_S)
+        for piece in pieces[1:]:
+            sender.send(piece)
+        while (newest := receiver.next_frame(PATIENCE_S)) and receiver.received < 10:
+            pass
+        assert (newest.pts_ns or 0) > (first.pts_ns or 0)
+
+
+def test_the_codec_may_change_under_the_connection(sender: SrtSender, port: int) -> None:
+    with viewer(port, queue_size=30) as receiver:
+        joined(sender)
+        for codec in ("h264", "h265", "h264"):
+            pieces = encode(codec, 10)
+            for piece in pieces:
+                sender.send(piece)
+            while receiver.next_frame(PATIENCE_S).codec != codec:
+                pass
+        assert receiver.reconnects == 0
+
+
+def test_the_end_is_told(port: int) -> None:
+    pieces = encode("h264", 3)
+    with SrtSender(port) as sender, viewer(port, queue_size=3) as receiver:
+        joined(sender)
+        for piece in pieces:
+            sender.send(piece)
+            receiver.next_frame(PATIENCE_S)
+        sender.close()
+        with pytest.raises(StreamEndedError, match=f"srt://127.0.0.1:{port} ended"):
+            receiver.next_frame(PATIENCE_S)
+
+
+def test_with_reconnect_the_picture_comes_back(port: int) -> None:
+    pieces = encode("h264", 3)
+    with viewer(port, reconnect=Reconnect()) as receiver:
+        for _ in range(2):
+            with SrtSender(port) as sender:
+                waiting = threading.Thread(target=receiver.next_frame, args=(PATIENCE_S,))
+                waiting.start()
+                joined(sender)
+                sender.send(pieces[0])
+                waiting.join(PATIENCE_S)
+        assert receiver.received == 2
+        assert receiver.reconnects >= 1
+
+
+def test_nobody_listens(port: int) -> None:
+    with viewer(port) as receiver:
+        with pytest.raises(NoPictureError, match="within 0"):
+            receiver.next_frame(0.1)
+        with pytest.raises(StreamRefusedError, match=f"no SRT listener answers at srt://127.0.0.1:{port}"):
+            receiver.next_frame(PATIENCE_S)
+
+
+def test_connected_but_nothing_sent(sender: SrtSender, port: int) -> None:
+    with viewer(port) as receiver:
+        joined(sender)
+        with pytest.raises(NoPictureError, match="no picture"):
+            receiver.next_frame(0.2)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [("", "asks for a passphrase"), ("a wrong passphrase", "did not accept the passphrase")],
+)
+def test_the_passphrase_does_not_fit(port: int, given: str, told: str) -> None:
+    address = StreamAddress("127.0.0.1", port, latency_ms=20, passphrase=given)
+    with SrtSender(port, passphrase="the right one"), Receiver(address, reconnect=Reconnect()) as receiver:
+        with pytest.raises(StreamRefusedError, match=told) as caught:
+            receiver.next_frame(PATIENCE_S)
+        assert "wrong" not in str(caught.value)
+
+
+def test_the_passphrase_fits(port: int) -> None:
+    piece = encode("h264", 1)[0]
+    address = StreamAddress("127.0.0.1", port, latency_ms=20, passphrase="the right one")
+    with SrtSender(port, passphrase="the right one") as sender, Receiver(address) as receiver:
+        joined(sender)
+        sender.send(piece)
+        assert receiver.next_frame(PATIENCE_S).width == 320
+
+
+def test_a_stream_of_another_codec_is_named(sender: SrtSender, port: int) -> None:
+    pieces = encode("mpeg4", 5)
+    with viewer(port) as receiver:
+        joined(sender)
+        for piece in pieces:
+            sender.send(piece)
+        with pytest.raises(UndecodableError, match="video/mpeg"):
+            receiver.next_frame(PATIENCE_S)
+
+
+def test_garbage_makes_no_picture_and_does_no_harm(sender: SrtSender, port: int) -> None:
+    pieces = encode("h264", 5)
+    with viewer(port) as receiver:
+        joined(sender)
+        sender.send(bytes(range(256)) * 50)
+        with pytest.raises(NoPictureError):
+            receiver.next_frame(0.3)
+        for piece in pieces:
+            sender.send(piece)
+        assert receiver.next_frame(PATIENCE_S).width == 320
+
+
+def test_nothing_is_left_behind(sender: SrtSender, port: int) -> None:
+    piece = encode("h264", 1)[0]
+
+    def one_visit() -> None:
+        with viewer(port) as receiver:
+            joined(sender)
+            sender.send(piece)
+            receiver.next_frame(PATIENCE_S)
+
+    one_visit()
+    threads, files = threading.active_count(), open_files()
+    for _ in range(10):
+        one_visit()
+    wait_until(lambda: threading.active_count() <= threads, "the receiver's threads are gone")
+    # libsrt keeps the sockets of closed connections for some seconds.
+    wait_until(lambda: open_files() <= files, "the receiver's sockets are gone")
+
+
+def open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
