@@ -1,0 +1,125 @@
+"""The server that bench.status measures: the gateway's own stack with everything filled, and an empty method.
+
+Run as a program it prints its port, serves until its standard input ends and uses no ROS.
+"""
+
+import asyncio
+import sys
+import time
+from pathlib import Path
+
+import grpc
+import uvloop
+
+from common.listen import bind_tcp
+from common.rpc import Context, new_server
+from gateway.preview_link.actual import Actual
+from gateway.preview_link.control import PreviewControl
+from gateway.preview_link.link import PreviewLink
+from gateway.preview_link.reconciler import Reconciler
+from gateway.rpc.answers import Answers
+from gateway.rpc.caller import Callers
+from gateway.rpc.server import SERVICE, method_handlers
+from gateway.rpc.servicer import RobotGateway
+from gateway.status.board import Board, SourceKind
+from gateway.status.events import EventLog
+from gateway.status.preview import (
+    Codec,
+    Counters,
+    Encoder,
+    Listener,
+    Measurement,
+    PreviewState,
+    Profile,
+    Stream,
+)
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.values import Battery, Compute, Network, Odometry, Received, Vision
+
+EMPTY_METHOD = "/bench.Reference/Empty"
+_NEWS_EVERY_S = 0.05
+"""The gateway reads its sources 20 times a second."""
+
+
+def main() -> None:
+    uvloop.run(_serve())
+
+
+async def _serve() -> None:
+    board, events = Board(), EventLog()
+    reconciler = Reconciler(1)
+    link = PreviewLink(Path("/nonexistent"), reconciler)
+    for number in range(8):
+        events.add(f"odometry received, for the {number}th time", time.monotonic())
+
+    def snapshot() -> Snapshot:
+        return take(
+            identity=Identity("bench", "0.0.0", insecure=False),
+            rules=Rules({kind: SourceRule(1000, required=True) for kind in SourceKind}, 3000),
+            board=board,
+            preview=link.view,
+            events=events.newest(),
+            now_s=time.monotonic(),
+        )
+
+    gateway = RobotGateway(
+        snapshot,
+        Answers(snapshot, lambda: link.view, time.monotonic),
+        PreviewControl(link, 1.0),
+        Callers(None),
+    )
+    server = new_server()
+    server.add_generic_rpc_handlers(
+        (
+            grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),
+            grpc.method_handlers_generic_handler(
+                "bench.Reference", {"Empty": grpc.unary_unary_rpc_method_handler(_empty)}
+            ),
+        )
+    )
+    port = bind_tcp(server, "127.0.0.1", 0)
+    await server.start()
+    news = asyncio.create_task(_bring_news(board, reconciler))
+    print(port, flush=True)
+    await asyncio.to_thread(sys.stdin.read)
+    news.cancel()
+    await server.stop(None)
+
+
+async def _empty(_request: bytes, _context: Context) -> bytes:
+    return b""
+
+
+async def _bring_news(board: Board, reconciler: Reconciler) -> None:
+    while True:
+        now = time.monotonic()
+        board.odometry = Received(Odometry(vx_mps=0.51, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
+        board.battery = Received(
+            Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now
+        )
+        board.compute = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
+        board.network = Received(
+            Network("wlan0", connected=True, wifi_signal_dbm=-61, link_quality_percent=70), now
+        )
+        board.onboard_battery = board.battery
+        reconciler.heard(_RUNNING, now)
+        await asyncio.sleep(_NEWS_EVERY_S)
+
+
+_RUNNING = Actual(
+    instance_id="bench",
+    applied_revision=1,
+    state=PreviewState.RUNNING,
+    profile=Profile.BALANCED,
+    last_error="",
+    listener=Listener(port=7100, latency_ms=125),
+    stream=Stream(1280, 720, 30.0, 2500, Codec.H265, False, "RTT 180 ms, 6 % loss: 2500 -> 1200 kbit/s"),
+    encoder=Encoder("x264", hardware=False, wanted="mpp-h265", fallback_reason="no such element"),
+    measurement=Measurement(29.9, 1210.0, 2, 12, 180.0, 6.0),
+    counters=Counters(starts=3, restarts=1, faults=1, fallbacks=1),
+)
+
+
+if __name__ == "__main__":
+    main()
