@@ -1,0 +1,131 @@
+"""A double of the preview service: the real schema on a real Unix socket, and no video behind it.
+
+    python -m tests.support.preview_double SOCKET [BEHAVIOUR]
+
+It takes a wish in and reaches it at once, unless its behaviour says otherwise. Every run is another process
+of the service to the gateway: it makes an instance id of its own and counts from 0.
+"""
+
+import asyncio
+import sys
+import uuid
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from subprocess import PIPE, Popen
+from typing import Any
+
+import grpc
+
+from common.listen import bind_unix
+from common.rpc import new_server
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from omniseer.preview.v1.preview_service_pb2_grpc import (
+    PreviewServiceServicer,
+    add_PreviewServiceServicer_to_server,
+)
+
+SIGN_OF_LIFE_S = 0.5
+
+
+class Behaviour(StrEnum):
+    """What becomes of an enabled wish."""
+
+    WORKS = "works"
+    FAULTS = "faults"
+    STAYS_STARTING = "stays-starting"
+    REFUSES = "refuses"
+    SPEAKS_STRANGELY = "speaks-strangely"
+
+
+_REACHES = {
+    Behaviour.WORKS: pb.LIFECYCLE_STATE_RUNNING,
+    Behaviour.FAULTS: pb.LIFECYCLE_STATE_FAULTED,
+    Behaviour.STAYS_STARTING: pb.LIFECYCLE_STATE_STARTING,
+}
+
+
+class PreviewDouble(PreviewServiceServicer):
+    """Remembers every wish it was given in `wishes`."""
+
+    def __init__(self, behaviour: Behaviour = Behaviour.WORKS) -> None:
+        self.behaviour = behaviour
+        self.wishes: list[pb.DesiredState] = []
+        self._changed = asyncio.Event()
+        self.actual = pb.ActualState(
+            instance_id=uuid.uuid4().hex,
+            state=pb.LIFECYCLE_STATE_DISABLED,
+            listener=pb.Listener(port=7100, latency_ms=125),
+        )
+        if behaviour is Behaviour.SPEAKS_STRANGELY:
+            self.actual.state = 42  # type: ignore[assignment]  # the point of it
+
+    async def ApplyDesiredState(self, request: pb.ApplyDesiredStateRequest, context: Any) -> Any:  # noqa: N802  # grpc's name
+        desired = request.desired
+        self.wishes.append(desired)
+        if self.behaviour is Behaviour.REFUSES and desired.enabled:
+            await context.abort(grpc.StatusCode.INVALID_ARGUMENT, "the double refuses")
+        self.actual.applied_revision = desired.revision
+        self.actual.profile = desired.profile
+        if desired.enabled:
+            self._start()
+        else:
+            self.actual.state = pb.LIFECYCLE_STATE_DISABLED
+            self.actual.ClearField("stream")
+        self._changed.set()
+        return pb.ApplyDesiredStateResponse(actual=self.actual)
+
+    def _start(self) -> None:
+        if self.actual.state != pb.LIFECYCLE_STATE_RUNNING:
+            self.actual.counters.starts += 1
+        self.actual.state = _REACHES[self.behaviour]
+        self.actual.stream.CopyFrom(pb.Stream(width_px=1280, height_px=720, fps=30, target_bitrate_kbps=2500))
+        if self.behaviour is Behaviour.FAULTS:
+            self.actual.counters.faults += 1
+            self.actual.last_error = "no camera found; plug one in"
+
+    async def WatchActualState(self, request: Any, context: Any) -> AsyncIterator[Any]:  # type: ignore[override]  # noqa: N802
+        while True:
+            self._changed.clear()
+            yield pb.WatchActualStateResponse(actual=self.actual)
+            try:
+                async with asyncio.timeout(SIGN_OF_LIFE_S):
+                    await self._changed.wait()
+            except TimeoutError:
+                pass  # time for a sign of life
+
+    async def ListEncoders(self, request: Any, context: Any) -> Any:  # noqa: N802  # grpc's name
+        return pb.ListEncodersResponse()
+
+
+async def serve_double(socket: Path, double: PreviewDouble) -> grpc.aio.Server:
+    """Started; the caller stops it."""
+    server = new_server()
+    add_PreviewServiceServicer_to_server(double, server)
+    bind_unix(server, socket)
+    await server.start()
+    return server
+
+
+@contextmanager
+def double_process(socket: Path, behaviour: Behaviour = Behaviour.WORKS) -> Iterator[Popen[str]]:
+    """A double in a process of its own, to be stopped and killed; serving when this returns."""
+    command = [sys.executable, "-m", "tests.support.preview_double", str(socket), behaviour]
+    with Popen(command, stdout=PIPE, text=True) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "serving\n"
+            yield process
+        finally:
+            process.kill()
+
+
+async def _main() -> None:
+    server = await serve_double(Path(sys.argv[1]), PreviewDouble(Behaviour(sys.argv[2])))
+    print("serving", flush=True)
+    await server.wait_for_termination()
+
+
+if __name__ == "__main__":
+    asyncio.run(_main())
