@@ -71,6 +71,15 @@ def status_rows(status: SystemStatus) -> list[Row]:
         *preview_rows(status.preview),
         _sampled("battery", power.lipo_battery, _battery(power.lipo_battery)),
     ]
+    if status.insecure:
+        rows.append(
+            Row(
+                "access",
+                "OPEN",
+                Tone.WARNING,
+                "not encrypted; everybody on the network may switch the preview",
+            )
+        )
     # What this robot's gateway never reports has no line.
     optional = (
         _sampled("computer battery", power.onboard_battery, _battery(power.onboard_battery)),

@@ -44,6 +44,7 @@ ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
 
 # gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
 _PLAIN_WORDS: Final = (
+    ("before receiving settings", "something listens there, but it does not answer as a gateway"),
     ("connection refused", "nothing listens there"),
     ("dns resolution failed", "the name does not resolve"),
     ("dns query cancelled", "the name does not resolve"),
@@ -58,7 +59,6 @@ _PLAIN_WORDS: Final = (
     ("socket closed", "the connection was closed"),
     ("connection reset", "the connection was closed"),
     ("failed parsing http/2", "what listens there does not speak gRPC"),
-    ("before receiving settings", "something listens there, but it does not answer as a gateway"),
 )
 
 

@@ -21,6 +21,7 @@ def system_status(message: wire.SystemStatus) -> SystemStatus:
     return SystemStatus(
         gateway_name=message.gateway_name,
         gateway_version=message.gateway_version,
+        insecure=message.insecure,
         health=_health(message.health),
         odometry=_odometry(message.health),
         vision=_vision(message.vision),

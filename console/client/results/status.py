@@ -100,6 +100,8 @@ class SystemStatus:
 
     gateway_name: str
     gateway_version: str
+    insecure: bool
+    """Whether the gateway talks without encryption to the network, by its owner's explicit choice."""
     health: Health
     odometry: Odometry
     vision: Vision

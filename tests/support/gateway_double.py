@@ -1,0 +1,154 @@
+"""A gateway for the operator's side to talk to: a real gRPC server whose answers the test writes.
+
+It keeps the contract's behaviour of the preview; tests/contract holds the real gateway to the same.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Iterator
+from concurrent import futures
+from contextlib import contextmanager
+from typing import Any
+
+import grpc
+
+from omniseer.gateway.v1 import (
+    overlay_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    robot_gateway_pb2_grpc,
+    system_status_pb2,
+)
+from omniseer.gateway.v1 import states_pb2 as states
+
+STREAM_URI = "srt://127.0.0.1:7100"
+
+
+def healthy_status() -> system_status_pb2.SystemStatus:
+    """A robot that drives forward and sees well."""
+    status = system_status_pb2.SystemStatus(gateway_name="lab-1", gateway_version="1.2.3")
+    health = status.health
+    health.state, health.ready, health.summary = states.ROBOT_HEALTH_OK, True, "robot healthy"
+    health.odom_available, health.odom_age_ms = True, 12
+    health.linear_speed_mps = health.measured_vx_mps = 0.5
+    health.angular_speed_rad_s = health.measured_wz_rad_s = 0.3
+    status.vision.MergeFrom(
+        system_status_pb2.VisionStatus(
+            available=True, age_ms=40, producer_fps=30, consumer_fps=29.5, last_infer_ms=12.5
+        )
+    )
+    battery = status.platform.power.lipo_battery
+    battery.available, battery.present, battery.source = True, True, "traction"
+    battery.percentage_available, battery.percentage = True, 78
+    status.preview.state = states.PREVIEW_DISABLED
+    status.preview.service_reachable = True
+    return status
+
+
+class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
+    """What the test may set, and what it may look at afterwards.
+
+    Attributes:
+        status: the answer to GetSystemStatus; also part of GetOverlaySnapshot.
+        overlay: detections and events of the answer to GetOverlaySnapshot.
+        failures: (code, details) pairs; each call takes one and fails with it, until none is left.
+        preview_becomes: states of the preview after an enable, one per later look at the status.
+        hold: while cleared, calls wait (at most 20 s) before they are answered.
+        calls: names of the methods called, in order.
+        wishes: what SetPreviewMode was asked.
+    """
+
+    def __init__(self) -> None:
+        self.status = healthy_status()
+        self.overlay = overlay_pb2.OverlaySnapshot()
+        self.failures: deque[tuple[grpc.StatusCode, str]] = deque()
+        self.preview_becomes: deque[int] = deque()
+        self.fault = "no encoder works. Type: robot-preview encoders"
+        self.accept = True
+        self.hold = threading.Event()
+        self.hold.set()
+        self.calls: list[str] = []
+        self.wishes: list[robot_gateway_pb2.SetPreviewModeRequest] = []
+
+    def GetSystemStatus(self, request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
+        self._begin("GetSystemStatus", context)
+        self._preview_moves_on()
+        return self.status
+
+    def GetOverlaySnapshot(self, request: Any, context: Any) -> overlay_pb2.OverlaySnapshot:  # noqa: N802
+        self._begin("GetOverlaySnapshot", context)
+        self.overlay.status.CopyFrom(self.status)
+        return self.overlay
+
+    def SetPreviewMode(  # noqa: N802
+        self, request: robot_gateway_pb2.SetPreviewModeRequest, context: Any
+    ) -> robot_gateway_pb2.SetPreviewModeResponse:
+        self._begin("SetPreviewMode", context)
+        self.wishes.append(request)
+        if self.accept:
+            if request.profile:
+                self.status.preview.profile = request.profile
+            if request.enabled:
+                self._preview_moves_on()
+            else:
+                self.status.preview.state = states.PREVIEW_DISABLED
+        message = "taken note" if self.accept else "the robot is being serviced"
+        return robot_gateway_pb2.SetPreviewModeResponse(
+            accepted=self.accept, message=message, preview=self.status.preview
+        )
+
+    def _begin(self, name: str, context: Any) -> None:
+        self.calls.append(name)
+        if self.failures:
+            code, details = self.failures.popleft()
+            context.abort(code, details)
+        self.hold.wait(20)
+
+    def _preview_moves_on(self) -> None:
+        if not self.preview_becomes:
+            return
+        preview = self.status.preview
+        preview.state = self.preview_becomes.popleft()
+        if preview.state == states.PREVIEW_FAULTED:
+            preview.last_error = self.fault
+            preview.counters.faults += 1
+        if preview.state == states.PREVIEW_RUNNING:
+            _describe_stream(preview)
+
+
+def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
+    preview.endpoint.MergeFrom(
+        preview_pb2.StreamEndpoint(
+            transport=preview_pb2.STREAM_TRANSPORT_SRT,
+            host="127.0.0.1",
+            port=7100,
+            uri=STREAM_URI,
+            latency_ms=125,
+            codec=preview_pb2.VIDEO_CODEC_H264,
+            container=preview_pb2.STREAM_CONTAINER_MPEG_TS,
+        )
+    )
+    preview.encoder.name = preview.encoder.wanted = "x264"
+    preview.video.width_px, preview.video.height_px, preview.video.fps = 1280, 720, 30
+    preview.target_bitrate_kbps = 2500
+
+
+@contextmanager
+def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
+    """Serves the double on 127.0.0.1 and yields the port; pings are allowed as by the real gateway."""
+    server = grpc.server(
+        futures.ThreadPoolExecutor(max_workers=8),
+        options=[
+            ("grpc.so_reuseport", 0),
+            ("grpc.keepalive_permit_without_calls", 1),
+            ("grpc.http2.min_recv_ping_interval_without_data_ms", 1_000),
+        ],
+    )
+    robot_gateway_pb2_grpc.add_RobotGatewayServicer_to_server(double, server)
+    bound = server.add_insecure_port(f"127.0.0.1:{port}")
+    server.start()
+    try:
+        yield bound
+    finally:
+        double.hold.set()
+        server.stop(0).wait(10)
