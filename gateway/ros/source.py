@@ -60,6 +60,16 @@ class Source:
         """What became of the messages so far."""
         return SourceCounts(self._values, self._without_value, self._failures)
 
+    @property
+    def topic(self) -> str:
+        """What it reads, as configured."""
+        return self._settings.topic
+
+    @property
+    def publisher_count(self) -> int:
+        """How many publishers this source is connected with at this moment."""
+        return int(self._subscription.get_publisher_count())
+
     def take(self) -> None:
         """Puts the newest message's value on the board, if there is a new one. Never raises."""
         now = Instant(time.monotonic(), time.time_ns())

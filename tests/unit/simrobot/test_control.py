@@ -1,0 +1,69 @@
+import asyncio
+import os
+import socket
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from common.errors import ExitCode, UserError
+from simrobot.behaviour import Behaviour
+from simrobot.control import ask, listening
+from simrobot.robot import Robot
+
+
+def changes(robot: Robot) -> Any:
+    return lambda wish: robot.change(wish, 1.0).model_dump(mode="json")
+
+
+async def test_a_wish_changes_the_robot_and_is_answered(tmp_path: Path) -> None:
+    robot = Robot(Behaviour(), 0.0)
+    async with listening(tmp_path / "s", changes(robot)):
+        answer = await asyncio.to_thread(ask, tmp_path / "s", {"speed_mps": 1.5})
+    assert answer["speed_mps"] == 1.5
+    assert robot.behaviour.speed_mps == 1.5
+
+
+async def test_a_refusal_reaches_the_one_who_asked(tmp_path: Path) -> None:
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        with pytest.raises(UserError, match="silent") as refusal:
+            await asyncio.to_thread(ask, tmp_path / "s", {"silent": ["sonar"]})
+    assert refusal.value.exit_code is ExitCode.USAGE
+
+
+@pytest.mark.parametrize("line", [b"{", b"[]", b"7", b"\xff", b'{"speed_mps": NaN}'])
+async def test_nonsense_is_answered_and_harms_nobody(tmp_path: Path, line: bytes) -> None:
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        reader, writer = await asyncio.open_unix_connection(tmp_path / "s")
+        writer.write(line + b"\n{}\n")
+        assert b"error" in await asyncio.wait_for(reader.readline(), 10)
+        assert b"behaviour" in await asyncio.wait_for(reader.readline(), 10)
+        writer.close()
+
+
+async def test_only_this_user_may_connect(tmp_path: Path) -> None:
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        assert (tmp_path / "s").stat().st_mode & 0o777 == 0o600
+    assert not (tmp_path / "s").exists()
+
+
+async def test_the_socket_of_a_killed_robot_is_taken_over(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(tmp_path / "s"))
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        assert await asyncio.to_thread(ask, tmp_path / "s", {})
+
+
+async def test_a_running_robot_keeps_its_socket(tmp_path: Path) -> None:
+    async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+        with pytest.raises(UserError, match="another simulated robot"):
+            async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
+                pass
+        assert await asyncio.to_thread(ask, tmp_path / "s", {})
+
+
+def test_nobody_there_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no simulated robot answers") as refusal:
+        ask(tmp_path / "nobody", {})
+    assert refusal.value.exit_code is ExitCode.UNREACHABLE
+    assert os.linesep not in str(refusal.value)
