@@ -9,5 +9,6 @@ _FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
 def configure(level: str) -> None:
     """Sends all log records from `level` ("debug", "info", "warning", "error") up to standard error."""
     logging.basicConfig(level=level.upper(), format=_FORMAT, stream=sys.stderr, force=True)
-    # asyncio's debug chatter says nothing about the robot.
-    logging.getLogger("asyncio").setLevel(logging.WARNING)
+    # The debug chatter of asyncio and gRPC says nothing about the robot.
+    for name in ("asyncio", "grpc"):
+        logging.getLogger(name).setLevel(logging.WARNING)

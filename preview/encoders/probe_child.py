@@ -1,0 +1,144 @@
+"""One trial of one encoder, in a process that may crash or hang.
+
+Encodes real frames of the wanted size through the real chain and prints one line of JSON: whether pictures
+came out, why not, and how long the first one took. Whoever started it sets the deadline.
+"""
+
+import json
+import os
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from common.errors import UserError
+from common.gst import GLib, Gst
+from preview.encoders import settings
+from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.chain import chain, size_caps
+from preview.values import Target
+
+FRAMES: Final = 10
+_ENOUGH: Final = 8
+"""Pictures that must come out; an encoder may keep a frame or two until more arrive."""
+_NICE: Final = 5
+"""A trial yields to whatever runs."""
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What came of it; `reason` is empty when the encoder is proven."""
+
+    reason: str = ""
+    first_byte_ms: float | None = None
+
+
+@dataclass(slots=True)
+class _Counts:
+    """Written by pad probes, once per frame."""
+
+    first_in_at: float = 0.0
+    first_out_at: float = 0.0
+    encoded: int = 0
+    encoded_bytes: int = 0
+    parsed: int = 0
+    begins_with_key_frame: bool = False
+
+
+def main() -> None:
+    """Runs one trial; the arguments are the encoder's name, width, height, fps and kbit/s.
+
+    `python -m preview.encoders.probe_child x264 1280 720 30 2500`
+    """
+    os.nice(_NICE)
+    name, *figures = sys.argv[1:]
+    width, height, fps, bitrate = (int(figure) for figure in figures)
+    try:
+        outcome = trial(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
+    except UserError as error:
+        outcome = Outcome(str(error))
+    # Nothing is torn down: the process ends, and a driver that hangs while it closes has no say any more.
+    sys.stdout.write(json.dumps(asdict(outcome)) + "\n")
+    sys.stdout.flush()
+    os._exit(0)
+
+
+def trial(encoder: Encoder, target: Target) -> Outcome:
+    """Encodes FRAMES moving frames and judges what comes out.
+
+    Raises:
+        UserError: the chain can't be built.
+    """
+    pipeline = _build(encoder, target)
+    counts = _Counts()
+    _watch(pipeline, counts)
+    if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
+        return Outcome(_first_error(pipeline) or "it can't be started")
+    message = pipeline.get_bus().timed_pop_filtered(
+        Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
+    )
+    if message.type == Gst.MessageType.ERROR:
+        return Outcome(message.parse_error()[0].message)
+    return _judge(counts)
+
+
+def _build(encoder: Encoder, target: Target) -> Any:
+    description = (
+        f"videotestsrc num-buffers={FRAMES} pattern=smpte horizontal-speed=16"
+        f" ! video/x-raw,width={target.width_px},height={target.height_px},framerate={target.fps}/1"
+        f" ! {chain(encoder)} ! fakesink name=out sync=false"
+    )
+    try:
+        pipeline = Gst.parse_launch(description)
+    except GLib.Error as error:
+        raise UserError(error.message) from error
+    pipeline.get_by_name("size").set_property("caps", size_caps(encoder, target))
+    settings.configure(pipeline.get_by_name("encoder"), encoder, target.bitrate_kbps, target.fps)
+    return pipeline
+
+
+def _watch(pipeline: Any, counts: _Counts) -> None:
+    def entered(_pad: Any, _info: Any) -> Any:
+        counts.first_in_at = counts.first_in_at or time.monotonic()
+        return Gst.PadProbeReturn.REMOVE
+
+    def encoded(_pad: Any, info: Any) -> Any:
+        counts.encoded += 1
+        counts.encoded_bytes += info.get_buffer().get_size()
+        if counts.encoded_bytes:
+            counts.first_out_at = counts.first_out_at or time.monotonic()
+        return Gst.PadProbeReturn.OK
+
+    def parsed(_pad: Any, info: Any) -> Any:
+        if counts.parsed == 0:
+            counts.begins_with_key_frame = not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
+        counts.parsed += 1
+        return Gst.PadProbeReturn.OK
+
+    for element, pad, probe in (
+        ("encoder", "sink", entered),
+        ("encoder", "src", encoded),
+        ("out", "sink", parsed),
+    ):
+        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
+
+
+def _judge(counts: _Counts) -> Outcome:
+    if counts.encoded == 0:
+        return Outcome("it gave no output")
+    if counts.encoded_bytes == 0:
+        return Outcome("it gave empty buffers only")
+    if counts.parsed < _ENOUGH:
+        return Outcome(f"only {counts.parsed} of {FRAMES} pictures came out readable")
+    if not counts.begins_with_key_frame:
+        return Outcome("its stream does not begin with a key frame")
+    return Outcome(first_byte_ms=(counts.first_out_at - counts.first_in_at) * 1000)
+
+
+def _first_error(pipeline: Any) -> str:
+    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+    return str(message.parse_error()[0].message) if message else ""
+
+
+if __name__ == "__main__":
+    main()

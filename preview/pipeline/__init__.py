@@ -1,0 +1,1 @@
+"""From a plan to a running pipeline. Together with encoders/, the only part that touches GStreamer."""

@@ -1,0 +1,69 @@
+"""Sends each picture whole: a transport stream cut at the picture's end, not seven packets at a time.
+
+A muxer that groups packets by seven keeps the tail of every picture until the next one fills the group. Here
+it hands out all packets of a picture as one list, and this probe on its source pad joins them and passes on
+slices of at most 1316 bytes, the last one ending where the picture ends.
+
+The slices get the packets' memory and timestamps but none of their flags: the muxer flags everything that
+starts with its tables as HEADER, and srtsink, which has the tables from the caps already, drops such
+buffers whole.
+
+This runs in Python once per picture, never per packet; it also is where pictures are counted.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from common.gst import Gst
+
+PACKET_BYTES: Final = 188
+SLICE_BYTES: Final = 7 * PACKET_BYTES
+"""What fits one datagram of SRT's live mode."""
+
+
+class Framing:
+    """The probe and what it counted. The counters are written by the streaming thread and read anywhere.
+
+    Args:
+        on_first_picture: called once, on the streaming thread: it must only hand over.
+    """
+
+    def __init__(self, on_first_picture: Callable[[], None]) -> None:
+        self.pictures = 0
+        self.bytes = 0
+        self.last_picture_at = 0.0
+        """time.monotonic() of the newest picture."""
+        self._on_first_picture = on_first_picture
+
+    def attach(self, muxer_pad: Any) -> None:
+        """Puts the probe on the muxer's source pad, which is linked to the listener."""
+        muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
+
+    def _probe(self, pad: Any, info: Any) -> Any:
+        if info.type & Gst.PadProbeType.BUFFER_LIST:
+            packets = info.get_buffer_list()
+            parts = [packets.get(index) for index in range(packets.length())]
+        else:
+            parts = [info.get_buffer()]
+        if parts:
+            pad.get_peer().chain_list(self._slices(parts))
+            self._count()
+        return Gst.PadProbeReturn.DROP
+
+    def _slices(self, parts: list[Any]) -> Any:
+        picture = Gst.Buffer.new_wrapped(b"".join(part.extract_dup(0, part.get_size()) for part in parts))
+        picture.pts, picture.dts = parts[0].pts, parts[0].dts
+        size = picture.get_size()
+        self.bytes += size
+        flags = Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.TIMESTAMPS
+        slices = Gst.BufferList.new_sized(size // SLICE_BYTES + 1)
+        for offset in range(0, size, SLICE_BYTES):
+            slices.insert(-1, picture.copy_region(flags, offset, min(SLICE_BYTES, size - offset)))
+        return slices
+
+    def _count(self) -> None:
+        self.last_picture_at = time.monotonic()
+        self.pictures += 1
+        if self.pictures == 1:
+            self._on_first_picture()

@@ -1,0 +1,255 @@
+"""A running pipeline, seen from the loop: start, watch, change, stop.
+
+What can fail, how it is noticed, and what follows:
+
+| failure | noticed by | follows |
+|---|---|---|
+| an element is missing, a description makes no sense | building: UserError | FAULTED, retry |
+| port taken, address not ours | ERROR of the sink while starting | FAULTED "UDP port ...", retry |
+| camera or file can't be opened, unplugged, unreadable | ERROR of the source | FAULTED, retry |
+| source ends | EOS on the bus | FAULTED, retry; a file begins again instead |
+| source stalls without a word | watchdog: no new frames | FAULTED, retry |
+| encoder can't be opened | ERROR of the encoder while starting | next encoder at once |
+| encoder fails later | ERROR of the encoder | next encoder at once |
+| encoder gives nothing, or empty buffers | watchdog: frames go in, nothing comes out | next encoder at once |
+| starting blocks | deadline of the call | as a failure of the encoder |
+| stopping blocks in the encoder | deadline of the call | abandoned with listener and source closed; the next one |
+| stopping blocks elsewhere | deadline of the call | the process ends with code 70, to be started again |
+| a viewer is slow, frozen, gone, a stranger | the listener drops it | others notice nothing |
+
+A process with an abandoned pipeline ends, with code 70, when the preview is next disabled: only that frees
+the driver. GStreamer's threads touch this object in two places, the first picture and a viewer's arrival, and
+both only hand over to the loop. State changes run in threads of their own with a deadline.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from enum import Enum
+from typing import Any, Final
+
+from common.gst import Gst
+from preview.adaptive import BitrateController
+from preview.config import TimeoutSettings
+from preview.encoders import settings
+from preview.pipeline import builder, faults, statistics
+from preview.pipeline.crossing import Crossing, in_thread
+from preview.pipeline.faults import Fault
+from preview.pipeline.framing import Framing
+from preview.pipeline.looping import Looping
+from preview.pipeline.watchdogs import Silent, Watchdogs
+from preview.plan import Plan
+from preview.values import Measurement, Profile, Target
+
+_log = logging.getLogger(__name__)
+
+_LOOK_EVERY_S: Final = 0.1
+MEASURE_EVERY_S: Final = 0.5
+_KEY_FRAMES_APART_S: Final = 0.3
+"""A crowd of viewers that joins at once gets its key frame at the end of this pause, not one each."""
+_INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
+
+
+class Stopped(Enum):
+    """How a stop went."""
+
+    CLEAN = "clean"
+    ENCODER_HANGS = "encoder hangs"
+    """Listener and source are closed; the rest never came back."""
+    HANGS = "hangs"
+    """The listener or the source never came back: only the end of the process frees them."""
+
+
+class Runner:
+    """One pipeline from building to stopping. Made, used and dropped on the loop.
+
+    Args:
+        plan: what to build.
+        timeouts: how long things may take.
+        on_first_picture: called once when the first encoded picture reached the listener.
+        on_fault: called with the first thing that failed, once.
+        on_measured: called when there are new figures.
+        controller: follows the viewers' links with the bit rate. None: it stays.
+
+    Raises:
+        UserError: the pipeline can't be built.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        timeouts: TimeoutSettings,
+        *,
+        on_first_picture: Callable[[], None],
+        on_fault: Callable[[Fault], None],
+        on_measured: Callable[[], None],
+        controller: BitrateController | None = None,
+    ) -> None:
+        self.plan = plan
+        self.measurement: Measurement | None = None
+        self.bitrate_kbps = plan.target.bitrate_kbps
+        self.bitrate_reason = ""
+        self._timeouts = timeouts
+        self._on_first_picture = on_first_picture
+        self._on_fault = on_fault
+        self._on_measured = on_measured
+        self._controller = controller
+        self._loop = asyncio.get_running_loop()
+        self._crossing = Crossing()
+        self._parts = builder.build(plan)
+        self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture))
+        self._framing.attach(self._parts.muxer_pad)
+        self._looping = Looping(self._parts, self._crossing, self._loop_failed) if plan.source.loops else None
+        self._parts.sink.connect("caller-added", lambda *_: self._crossing.hand_over(self._viewer_joined))
+        self._bus = self._parts.pipeline.get_bus()
+        self._bus_fd = self._bus.get_pollfd().fd
+        self._watch: asyncio.Task[None] | None = None
+        self._faulted = False
+        self._key_frame_after = 0.0
+        self._key_frame_timer: asyncio.TimerHandle | None = None
+
+    async def start(self) -> None:
+        """Starts the pipeline. What fails is told through `on_fault`, also after this has returned."""
+        self._loop.add_reader(self._bus_fd, self._read_bus)
+        pipeline = self._parts.pipeline
+        try:
+            outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
+        except TimeoutError:
+            self.fail(faults.from_silence(Silent.ENCODER, self._timeouts.start_s, self.plan))
+            return
+        self._read_bus()
+        if outcome == Gst.StateChangeReturn.FAILURE:
+            # An element that refuses without saying why left no message behind.
+            self.fail(faults.unexplained(self.plan))
+            return
+        self._watch = asyncio.create_task(self._supervise(), name="supervision")
+
+    async def stop(self) -> Stopped:
+        """Tears the pipeline down, each part with a deadline.
+
+        First the listener, so that its port is free and viewers know, then the source, so that its device
+        is free, then the rest.
+        """
+        self._faulted = True  # Whatever fails from here on is the teardown's own doing.
+        await self._stop_watching()
+        parts, deadline_s = self._parts, self._timeouts.stop_s
+        try:
+            await in_thread(lambda: _to_null(parts.sink), deadline_s)
+            await in_thread(lambda: _to_null(parts.source), deadline_s)
+        except TimeoutError:
+            return Stopped.HANGS
+        try:
+            await in_thread(lambda: parts.pipeline.set_state(Gst.State.NULL), deadline_s)
+        except TimeoutError:
+            return Stopped.ENCODER_HANGS
+        return Stopped.CLEAN
+
+    def switching(self, profile: Profile, target: Target) -> Callable[[], None]:
+        """Goes on with another profile; viewers stay connected.
+
+        Returns:
+            What is left to do: a call that may block in the encoder's driver.
+        """
+        plan = self.plan = self.plan.switched(profile, target)
+        self.bitrate_kbps, self.bitrate_reason = target.bitrate_kbps, ""
+        if self._controller:
+            self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
+        return lambda: builder.apply_target(self._parts, plan)
+
+    def fail(self, fault: Fault) -> None:
+        """Something is wrong with it. Only the first fault counts."""
+        if not self._faulted:
+            self._faulted = True
+            self._on_fault(fault)
+
+    def draw(self) -> str:
+        """The pipeline as a DOT graph."""
+        text = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
+        return str(text)
+
+    # --- on the loop, called back ---
+
+    def _read_bus(self) -> None:
+        while (message := self._bus.pop_filtered(_INTERESTING)) is not None:
+            if message.type == Gst.MessageType.ERROR:
+                _log.debug("%s: %s", message.src.get_path_string(), message.parse_error())
+                self.fail(faults.from_message(message, self._parts, self.plan))
+            elif message.type == Gst.MessageType.WARNING:
+                _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
+            else:
+                self.fail(faults.ended(self.plan))
+
+    def _first_picture(self) -> None:
+        if not self._faulted:
+            self._on_first_picture()
+
+    def _loop_failed(self) -> None:
+        self.fail(faults.ended(self.plan))
+
+    def _viewer_joined(self) -> None:
+        """Gives a new viewer a picture to begin with; many at once share one."""
+        wait_s = self._key_frame_after - time.monotonic()
+        if wait_s <= 0:
+            self._request_key_frame()
+        elif self._key_frame_timer is None:
+            self._key_frame_timer = self._loop.call_later(wait_s, self._request_key_frame)
+
+    def _request_key_frame(self) -> None:
+        self._key_frame_timer = None
+        self._key_frame_after = time.monotonic() + _KEY_FRAMES_APART_S
+        sink_pad = self._parts.sink.get_static_pad("sink")
+        settings.request_key_frame(self._parts.encoder, self.plan.encoder, sink_pad)
+
+    async def _supervise(self) -> None:
+        """Looks at the counters ten times a second until the pipeline is stopped."""
+        timeouts = self._timeouts
+        watchdogs = Watchdogs(
+            time.monotonic(),
+            first_frame_s=timeouts.start_s,
+            source_s=timeouts.source_silence_s,
+            encoder_s=timeouts.encoder_silence_s,
+        )
+        reading = statistics.read(self._framing, self._parts.sink)
+        while True:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            now = time.monotonic()
+            silent = watchdogs.look(self._parts.rate.get_property("in"), self._framing.pictures, now)
+            if silent:
+                self.fail(faults.from_silence(silent, watchdogs.silence_s(silent, now), self.plan))
+                return
+            if now - reading.at >= MEASURE_EVERY_S:
+                reading = self._measure(reading)
+
+    def _measure(self, before: statistics.Reading) -> statistics.Reading:
+        now = statistics.read(self._framing, self._parts.sink)
+        self.measurement = statistics.measure(before, now, self._framing.last_picture_at)
+        if self._controller and self.plan.encoder.spelling.live_bitrate:
+            self._follow(self._controller, statistics.link_report(before, now))
+        self._on_measured()
+        return now
+
+    def _follow(self, controller: BitrateController, link: statistics.LinkReport | None) -> None:
+        decision = controller.decide(link, time.monotonic())
+        if decision.bitrate_kbps != self.bitrate_kbps:
+            settings.set_bitrate_live(
+                self._parts.encoder, self.plan.encoder, decision.bitrate_kbps, self.plan.gop_frames
+            )
+            _log.info("bit rate: %s", decision.reason)
+        self.bitrate_kbps, self.bitrate_reason = decision.bitrate_kbps, decision.reason
+
+    async def _stop_watching(self) -> None:
+        self._loop.remove_reader(self._bus_fd)
+        if self._key_frame_timer:
+            self._key_frame_timer.cancel()
+        if self._watch:
+            self._watch.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._watch
+
+
+def _to_null(element: Any) -> None:
+    # Locked, so that nothing of the pipeline starts it again meanwhile.
+    element.set_locked_state(True)
+    element.set_state(Gst.State.NULL)

@@ -1,0 +1,1 @@
+"""What the gateway speaks to: requests to domain calls, domain values to messages."""
