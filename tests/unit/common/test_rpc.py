@@ -1,0 +1,86 @@
+from collections.abc import Iterator
+from typing import Any
+
+import grpc
+import pytest
+
+import gateway.app  # noqa: F401  # so that every domain error that exists is known here
+from common.errors import DomainError, InvalidRequestError
+from common.rpc import STATUS_CODES, new_server
+
+
+def below(error: type[DomainError]) -> Iterator[type[DomainError]]:
+    for child in error.__subclasses__():
+        yield child
+        yield from below(child)
+
+
+def test_every_domain_error_has_a_code() -> None:
+    assert set(STATUS_CODES) == set(below(DomainError))
+
+
+async def answers(error: Exception | None, *, stream: bool = False) -> Any:
+    """What a caller sees of a handler that raises `error`, over a real connection."""
+
+    async def unary(_request: bytes, _context: Any) -> bytes:
+        if error:
+            raise error
+        return b"done"
+
+    async def streaming(_request: bytes, _context: Any) -> Any:
+        yield b"first"
+        if error:
+            raise error
+
+    handlers = {
+        "Unary": grpc.unary_unary_rpc_method_handler(unary),
+        "Stream": grpc.unary_stream_rpc_method_handler(streaming),
+    }
+    server = new_server()
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            if stream:
+                return [each async for each in channel.unary_stream("/test.Service/Stream")(b"")]
+            return await channel.unary_unary("/test.Service/Unary")(b"")
+    finally:
+        await server.stop(None)
+
+
+async def test_a_handler_that_works_is_not_in_the_way() -> None:
+    assert await answers(None) == b"done"
+    assert await answers(None, stream=True) == [b"first"]
+
+
+@pytest.mark.parametrize("stream", [False, True])
+async def test_a_domain_error_arrives_with_its_code_and_words(stream: bool) -> None:
+    with pytest.raises(grpc.aio.AioRpcError) as seen:
+        await answers(InvalidRequestError("no such thing; choose another"), stream=stream)
+    assert seen.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert seen.value.details() == "no such thing; choose another"
+
+
+@pytest.mark.parametrize("stream", [False, True])
+async def test_a_defect_tells_the_log_everything_and_the_caller_nothing(
+    stream: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(grpc.aio.AioRpcError) as seen:
+        await answers(ZeroDivisionError("secret"), stream=stream)
+    assert seen.value.code() is grpc.StatusCode.INTERNAL
+    assert "secret" not in str(seen.value.details())
+    assert "secret" in caplog.text
+
+
+async def test_an_unknown_method_is_unimplemented() -> None:
+    server = new_server()
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            with pytest.raises(grpc.aio.AioRpcError) as seen:
+                await channel.unary_unary("/test.Service/Nothing")(b"")
+            assert seen.value.code() is grpc.StatusCode.UNIMPLEMENTED
+    finally:
+        await server.stop(None)

@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import pytest
+
+from common.errors import ExitCode, UserError
+from gateway.config import DEFAULT_SOURCES, GatewaySettings, load_settings
+
+
+def load(tmp_path: Path, text: str) -> GatewaySettings:
+    path = tmp_path / "gateway.yaml"
+    path.write_text(text)
+    return load_settings(path)
+
+
+def test_the_defaults_are_the_contracts() -> None:
+    settings = load_settings(None)
+    assert (settings.grpc.host, settings.grpc.port) == ("127.0.0.1", 50051)
+    limits = {source.kind.value: source.stale_after_ms for source in settings.sources}
+    assert limits == {"odometry": 1000, "vision": 2000, "detections": 500, "battery": 5000}
+    assert settings.platform.stale_after_ms == 3000
+    assert {source.kind.value for source in DEFAULT_SOURCES if source.required} == {"odometry", "vision"}
+
+
+def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GATEWAY__GRPC__PORT", "50099")
+    assert load(tmp_path, "grpc: {port: 50077}").grpc.port == 50099
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("grpc: {prot: 1}", "unknown key 'grpc.prot'"),
+        ("grpc: {port: 99999}", "key 'grpc.port' is 99999"),
+        ("sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
+        ("grpc: {host: 0.0.0.0}", "everybody on that network"),
+        ("grpc: {host: some-name}", "everybody on that network"),
+        (
+            "sources: [{kind: odometry, topic: /a, type: n/msg/O, stale_after_ms: 1},"
+            " {kind: odometry, topic: /b, type: n/msg/O, stale_after_ms: 1}]",
+            "2 of kind 'odometry'",
+        ),
+        ("- a list", "holds a list at its top"),
+        ("a: [", "is not YAML"),
+    ],
+)
+def test_a_mistake_is_one_line_that_names_it(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(UserError) as seen:
+        load(tmp_path, text)
+    assert words in str(seen.value)
+    assert "\n" not in str(seen.value)
+    assert seen.value.exit_code is ExitCode.USAGE
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.3.2.1", "localhost", "::1"])
+def test_the_loopback_needs_no_permission(tmp_path: Path, host: str) -> None:
+    assert load(tmp_path, f"grpc: {{host: '{host}'}}").grpc.host == host
+
+
+def test_exposure_can_be_accepted(tmp_path: Path) -> None:
+    settings = load(tmp_path, "{grpc: {host: 0.0.0.0}, security: {insecure: true}}")
+    assert settings.security.insecure

@@ -1,0 +1,205 @@
+"""The mapping is total: every state has a value, every field of the contract is set by some snapshot."""
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import Any
+
+import pytest
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
+
+from common.errors import InvalidRequestError
+from gateway.preview_link import wire
+from gateway.rpc.caller import Caller
+from gateway.rpc.mapping import enums
+from gateway.rpc.mapping.status import overlay_snapshot
+from gateway.rpc.server import SERVICE, method_handlers
+from gateway.status.board import Board, SourceKind
+from gateway.status.events import Event
+from gateway.status.health import HealthState
+from gateway.status.preview import (
+    Codec,
+    Counters,
+    Encoder,
+    Listener,
+    Measurement,
+    PreviewState,
+    PreviewView,
+    Profile,
+    Stream,
+)
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.values import (
+    Battery,
+    Compute,
+    Detection,
+    Detections,
+    Network,
+    Odometry,
+    Received,
+    Vision,
+)
+from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
+from omniseer.preview.v1 import preview_service_pb2
+
+NOW_S = 1000.0
+CALLER = Caller(robot_host="10.1.2.3", may_watch=True)
+NOT_SERVED = {
+    # Declared by the locked contract, implemented with teleoperation and command attribution.
+    "omniseer.gateway.v1.SystemStatus.teleop",
+    "omniseer.gateway.v1.SystemStatus.effective_command",
+}
+
+
+@pytest.mark.parametrize(
+    ("domain", "table", "wire_enum"),
+    [
+        (PreviewState, enums.PREVIEW_STATES, states_pb2.PreviewState),
+        (Profile, enums.PROFILES, preview_pb2.PreviewProfile),
+        (Codec, enums.CODECS, preview_pb2.VideoCodec),
+        (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
+    ],
+)
+def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table: Any, wire_enum: Any) -> None:
+    assert set(domain) <= set(table) <= {None, *domain}
+    assert len(set(table.values())) == len(table)
+    assert {0, *table.values()} == set(wire_enum.values())
+
+
+def test_the_preview_service_and_the_domain_cover_each_other() -> None:
+    assert set(wire.STATES.values()) == set(PreviewState)
+    assert {0, *wire.STATES} == set(preview_service_pb2.LifecycleState.values())
+    assert set(wire.PROFILES) == set(Profile)
+    assert {0, *wire.PROFILES.values()} == set(preview_service_pb2.Profile.values())
+    assert set(wire.CODECS.values()) == set(Codec)
+    assert {0, *wire.CODECS} == set(preview_service_pb2.Codec.values())
+
+
+def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
+    for number in (-1, 4, 2**31 - 1):
+        with pytest.raises(InvalidRequestError, match=str(number)):
+            enums.profile_from(number)
+    assert enums.profile_from(0) is None
+
+
+def test_every_method_of_the_contract_has_a_handler() -> None:
+    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+    assert service.full_name == SERVICE
+    handlers = method_handlers(_AnyGateway())  # type: ignore[arg-type]  # only bound, never called
+    assert set(handlers) == {method.name for method in service.methods}
+
+
+class _AnyGateway:
+    def __getattr__(self, name: str) -> object:
+        return name
+
+
+def everything() -> Snapshot:
+    """Every value known, none of them zero, all of them stale by a known age."""
+    at_s = NOW_S - 10
+    preview = PreviewView(
+        state=PreviewState.RUNNING,
+        profile=Profile.LOW_BW,
+        last_error="what went wrong",
+        service_reachable=True,
+        listener=Listener(7100, 125),
+        stream=Stream(1280, 720, 15.0, 1000, Codec.H265, True, "RTT 180 ms"),
+        encoder=Encoder("x264", True, "mpp-h265", "no such element"),
+        measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),
+        counters=Counters(4, 3, 2, 1),
+        passphrase="a-passphrase",
+    )
+    board = Board(
+        odometry=Received(Odometry(0.3, 0.4, -0.5), at_s),
+        vision=Received(Vision(30.0, 29.0, 11.0, 7, 1), at_s),
+        detections=Received(
+            Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s
+        ),
+        battery=Received(Battery(True, 15.0, 80.0, True), at_s),
+        compute=Received(Compute(40.0, 60.0, True, 1, 2, 50.0), at_s),
+        network=Received(Network("wlan0", True, -60, 70), at_s),
+        onboard_battery=Received(Battery(True, 12.0, 70.0, True), at_s),
+    )
+    return take(
+        identity=Identity("lab", "1.2.3", insecure=True),
+        rules=Rules({kind: SourceRule(1000, required=False) for kind in SourceKind}, 3000),
+        board=board,
+        preview=preview,
+        events=(Event(1, at_s, "something happened"),),
+        now_s=NOW_S,
+    )
+
+
+def unset(message: Any, descriptor: Descriptor) -> Iterator[str]:
+    for field in descriptor.fields:
+        if field.full_name in NOT_SERVED:
+            continue
+        value = getattr(message, field.name)
+        if field.is_repeated:
+            if not value:
+                yield field.full_name
+                continue
+            value = value[0]
+        if field.type == FieldDescriptor.TYPE_MESSAGE:
+            if not field.is_repeated and not message.HasField(field.name):
+                yield field.full_name
+            assert field.message_type is not None
+            yield from unset(value, field.message_type)
+        elif not value:
+            yield field.full_name
+
+
+def test_a_full_snapshot_sets_every_field_of_the_contract() -> None:
+    overlay = overlay_snapshot(everything(), CALLER)
+    assert not list(unset(overlay, overlay_pb2.OverlaySnapshot.DESCRIPTOR))
+    assert {field.full_name for field in system_status_pb2.SystemStatus.DESCRIPTOR.fields} >= NOT_SERVED, (
+        "the list of exceptions names fields that don't exist"
+    )
+
+
+def test_the_values_arrive_where_the_contract_has_them() -> None:
+    status = overlay_snapshot(everything(), CALLER).status
+    assert status.health.linear_speed_mps == pytest.approx(0.5)
+    assert status.health.angular_speed_rad_s == pytest.approx(0.5)
+    assert status.health.measured_wz_rad_s == pytest.approx(-0.5)
+    assert (status.health.odom_age_ms, status.health.odom_stale) == (10_000, True)
+    assert status.platform.power.lipo_battery.voltage == 15.0
+    assert status.platform.power.onboard_battery.voltage == 12.0
+    assert status.preview.measured.last_frame_age_ms == 12 + 10_000
+    assert status.preview.endpoint.uri == "srt://10.1.2.3:7100?mode=caller&latency=125"
+
+
+def test_the_passphrase_goes_only_to_those_who_may_watch() -> None:
+    stranger = Caller(robot_host="fe80::1", may_watch=False)
+    overlay = overlay_snapshot(everything(), stranger)
+    assert overlay.status.preview.endpoint.encrypted
+    assert overlay.status.preview.endpoint.passphrase == ""
+    assert overlay.status.preview.endpoint.uri.startswith("srt://[fe80::1]:7100?")
+    assert b"a-passphrase" not in overlay.SerializeToString()
+
+
+def test_an_empty_snapshot_claims_nothing() -> None:
+    nothing = take(
+        identity=Identity("lab", "1.2.3", insecure=False),
+        rules=Rules({kind: SourceRule(1000, required=True) for kind in SourceKind}, 3000),
+        board=Board(),
+        preview=PreviewView(PreviewState.DISABLED, None, "", False, None, None, None, None, Counters()),
+        events=(),
+        now_s=NOW_S,
+    )
+    overlay = overlay_snapshot(nothing, CALLER)
+    status = overlay.status
+    assert status.health.summary == "waiting for odometry"
+    assert not any(
+        part.available
+        for part in (
+            overlay.detections,
+            status.vision,
+            status.platform.compute,
+            status.platform.network,
+            status.platform.power.lipo_battery,
+            status.platform.power.onboard_battery,
+            status.preview.measured,
+        )
+    )
+    assert status.preview.profile == preview_pb2.PREVIEW_PROFILE_UNSPECIFIED
+    assert not status.preview.HasField("endpoint")
