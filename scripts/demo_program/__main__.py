@@ -1,0 +1,117 @@
+"""The command line of scripts/demo."""
+
+import argparse
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+from common.errors import ExitCode, UserError
+from common.program import end_with
+
+# Before the client's import reads it: gRPC's own log lines would break into the table.
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
+
+from demo_program.check import check
+from demo_program.ground import DEFAULT_GRPC_PORT, DEFAULT_SRT_PORT, Ground, Wishes, prepared
+from demo_program.programs import Programs, ProgramTroubleError
+from demo_program.show import show
+from demo_program.sources import parse_source
+
+
+def main() -> int:
+    """Ends 0, or 1 with a reason and the end of each log."""
+    wishes, is_check = _command_line()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _interrupted)
+    try:
+        with prepared(wishes) as ground:
+            try:
+                with Programs(ground) as programs:
+                    (check if is_check else show)(ground, programs, _began_s())
+            except KeyboardInterrupt:
+                if is_check:
+                    print("main job: interrupted", flush=True)
+                return int(ExitCode.FAILED if is_check else ExitCode.DONE)
+            except UserError as error:
+                ground.keep_logs()
+                print(f"error: {error}", file=sys.stderr)
+                return _failed(is_check, _log_tails(ground, error))
+    except KeyboardInterrupt:
+        return int(ExitCode.FAILED)
+    except UserError as error:
+        end_with(error)
+    if is_check:
+        print("main job: ok", flush=True)
+    return int(ExitCode.DONE)
+
+
+def _log_tails(ground: Ground, error: UserError) -> str:
+    """The log of the program that made the trouble, or all, where none can be blamed yet."""
+    return ground.log_tails(error.program if isinstance(error, ProgramTroubleError) else "")
+
+
+def _failed(is_check: bool, tails: str) -> int:
+    print(tails, file=sys.stderr)
+    if is_check:
+        print("main job: failed", flush=True)
+    return int(ExitCode.FAILED)
+
+
+def _interrupted(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _began_s() -> float:
+    """When scripts/demo began, on the monotonic clock: setup counts as a step."""
+    began = os.environ.get("DEMO_BEGAN", "").replace(",", ".")
+    return time.monotonic() - (time.time() - float(began) if began else 0.0)
+
+
+def _command_line() -> tuple[Wishes, bool]:
+    parser = argparse.ArgumentParser(
+        prog="scripts/demo",
+        description="A simulated robot, the gateway and the preview service on this machine, until Ctrl-C.",
+    )
+    parser.add_argument("--check", action="store_true", help="run the main job once, say what was seen, end")
+    parser.add_argument(
+        "--source",
+        default="test",
+        metavar="test|file:PATH|v4l2:DEVICE|gst:DESCRIPTION",
+        help="where the pictures come from (a moving test picture)",
+    )
+    free = "any free one with --check"
+    parser.add_argument(
+        "--grpc-port", type=_port, help=f"the gateway's TCP port ({DEFAULT_GRPC_PORT}; {free})"
+    )
+    parser.add_argument("--srt-port", type=_port, help=f"the stream's UDP port ({DEFAULT_SRT_PORT}; {free})")
+    parser.add_argument("--domain", type=_domain, help="the ROS domain (one that nobody uses)")
+    arguments = parser.parse_args()
+    try:
+        source = parse_source(arguments.source, Path.cwd())
+    except UserError as error:
+        parser.error(str(error))
+    wishes = Wishes(source, arguments.grpc_port, arguments.srt_port, arguments.domain, arguments.check)
+    return wishes, arguments.check
+
+
+def _port(text: str) -> int:
+    return _number(text, 1, 65535)
+
+
+def _domain(text: str) -> int:
+    # Beyond 101 a domain's ports reach into the range that Linux hands out to anybody.
+    return _number(text, 0, 101)
+
+
+def _number(text: str, lowest: int, highest: int) -> int:
+    if not text.isdecimal() or not lowest <= int(text) <= highest:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number from {lowest} to {highest}")
+    return int(text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
