@@ -8,9 +8,9 @@ from typing import Final
 
 from common import listen, rpc
 from preview.config import PreviewSettings
+from preview.encoder_note import EncoderNote
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.probe import Prober
-from preview.hung_note import HungNote
 from preview.manager import Manager
 from preview.rpc.servicer import PreviewServicer
 from preview.selection import Selection
@@ -28,11 +28,11 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: the socket can't be used.
     """
-    note = HungNote(settings.runtime_dir)
+    note = EncoderNote(settings.runtime_dir)
     selection = Selection(allowed(settings), settings.encoders.forgive_after_s)
     note.tell(selection)
     prober = new_prober(settings)
-    manager = Manager(settings, prober, selection, on_hung=lambda name, why: _end_hung(note, name, why))
+    manager = Manager(settings, prober, selection, note, on_hung=lambda name, why: _end_hung(note, name, why))
     server = rpc.new_server()
     servicer = PreviewServicer(manager, prober, preference(settings))
     servicer.register(server)
@@ -70,7 +70,7 @@ def _largest(settings: PreviewSettings) -> Target:
     return max(settings.profiles.targets.values(), key=lambda t: (t.width_px * t.height_px, t.fps))
 
 
-def _end_hung(note: HungNote, name: str, why: str) -> None:
+def _end_hung(note: EncoderNote, name: str, why: str) -> None:
     """Ends the process at once: a thread that hangs in a driver can't be waited for."""
     if name:
         note.leave(name, why)

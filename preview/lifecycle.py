@@ -138,8 +138,7 @@ class Lifecycle:
         return after
 
     def note_fallback(self) -> None:
-        """Counts an encoder that was passed over. The next attempt is a first one again: another encoder."""
-        self._attempts_failed = 0
+        """Counts an encoder that was passed over for the next one."""
         self._counters = _raised(self._counters, fallbacks=1)
 
     def note_steady(self) -> None:

@@ -22,11 +22,12 @@ from common.errors import UserError
 from preview import sources
 from preview.adaptive import BitrateController
 from preview.config import PreviewSettings
+from preview.encoder_note import EncoderNote
 from preview.encoders.probe import Prober
 from preview.lifecycle import Event, Lifecycle, State
 from preview.pipeline.crossing import in_thread
 from preview.pipeline.faults import Blame, Fault
-from preview.pipeline.runner import Runner, Stopped
+from preview.pipeline.runner import HungError, Runner
 from preview.plan import ListenerPlan, Plan
 from preview.selection import Selection
 from preview.status import Status, StreamStatus
@@ -36,7 +37,9 @@ _log = logging.getLogger(__name__)
 
 _STEADY_AFTER_S: Final = 15.0
 """A pipeline that ran this long has left its last fault behind."""
-_DRAW_DEADLINE_S: Final = 0.5
+_DRAW_DEADLINE_S: Final = 0.3
+_PATIENCE_WITH_FAULTED_S: Final = 0.3
+"""How long the next pipeline waits for the encoder of the last one; it may go on stopping meanwhile."""
 _SWITCH_DEADLINE_S: Final = 2.0
 DRAWING: Final = "last-fault.dot"
 
@@ -48,6 +51,7 @@ class Manager:
         settings: the service's.
         prober: knows which encoders work.
         selection: knows which of them failed since.
+        note: tells the next process, should this one die of an encoder.
         on_hung: called when a driver hangs so that only the end of the process frees it; told the name of
             the encoder to pass over next time (empty: not the encoder's doing) and why.
     """
@@ -57,12 +61,14 @@ class Manager:
         settings: PreviewSettings,
         prober: Prober,
         selection: Selection,
+        note: EncoderNote,
         on_hung: Callable[[str, str], None],
     ) -> None:
         self._settings = settings
         self._targets = settings.profiles.targets
         self._prober = prober
         self._selection = selection
+        self._note = note
         self._on_hung = on_hung
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
@@ -70,8 +76,10 @@ class Manager:
         self._last_error = ""
         self._runner: Runner | None = None
         self._running_since = 0.0
-        self._abandoned = ""
-        """The encoder of a pipeline that never stopped."""
+        self._stopping: dict[asyncio.Task[bool], str] = {}
+        """What is left of pipelines whose encoder did not stop at once, and its name."""
+        self._passed_over = False
+        """The newest fault was an encoder's."""
         self._retry_now = False
         self._retry_timer: asyncio.TimerHandle | None = None
         self._watchers = 0
@@ -196,13 +204,9 @@ class Manager:
         self._last_error = fault.sentence
         self._move(Event.FAILURE)
         if fault.blame is Blame.ENCODER and self._runner:
-            self._pass_over(self._runner.plan.encoder.name, fault.sentence)
-
-    def _pass_over(self, name: str, reason: str) -> None:
-        self._selection.pass_over(name, reason, time.monotonic())
-        if self._selection.has_another(self._prober.verdicts):
-            self._lifecycle.note_fallback()
-            self._retry_now = True
+            name = self._runner.plan.encoder.name
+            self._selection.pass_over(name, fault.sentence, time.monotonic())
+            self._passed_over = True
 
     def _retry(self) -> None:
         self._retry_timer = None
@@ -240,6 +244,8 @@ class Manager:
         state, runner = self._lifecycle.state, self._runner
         if state is State.STOPPING:
             await self._tear_down()
+            if not self._wish.enabled:
+                await self._finish_stopping()
             self._move(Event.STOPPED)
             self._after_stop()
             return True
@@ -257,12 +263,16 @@ class Manager:
         if self._wish.enabled:
             self._last_error = ""
             self._move(Event.ENABLE)
-        elif self._abandoned:
-            self._on_hung(self._abandoned, "it hung when it was stopped")
 
     async def _recover(self) -> bool:
         if self._runner:
             await self._tear_down()
+        if self._passed_over:
+            self._passed_over = False
+            await self._try_encoders()
+            if self._selection.has_another(self._prober.verdicts):
+                self._lifecycle.note_fallback()
+                self._retry_now = True
         if not self._wish.enabled:
             self._move(Event.DISABLE)
         elif self._retry_now:
@@ -287,6 +297,7 @@ class Manager:
             self._failed(Fault(Blame.OTHER, str(error)))
             return
         self._retry_now = False
+        self._note.begin(plan.encoder.name)
         await runner.start()
 
     def _new_runner(self, plan: Plan) -> Runner:
@@ -308,11 +319,7 @@ class Manager:
         Raises:
             UserError: the source can't be used, or no encoder works.
         """
-        encoders = self._settings.encoders
-        for encoder in self._selection.order:
-            await self._prober.verdict(encoder)
-            if self._selection.has_another(self._prober.verdicts):
-                break
+        await self._try_encoders()
         if self._lifecycle.state is not State.STARTING:
             return None
         verdicts = self._prober.verdicts
@@ -332,8 +339,15 @@ class Manager:
             profile=self._wish.profile,
             target=self._targets[self._wish.profile],
             listener=self._listener(),
-            key_frame_interval_s=encoders.key_frame_interval_s,
+            key_frame_interval_s=self._settings.encoders.key_frame_interval_s,
         )
+
+    async def _try_encoders(self) -> None:
+        """Waits until one is known that works and has not failed, or all are known."""
+        for encoder in self._selection.order:
+            await self._prober.verdict(encoder)
+            if self._selection.has_another(self._prober.verdicts):
+                return
 
     def _listener(self) -> ListenerPlan:
         srt = self._settings.srt
@@ -359,19 +373,33 @@ class Manager:
             runner.fail(Fault(Blame.ENCODER, f"encoder {name} hung when the profile was changed"))
 
     async def _tear_down(self) -> None:
+        """Stops the pipeline. After a fault it does not wait long for the encoder: a viewer waits, too."""
         runner = self._runner
         if runner is None:
             return
-        if self._lifecycle.state is State.FAULTED:
+        faulted = self._lifecycle.state is State.FAULTED
+        if faulted:
             await self._keep_drawing(runner)
-        stopped = await runner.stop()
+        try:
+            rest = await runner.stop()
+        except HungError as error:
+            self._on_hung("", str(error))
+            return
+        self._stopping[rest] = runner.plan.encoder.name
+        await asyncio.wait({rest}, timeout=_PATIENCE_WITH_FAULTED_S if faulted else None)
         self._runner = None
-        name = runner.plan.encoder.name
-        if stopped is Stopped.HANGS:
-            self._on_hung("", f"{runner.plan.source.label} or the listener hung when it was stopped")
-        elif stopped is Stopped.ENCODER_HANGS:
-            _log.error("encoder %s hung when it was stopped; its pipeline is abandoned", name)
-            self._abandoned = name
+        self._stopping = {rest: name for rest, name in self._stopping.items() if not _is_over(rest)}
+        if not self._stopping:
+            self._note.end()
+
+    async def _finish_stopping(self) -> None:
+        """Waits for encoders that were left behind; ends the process when one of them never comes back."""
+        if self._stopping:
+            await asyncio.wait(self._stopping)
+        hung = [name for rest, name in self._stopping.items() if not _is_over(rest)]
+        self._stopping.clear()
+        if hung:
+            self._on_hung(hung[0], "it hung when it was stopped")
 
     async def _keep_drawing(self, runner: Runner) -> None:
         """Keeps the pipeline that failed as a drawing, for whoever looks for the reason."""
@@ -385,6 +413,11 @@ class Manager:
             await in_thread(draw, _DRAW_DEADLINE_S)
         except (TimeoutError, OSError) as error:
             _log.warning("no drawing of the failed pipeline in %s: %s", path, error)
+
+
+def _is_over(rest: "asyncio.Task[bool]") -> bool:
+    """Whether a pipeline is stopped; not when it is still at it or hangs for good."""
+    return rest.done() and rest.result()
 
 
 def _stream(runner: Runner) -> StreamStatus:

@@ -13,7 +13,7 @@ What can fail, how it is noticed, and what follows:
 | encoder fails later | ERROR of the encoder | next encoder at once |
 | encoder gives nothing, or empty buffers | watchdog: frames go in, nothing comes out | next encoder at once |
 | starting blocks | deadline of the call | as a failure of the encoder |
-| stopping blocks in the encoder | deadline of the call | abandoned with listener and source closed; the next one |
+| stopping blocks in the encoder | deadline | left behind, its port and source free; next encoder |
 | stopping blocks elsewhere | deadline of the call | the process ends with code 70, to be started again |
 | a viewer is slow, frozen, gone, a stranger | the listener drops it | others notice nothing |
 
@@ -27,7 +27,6 @@ import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from enum import Enum
 from typing import Any, Final
 
 from common.gst import Gst
@@ -52,14 +51,8 @@ _KEY_FRAMES_APART_S: Final = 0.3
 _INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
 
-class Stopped(Enum):
-    """How a stop went."""
-
-    CLEAN = "clean"
-    ENCODER_HANGS = "encoder hangs"
-    """Listener and source are closed; the rest never came back."""
-    HANGS = "hangs"
-    """The listener or the source never came back: only the end of the process frees them."""
+class HungError(Exception):
+    """The listener or the source can't be stopped: only the end of the process frees port and device."""
 
 
 class Runner:
@@ -126,25 +119,35 @@ class Runner:
             return
         self._watch = asyncio.create_task(self._supervise(), name="supervision")
 
-    async def stop(self) -> Stopped:
+    async def stop(self) -> "asyncio.Task[bool]":
         """Tears the pipeline down, each part with a deadline.
 
         First the listener, so that its port is free and viewers know, then the source, so that its device
-        is free, then the rest.
+        is free: so the next pipeline can start whatever becomes of the rest.
+
+        Returns:
+            The rest: the encoder and all around it. True when it is stopped, False when it hangs for good.
+
+        Raises:
+            HungError: the listener or the source hangs.
         """
         self._faulted = True  # Whatever fails from here on is the teardown's own doing.
         await self._stop_watching()
         parts, deadline_s = self._parts, self._timeouts.stop_s
+        for part, name in ((parts.sink, "the SRT listener"), (parts.source, self.plan.source.label)):
+            try:
+                await in_thread(lambda part=part: _to_null(part), deadline_s)  # type: ignore[misc]  # bound now
+            except TimeoutError as error:
+                raise HungError(f"{name} hung when it was stopped") from error
+        return asyncio.create_task(self._stop_rest(deadline_s), name="stop the encoder")
+
+    async def _stop_rest(self, deadline_s: float) -> bool:
+        pipeline = self._parts.pipeline
         try:
-            await in_thread(lambda: _to_null(parts.sink), deadline_s)
-            await in_thread(lambda: _to_null(parts.source), deadline_s)
+            await in_thread(lambda: pipeline.set_state(Gst.State.NULL), deadline_s)
         except TimeoutError:
-            return Stopped.HANGS
-        try:
-            await in_thread(lambda: parts.pipeline.set_state(Gst.State.NULL), deadline_s)
-        except TimeoutError:
-            return Stopped.ENCODER_HANGS
-        return Stopped.CLEAN
+            return False
+        return True
 
     def switching(self, profile: Profile, target: Target) -> Callable[[], None]:
         """Goes on with another profile; viewers stay connected.

@@ -1,0 +1,153 @@
+"""Encoders that fail, each in its own way: what takes over, what status says, how long it is dark."""
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.running_preview import RunningPreview
+from tests.support.watcher import Watcher
+
+pytestmark = pytest.mark.gst
+
+ORDER = {"encoders": {"order": ["mpp-h265", "va-h265", "x264"], "probe_timeout_s": 4}}
+DARK_AT_MOST_S = 2.0
+"""The promise; the machine of the tests may be slow, so what is measured gets twice that."""
+SLOW_MACHINE = 2.0
+EXIT_HUNG = 70
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("null-to-ready", "can't be opened"),
+        ("ready-to-paused", "can't be opened"),
+        ("no-output", "no output"),
+        ("empty", "empty buffers"),
+        ("error:3", "hardware fault"),
+        ("hang:3", "hung"),
+        ("crash:3", "crashed"),
+    ],
+)
+def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: str, words: str) -> None:
+    doubles = {"mpph265enc": fault, "vah265enc": "ok"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+        preview.wish()
+        state = preview.running()
+        assert (state.encoder.name, state.encoder.wanted) == ("va-h265", "mpp-h265")
+        assert words in state.encoder.fallback_reason
+        assert state.encoder.hardware
+        assert state.last_error == ""
+        assert state.counters == pb.Counters(starts=1)
+
+
+def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, ORDER, {"vah265enc": "ok"}) as preview:
+        preview.wish()
+        state = preview.running()
+        assert state.encoder.name == "va-h265"
+        assert state.encoder.fallback_reason == "there is no GStreamer element mpph265enc"
+
+
+def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) -> None:
+    doubles = {"mpph265enc": "no-output", "vah265enc": "null-to-ready"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+        preview.wish()
+        state = preview.running()
+        assert state.encoder.name == "x264"
+        assert not state.encoder.hardware
+        assert "no hardware encoder works" in state.last_error
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("later null-to-ready", "can't be opened"),
+        ("later ready-to-paused", "can't be opened"),
+        ("later no-output", "no picture"),
+        ("later empty", "no picture"),
+    ],
+)
+def test_an_encoder_that_fails_at_the_start_is_passed_over(tmp_path: Path, fault: str, words: str) -> None:
+    doubles = {"mpph265enc": fault, "vah265enc": "ok"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+        wished_at = time.monotonic()
+        preview.wish()
+        state = preview.running()
+        assert time.monotonic() - wished_at < DARK_AT_MOST_S * SLOW_MACHINE
+        passed_over(state, "va-h265", words)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [("later error:40", "hardware fault"), ("later hang:40", "no picture")],
+)
+def test_a_viewer_has_its_picture_back(tmp_path: Path, fault: str, words: str) -> None:
+    doubles = {"mpph265enc": fault, "vah265enc": "ok"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+        preview.wish()
+        preview.running()
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_pictures(10)
+            state = preview.wait_for(
+                lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
+            )
+            watcher.wait_for_pictures(30)
+        passed_over(state, "va-h265", words)
+        assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
+        print(f"{fault}: {watcher.longest_pause_s:.2f} s without a picture")
+
+
+def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp_path: Path) -> None:
+    settings = ORDER | {"timeouts": {"stop_s": 1.0}}
+    with RunningPreview(tmp_path, settings, {"mpph265enc": "later hang:5", "vah265enc": "ok"}) as preview:
+        preview.wish()
+        preview.wait_for(lambda a: a.encoder.name == "va-h265", "fallback")
+        preview.running()
+        preview.wish(None)
+        assert preview.process.wait(20) == EXIT_HUNG
+        preview.start_again()
+        preview.wish()
+        state = preview.running()
+        assert state.encoder.name == "va-h265"
+        assert "hung" in state.encoder.fallback_reason
+        assert state.counters.faults == 0
+
+
+def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, ORDER, {"mpph265enc": "later crash:40", "vah265enc": "ok"}) as preview:
+        preview.wish()
+        preview.running()
+        assert preview.process.wait(20) == -signal.SIGSEGV
+        died_at = time.monotonic()
+        # What the container engine and the gateway do.
+        preview.start_again()
+        preview.wish()
+        state = preview.running()
+        # A new viewer: one that was connected hears nothing of the crash, and calls again only when its own
+        # side of SRT gives up after 5 s.
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_pictures(1)
+        dark_s = watcher.arrivals_s[0] - died_at
+        assert state.encoder.name == "va-h265"
+        assert "the process ended while it was in use" in state.encoder.fallback_reason
+        assert dark_s < DARK_AT_MOST_S * SLOW_MACHINE
+        print(f"crash: {dark_s:.2f} s without a picture")
+
+
+def test_when_every_encoder_has_failed_they_are_tried_again(tmp_path: Path) -> None:
+    settings = {"encoders": {"order": ["mpp-h265"]}}
+    with RunningPreview(tmp_path, settings, {"mpph265enc": "later null-to-ready"}) as preview:
+        preview.wish()
+        state = preview.wait_for(lambda a: a.counters.faults >= 2, "a second attempt")
+        assert state.counters.fallbacks == 0
+        assert "can't be opened" in state.last_error
+
+
+def passed_over(state: pb.ActualState, now: str, words: str) -> None:
+    assert (state.encoder.name, state.encoder.wanted) == (now, "mpp-h265")
+    assert words in state.encoder.fallback_reason
+    assert words in state.last_error
+    assert (state.counters.faults, state.counters.fallbacks, state.counters.restarts) == (1, 1, 1)

@@ -1,0 +1,1 @@
+"""Hardware encoders that this machine doesn't have, by their real names, and able to fail."""

@@ -1,0 +1,8 @@
+"""Python reads this at its start when this directory is on PYTHONPATH: the processes under test get doubles.
+
+So neither the service nor its trials know anything of doubles, and both meet the same ones.
+"""
+
+from tests.support.encoder_doubles.doubles import register_from_environment
+
+register_from_environment()

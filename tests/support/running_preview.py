@@ -1,0 +1,172 @@
+"""A preview service of its own for a test: the real program, spoken to over its real socket."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import grpc
+import yaml
+
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
+from tests.support.ports import free_udp_port
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).parents[2]
+DOUBLES_DIR = Path(__file__).parent / "encoder_doubles"
+PATIENCE_S = 20.0
+# Small pictures: the machine has other things to do.
+SMALL = {"width_px": 320, "height_px": 240}
+PROFILES = {
+    "low_bw": SMALL | {"fps": 15, "bitrate_kbps": 300, "floor_kbps": 100},
+    "balanced": SMALL | {"fps": 30, "bitrate_kbps": 600, "floor_kbps": 150},
+    "high_quality": SMALL | {"fps": 60, "bitrate_kbps": 900, "floor_kbps": 200},
+}
+
+
+class RunningPreview:
+    """The service as a process.
+
+    Args:
+        directory: for its configuration, socket and log.
+        settings: keys of the configuration that differ from the test's own: a moving picture, x264, small.
+        doubles: hardware encoders to pretend, element -> how it fails (see encoder_doubles).
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        settings: Mapping[str, Any] | None = None,
+        doubles: Mapping[str, str] | None = None,
+    ) -> None:
+        self.port = free_udp_port()
+        self.socket = directory / "preview.sock"
+        self.runtime_dir = directory / "run"
+        self.log = directory / "preview.log"
+        self._config = directory / "preview.yaml"
+        self._doubles = dict(doubles or {})
+        self._revision = 0
+        own: dict[str, Any] = {
+            "socket": str(self.socket),
+            "runtime_dir": str(self.runtime_dir),
+            "source": {"kind": "test"},
+            "profiles": PROFILES,
+            "srt": {"port": self.port, "bind": "127.0.0.1", "latency_ms": 20},
+            "encoders": {"order": ["x264"]},
+        }
+        self._config.write_text(yaml.safe_dump(_merged(own, settings or {})), encoding="utf-8")
+        self.process = self._spawn()
+        self.channel = grpc.insecure_channel(f"unix:{self.socket}")
+        self.stub = pb_grpc.PreviewServiceStub(self.channel)  # type: ignore[no-untyped-call]
+
+    def __enter__(self) -> Self:
+        wait_until(
+            lambda: self.socket.exists() or self.process.poll() is not None, "the service is up", PATIENCE_S
+        )
+        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.channel.close()
+        self.process.terminate()
+        try:
+            self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+        finally:
+            if kind is not None:
+                sys.stderr.write(self.log.read_text(encoding="utf-8"))
+
+    def start_again(self) -> None:
+        """What a container engine does when the process has ended."""
+        assert self.process.poll() is not None
+        self.process = self._spawn()
+
+    def wish(
+        self, profile: "pb.Profile.ValueType | None" = pb.PROFILE_BALANCED, passphrase: str = ""
+    ) -> pb.ActualState:
+        """A new wish; without a profile: off."""
+        self._revision += 1
+        desired = pb.DesiredState(
+            revision=self._revision,
+            enabled=profile is not None,
+            profile=profile or pb.PROFILE_UNSPECIFIED,
+            passphrase=passphrase,
+        )
+        return self.apply(desired)
+
+    def apply(self, desired: pb.DesiredState) -> pb.ActualState:
+        """Applies a wish as it is."""
+        request = pb.ApplyDesiredStateRequest(desired=desired)
+        return self.stub.ApplyDesiredState(request, timeout=PATIENCE_S, wait_for_ready=True).actual
+
+    def wait_for(
+        self, holds: Callable[[pb.ActualState], object], what: str, within_s: float = PATIENCE_S
+    ) -> pb.ActualState:
+        """Watches the service until its state will do."""
+        deadline = time.monotonic() + within_s
+        last: pb.ActualState | None = None
+        call = self.stub.WatchActualState(pb.WatchActualStateRequest(), timeout=within_s, wait_for_ready=True)
+        try:
+            for answer in call:
+                last = answer.actual
+                if holds(last):
+                    return last
+                if time.monotonic() > deadline:
+                    break
+        except grpc.RpcError as error:
+            raise AssertionError(f"{what}: {error}; last: {last}") from error
+        finally:
+            call.cancel()
+        raise AssertionError(f"not within {within_s:g} s: {what}; last: {last}")
+
+    def running(self, *, revision: int | None = None) -> pb.ActualState:
+        """Waits until pictures flow."""
+        return self.wait_for(
+            lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING and a.applied_revision >= (revision or 0),
+            "running",
+        )
+
+    def disabled(self) -> pb.ActualState:
+        """Waits until nothing is left."""
+        return self.wait_for(lambda a: a.state == pb.LIFECYCLE_STATE_DISABLED, "disabled")
+
+    def faulted(self, words: str = "") -> pb.ActualState:
+        """Waits for a fault that says `words`."""
+        return self.wait_for(
+            lambda a: a.state == pb.LIFECYCLE_STATE_FAULTED and words in a.last_error, f"faulted: {words}"
+        )
+
+    def _spawn(self) -> subprocess.Popen[bytes]:
+        environment = dict(os.environ)
+        if self._doubles:
+            environment["PYTHONPATH"] = f"{DOUBLES_DIR}:{ROOT}"
+            environment["ENCODER_DOUBLES"] = json.dumps(self._doubles)
+        with self.log.open("ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", "preview.cli", "serve", "--config", str(self._config)],
+                cwd=ROOT,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+
+
+def _merged(base: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """`more` wins, section by section; a source is replaced whole."""
+    merged = dict(base)
+    for key, value in more.items():
+        both = isinstance(value, Mapping) and isinstance(base.get(key), dict) and key != "source"
+        merged[key] = _merged(base[key], value) if both else value
+    return merged
