@@ -1,0 +1,109 @@
+"""What reading ROS costs: sampling against stock rclpy callbacks, fast topics against slow ones; and latency.
+
+Publisher and readers are processes of their own. The comparison with callbacks counts the whole reading
+process. The one of rates counts its Python side, which is ours to keep flat; Fast DDS's own receiving grows
+with the messages, some 10 us each, whoever reads them. Both parts are logged.
+"""
+
+import os
+import statistics
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from bench.processes import CpuShare, cpu_share, program, resident_mib
+from bench.ros_latency import latencies_ms
+from bench.rows import Row
+from tests.support.ros import free_domain
+
+FAST_HZ, SLOW_HZ = 200, 50
+ROUNDS = 3
+WINDOW_S = 8.0
+SETTLE_S = 1.0
+
+
+def run(names: list[str]) -> list[Row]:
+    rows: list[Row] = []
+    if not names or {"ros.intake", "ros.flat"} & set(names):
+        rows += _cpu_rows()
+    if not names or "ros.value_latency_ms" in names:
+        rows.append(_latency_row())
+    return [row for row in rows if not names or row.name in names]
+
+
+def _cpu_rows() -> list[Row]:
+    ours: list[CpuShare] = []
+    stock: list[CpuShare] = []
+    slow: list[CpuShare] = []
+    for _ in range(ROUNDS):
+        with _domain():
+            with program("bench.ros_talker", str(FAST_HZ)):
+                ours.append(_cost_of("sampler", FAST_HZ))
+                stock.append(_cost_of("callbacks", FAST_HZ))
+            with program("bench.ros_talker", str(SLOW_HZ)):
+                slow.append(_cost_of("sampler", SLOW_HZ))
+    return [
+        Row(
+            name="ros.intake",
+            what=f"CPU of reading 4 x {FAST_HZ} Hz odometry, sampled, against rclpy callbacks",
+            unit="% of a core",
+            value=statistics.median(each.whole for each in ours),
+            reference=statistics.median(each.whole for each in stock),
+            bar=0.2,
+        ),
+        Row(
+            name="ros.flat",
+            what=f"CPU of the sampling thread, 4 x {FAST_HZ} Hz against 4 x {SLOW_HZ} Hz",
+            unit="% of a core",
+            value=statistics.median(each.own for each in ours),
+            reference=statistics.median(each.own for each in slow),
+            bar=1.15,
+        ),
+    ]
+
+
+def _cost_of(way: str, rate_hz: int) -> CpuShare:
+    with program("bench.ros_listener", way) as process:
+        cpu_share(process.pid, SETTLE_S)
+        cpu = cpu_share(process.pid, WINDOW_S)
+        rss = resident_mib(process.pid)
+        assert process.stdin
+        assert process.stdout
+        process.stdin.close()
+        kept = int(process.stdout.readline())
+    print(
+        f"ros: {way} at 4 x {rate_hz} Hz: {cpu.own:.2f} % + {cpu.middleware:.2f} % in Fast DDS, "
+        f"{rss:.0f} MiB, {kept} values",
+        file=sys.stderr,
+    )
+    # A reader that receives nothing is the cheapest of all.
+    if kept < 4 * 19 * WINDOW_S:
+        raise RuntimeError(f"{way} kept {kept} values only: the figures would mean nothing")
+    return cpu
+
+
+def _latency_row() -> Row:
+    with _domain():
+        found = sorted(latencies_ms())
+    p50, p99 = found[len(found) // 2], found[int(len(found) * 0.99)]
+    print(f"ros: {len(found)} values, median {p50:.1f} ms, p99 {p99:.1f} ms", file=sys.stderr)
+    return Row(
+        name="ros.value_latency_ms",
+        what=f"odometry published until GetSystemStatus shows it: 99th percentile of {len(found)}",
+        unit="ms",
+        value=p99,
+        reference=None,
+        bar=60.0,
+    )
+
+
+@contextmanager
+def _domain() -> Iterator[None]:
+    before = os.environ.copy()
+    with free_domain() as domain:
+        os.environ |= {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        try:
+            yield
+        finally:
+            os.environ.clear()
+            os.environ.update(before)

@@ -1,0 +1,96 @@
+"""How late a value is: odometry is published, and a client asks the real gateway until it shows."""
+
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import grpc
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.running_gateway import free_tcp_port
+
+COUNT = 400
+TOPIC = "/odometry/filtered"
+GIVE_UP_S = 10.0
+ASK_EVERY_S = 0.002
+PAUSE_S = 0.1
+"""Messages leave at random moments of this span, so that they meet the sampler at any phase."""
+
+
+def latencies_ms() -> list[float]:
+    """The time from `publish` until an answer of GetSystemStatus holds the value, of COUNT messages."""
+    dice = random.Random(1)
+    with _gateway() as gateway, _publisher() as publisher:
+        _wait_for_discovery(gateway, publisher)
+        found = []
+        for number in range(1, COUNT + 1):
+            time.sleep(dice.uniform(0, PAUSE_S))
+            found.append(_publish_until_seen(gateway, publisher, float(number)))
+    return found
+
+
+def _publish_until_seen(gateway: Any, publisher: Any, speed: float) -> float:
+    message = Odometry()
+    message.twist.twist.linear.x = speed
+    sent_s = time.monotonic()
+    publisher.publish(message)
+    while time.monotonic() - sent_s < GIVE_UP_S:
+        if gateway.GetSystemStatus(GetSystemStatusRequest()).health.measured_vx_mps == speed:
+            return 1000 * (time.monotonic() - sent_s)
+        time.sleep(ASK_EVERY_S)
+    raise RuntimeError(f"message {speed:.0f} was not seen within {GIVE_UP_S:.0f} s")
+
+
+def _wait_for_discovery(gateway: Any, publisher: Any) -> None:
+    """Publishes until the first value shows: both sides have found each other."""
+    deadline = time.monotonic() + GIVE_UP_S
+    while not gateway.GetSystemStatus(GetSystemStatusRequest()).health.odom_available:
+        if time.monotonic() > deadline:
+            raise RuntimeError("the gateway never saw a message")
+        publisher.publish(Odometry())
+        time.sleep(0.1)
+
+
+@contextmanager
+def _gateway() -> Iterator[Any]:
+    """The real program, with its defaults, and a client of it."""
+    port = free_tcp_port()
+    with tempfile.TemporaryDirectory() as directory:
+        settings = {
+            "GATEWAY__GRPC__PORT": str(port),
+            "GATEWAY__PREVIEW__SOCKET": str(Path(directory) / "preview.sock"),
+            "GATEWAY__LOG_LEVEL": "error",
+        }
+        command = [str(Path(sys.executable).parent / "robot-gateway"), "serve"]
+        with subprocess.Popen(command, env=os.environ | settings) as process:
+            try:
+                with grpc.insecure_channel(f"127.0.0.1:{port}") as channel:
+                    grpc.channel_ready_future(channel).result(timeout=GIVE_UP_S)
+                    yield RobotGatewayStub(channel)
+            finally:
+                process.terminate()
+
+
+@contextmanager
+def _publisher() -> Iterator[Any]:
+    context = Context()
+    context.init(args=[], initialize_logging=False)
+    node = Node("bench_latency", context=context, enable_rosout=False)
+    try:
+        yield node.create_publisher(Odometry, TOPIC, QoSProfile(depth=10))
+    finally:
+        node.destroy_node()
+        context.shutdown()
+        context.destroy()
