@@ -13,6 +13,7 @@ This runs in Python once per picture, never per packet; it also is where picture
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst
@@ -35,10 +36,17 @@ class Framing:
         self.last_picture_at = 0.0
         """time.monotonic() of the newest picture."""
         self._on_first_picture = on_first_picture
+        self._detach: Callable[[], None] = lambda: None
 
     def attach(self, muxer_pad: Any) -> None:
         """Puts the probe on the muxer's source pad, which is linked to the listener."""
-        muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
+        probe = muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
+        self._detach = partial(muxer_pad.remove_probe, probe)
+
+    def detach(self) -> None:
+        """Takes the probe away: through it the pipeline and this object would keep each other alive."""
+        self._detach()
+        self._detach = lambda: None
 
     def _probe(self, pad: Any, info: Any) -> Any:
         if info.type & Gst.PadProbeType.BUFFER_LIST:

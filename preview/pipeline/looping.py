@@ -30,7 +30,15 @@ class Looping:
         self._crossing = crossing
         self._on_failure = on_failure
         self._task: asyncio.Task[None] | None = None
-        self._pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH, self._probe)
+        self._probe_id = self._pad.add_probe(
+            Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH, self._probe
+        )
+
+    def detach(self) -> None:
+        """Takes the probe away: through it the pipeline and this object would keep each other alive."""
+        self._pad.remove_probe(self._probe_id)
+        if self._task:
+            self._task.cancel()
 
     def _probe(self, _pad: Any, info: Any) -> Any:
         """On streaming threads: keeps the end, and the flushing that the seek causes, from going on."""

@@ -27,6 +27,7 @@ import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst
@@ -95,7 +96,9 @@ class Runner:
         self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture))
         self._framing.attach(self._parts.muxer_pad)
         self._looping = Looping(self._parts, self._crossing, self._loop_failed) if plan.source.loops else None
-        self._parts.sink.connect("caller-added", lambda *_: self._crossing.hand_over(self._viewer_joined))
+        self._joins = self._parts.sink.connect(
+            "caller-added", lambda *_: self._crossing.hand_over(self._viewer_joined)
+        )
         self._bus = self._parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._watch: asyncio.Task[None] | None = None
@@ -133,18 +136,38 @@ class Runner:
         """
         self._faulted = True  # Whatever fails from here on is the teardown's own doing.
         await self._stop_watching()
-        parts, deadline_s = self._parts, self._timeouts.stop_s
-        for part, name in ((parts.sink, "the SRT listener"), (parts.source, self.plan.source.label)):
+        deadline_s = self._timeouts.stop_s
+        for part, name in (
+            (self._parts.sink, "the SRT listener"),
+            (self._parts.source, self.plan.source.label),
+        ):
             try:
-                await in_thread(lambda part=part: _to_null(part), deadline_s)  # type: ignore[misc]  # bound now
+                await in_thread(partial(_to_null, part), deadline_s)
             except TimeoutError as error:
                 raise HungError(f"{name} hung when it was stopped") from error
-        return asyncio.create_task(self._stop_rest(deadline_s), name="stop the encoder")
+        del part
+        return asyncio.create_task(self._stop_rest(self._let_go(), deadline_s), name="stop the encoder")
 
-    async def _stop_rest(self, deadline_s: float) -> bool:
-        pipeline = self._parts.pipeline
+    def _let_go(self) -> list[Any]:
+        """Cuts every tie to the pipeline; what is returned is the last reference to it."""
+        self._parts.sink.disconnect(self._joins)
+        self._framing.detach()
+        if self._looping:
+            self._looping.detach()
+            self._looping = None
+        last = [self._parts.pipeline]
+        del self._parts, self._bus
+        return last
+
+    async def _stop_rest(self, last: list[Any], deadline_s: float) -> bool:
+        def stop() -> None:
+            last[0].set_state(Gst.State.NULL)
+            # Forgotten here, in this thread: SRT frees the port for good, and cleans up after itself, when
+            # its last element is gone, and both take their time.
+            last.clear()
+
         try:
-            await in_thread(lambda: pipeline.set_state(Gst.State.NULL), deadline_s)
+            await in_thread(stop, deadline_s)
         except TimeoutError:
             return False
         return True

@@ -51,7 +51,7 @@ class RunningPreview:
         self.log = directory / "preview.log"
         self._config = directory / "preview.yaml"
         self._doubles = dict(doubles or {})
-        self._revision = 0
+        self.revision = 0
         own: dict[str, Any] = {
             "socket": str(self.socket),
             "runtime_dir": str(self.runtime_dir),
@@ -96,9 +96,9 @@ class RunningPreview:
         self, profile: "pb.Profile.ValueType | None" = pb.PROFILE_BALANCED, passphrase: str = ""
     ) -> pb.ActualState:
         """A new wish; without a profile: off."""
-        self._revision += 1
+        self.revision += 1
         desired = pb.DesiredState(
-            revision=self._revision,
+            revision=self.revision,
             enabled=profile is not None,
             profile=profile or pb.PROFILE_UNSPECIFIED,
             passphrase=passphrase,

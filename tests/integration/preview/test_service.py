@@ -1,0 +1,187 @@
+"""The service's life, seen from the gateway's side of the socket."""
+
+import socket
+from pathlib import Path
+
+import grpc
+import pytest
+
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.running_preview import RunningPreview
+from tests.support.waiting import wait_until
+from tests.support.watcher import Watcher
+
+pytestmark = pytest.mark.gst
+
+
+def port_is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+        return True
+
+
+def test_nothing_is_there_until_it_is_wanted(preview: RunningPreview) -> None:
+    state = preview.disabled()
+    assert (state.applied_revision, state.last_error) == (0, "")
+    assert not state.HasField("stream")
+    assert not state.HasField("encoder")
+    assert not state.HasField("measurement")
+    assert (state.listener.port, state.listener.latency_ms) == (preview.port, 20)
+    assert port_is_free(preview.port)
+
+
+def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPreview) -> None:
+    answer = preview.wish(pb.PROFILE_BALANCED)
+    assert answer.state == pb.LIFECYCLE_STATE_STARTING
+    assert answer.applied_revision == 1
+    state = preview.running()
+    assert (state.stream.width_px, state.stream.height_px, state.stream.fps) == (320, 240, 30)
+    assert state.stream.target_bitrate_kbps == 600
+    assert state.stream.codec == pb.CODEC_H264
+    assert (state.encoder.name, state.encoder.wanted, state.encoder.fallback_reason) == ("x264", "x264", "")
+    with Watcher(preview.port) as watcher:
+        watcher.wait_for_pictures(10)
+        measured = preview.wait_for(lambda a: a.measurement.viewer_count == 1, "one viewer").measurement
+        assert measured.HasField("worst_rtt_ms")
+        assert measured.HasField("worst_loss_percent")
+    gone = preview.wait_for(lambda a: a.measurement.viewer_count == 0, "no viewer").measurement
+    assert not gone.HasField("worst_rtt_ms")
+    preview.wish(None)
+    after = preview.disabled()
+    assert port_is_free(preview.port)
+    assert after.profile == pb.PROFILE_BALANCED
+    assert after.counters == pb.Counters(starts=1)
+
+
+def test_the_figures_are_those_of_the_stream(preview: RunningPreview) -> None:
+    preview.wish(pb.PROFILE_BALANCED)
+    preview.running()
+    state = preview.wait_for(lambda a: 20 < a.measurement.fps < 40, "a rate near 30")
+    assert state.measurement.bitrate_kbps > 50
+    assert state.measurement.last_frame_age_ms < 5000
+
+
+def test_the_same_wish_changes_nothing(preview: RunningPreview) -> None:
+    wish = pb.DesiredState(revision=7, enabled=True, profile=pb.PROFILE_BALANCED)
+    preview.apply(wish)
+    preview.running()
+    other = pb.DesiredState(revision=7, enabled=False)
+    assert preview.apply(wish).state == pb.LIFECYCLE_STATE_RUNNING
+    assert preview.apply(other).state == pb.LIFECYCLE_STATE_RUNNING
+    assert preview.running().counters.starts == 1
+
+
+def test_an_unknown_profile_is_refused_and_changes_nothing(preview: RunningPreview) -> None:
+    for profile in (0, 17):
+        request = pb.DesiredState(revision=3, enabled=True, profile=profile)  # type: ignore[arg-type]
+        with pytest.raises(grpc.RpcError) as refusal:
+            preview.apply(request)
+        assert refusal.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    assert preview.disabled().applied_revision == 0
+
+
+def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
+    for profile in (pb.PROFILE_BALANCED, None, pb.PROFILE_LOW_BW, None, pb.PROFILE_HIGH_QUALITY):
+        preview.wish(profile)
+    state = preview.wait_for(
+        lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING and a.profile == pb.PROFILE_HIGH_QUALITY,
+        "the last wish",
+    )
+    assert state.applied_revision == 5
+    assert state.counters.faults == 0
+    with Watcher(preview.port) as watcher:
+        watcher.wait_for_pictures(5)
+
+
+def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
+    preview.wish(pb.PROFILE_BALANCED)
+    preview.running()
+    with Watcher(preview.port) as watcher:
+        watcher.wait_for_pictures(10)
+        for profile, fps in (
+            (pb.PROFILE_HIGH_QUALITY, 60),
+            (pb.PROFILE_LOW_BW, 15),
+            (pb.PROFILE_BALANCED, 30),
+        ):
+            preview.wish(profile)
+            state = preview.wait_for(
+                lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5 and a.stream.fps == fps,
+                f"{fps} fps",
+            )
+            assert state.state == pb.LIFECYCLE_STATE_RUNNING
+            watcher.wait_for_pictures(10)
+        assert watcher.reconnects == 0
+        assert watcher.longest_pause_s < 0.5
+        print(f"longest gap {watcher.longest_pause_s * 1000:.0f} ms")
+    assert preview.running().counters.starts == 1
+
+
+def test_left_alone_it_stops_by_itself_and_the_same_wish_brings_it_back(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, {"timeouts": {"without_gateway_s": 1.0}}) as preview:
+        wish = pb.DesiredState(revision=4, enabled=True, profile=pb.PROFILE_BALANCED)
+        preview.apply(wish)
+        wait_until(lambda: "stopped by itself" in preview.log.read_text(encoding="utf-8"), "left alone")
+        state = preview.disabled()
+        assert "nobody has watched" in state.last_error
+        assert state.applied_revision == 0
+        preview.apply(wish)
+        assert preview.running().last_error == ""
+
+
+def test_encoders_are_listed_in_the_order_of_preference(preview: RunningPreview) -> None:
+    answer = preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=30)
+    first, *others = answer.encoders
+    assert (first.name, first.family, first.element, first.codec) == (
+        "x264",
+        "x264",
+        "x264enc",
+        pb.CODEC_H264,
+    )
+    assert first.proven
+    assert first.HasField("first_byte_ms")
+    missing = next(one for one in others if one.name == "mpp-h265")
+    assert (missing.present, missing.proven) == (False, False)
+    assert missing.reason == "there is no GStreamer element mpph265enc"
+    assert not missing.HasField("first_byte_ms")
+
+
+def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, {"encoders": {"order": ["x264", "x265"], "codec": "h265"}}) as preview:
+        preview.wish()
+        state = preview.running()
+        assert state.stream.codec == pb.CODEC_H265
+        assert (state.encoder.name, state.encoder.wanted) == ("x265", "x265")
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_pictures(30)
+        assert set(watcher.codecs) == {"h265"}
+
+
+def test_again_and_again_leaves_nothing_behind(preview: RunningPreview) -> None:
+    fds = Path(f"/proc/{preview.process.pid}/fd")
+
+    def one_round() -> None:
+        preview.wish(pb.PROFILE_LOW_BW)
+        preview.running(revision=preview.revision)
+        preview.wish(None)
+        preview.disabled()
+
+    for _ in range(10):
+        one_round()
+    descriptors, resident = len(list(fds.iterdir())), resident_mib(preview)
+    for _ in range(30):
+        one_round()
+    wait_until(lambda: len(list(fds.iterdir())) <= descriptors, "as many descriptors as before")
+    assert resident_mib(preview) - resident < 5
+    assert threads(preview) < 60
+
+
+def resident_mib(preview: RunningPreview) -> float:
+    status = Path(f"/proc/{preview.process.pid}/status").read_text(encoding="ascii")
+    return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:"))) / 1024
+
+
+def threads(preview: RunningPreview) -> int:
+    return len(list(Path(f"/proc/{preview.process.pid}/task").iterdir()))
