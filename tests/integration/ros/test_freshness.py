@@ -1,0 +1,155 @@
+"""Ages, and what becomes of them when topics fall silent, vanish, return, hurry or dawdle."""
+
+import statistics
+import threading
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from nav_msgs.msg import Odometry as OdometryMessage
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from gateway.config import DEFAULT_SOURCES
+from gateway.ros.intake import intake
+from gateway.status.board import Board, SourceKind
+from tests.support.ros import simulated_robot
+from tests.support.talker import Talker
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.ros
+
+ODOMETRY = next(source for source in DEFAULT_SOURCES if source.kind is SourceKind.ODOMETRY)
+
+
+def age_s(board: Board) -> float:
+    """Age of the odometry on the board; infinite when there is none."""
+    received = board.odometry
+    return time.monotonic() - received.at_s if received else float("inf")
+
+
+def test_an_age_is_counted_from_the_reception(talker: Talker) -> None:
+    """Not from the moment of sampling, which comes 25 ms later on average."""
+    board, late_s = Board(), []
+    with intake([ODOMETRY], board) as running:
+        publisher = talker.meet(running, ODOMETRY.topic, OdometryMessage)
+        for _ in range(21):
+            before, sent_s = board.odometry, time.monotonic()
+            publisher.publish(OdometryMessage())
+            wait_until(lambda before=before: board.odometry is not before, "the next message")
+            assert board.odometry
+            late_s.append(board.odometry.at_s - sent_s)
+            # Somewhere else in the sampler's period each time.
+            threading.Event().wait(0.0073 * (len(late_s) % 7))
+    assert min(late_s) >= 0, "no message is received before it is sent"
+    assert statistics.median(late_s) < 0.012
+
+
+def test_a_publisher_whose_clock_is_wrong_does_not_change_the_age(talker: Talker) -> None:
+    board = Board()
+    message = OdometryMessage()
+    message.header.stamp.sec = 1
+    with intake([ODOMETRY], board) as running:
+        talker.say(running, ODOMETRY.topic, message)
+        wait_until(lambda: board.odometry, "odometry")
+        assert age_s(board) < 10
+
+
+def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
+        wait_until(lambda: age_s(board) < 0.2, "fresh odometry")
+        robot.change(silent=["odometry"])
+        wait_until(lambda: age_s(board) > 1.0, "odometry to become stale")
+        assert board.vision
+        assert time.monotonic() - board.vision.at_s < 1.0, "only the silenced topic is silent"
+        robot.change(silent=[])
+        wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
+
+
+def test_a_robot_that_is_killed_and_comes_back_is_heard_again(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake(DEFAULT_SOURCES, board):
+        with simulated_robot(tmp_path) as robot:
+            wait_until(lambda: age_s(board) < 0.2, "fresh odometry")
+            robot.process.kill()
+        wait_until(lambda: age_s(board) > 1.0, "odometry to become stale")
+        with simulated_robot(tmp_path, "speed_mps=1.75"):
+            wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
+            assert board.odometry
+            assert board.odometry.value.vx_mps == 1.75
+
+
+def test_a_gateway_that_starts_after_the_robot_hears_it(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with simulated_robot(tmp_path), intake(DEFAULT_SOURCES, board):
+        wait_until(lambda: age_s(board) < 0.2 and board.battery and board.detections, "all sources")
+
+
+def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake([ODOMETRY], board) as running, simulated_robot(tmp_path, "--odometry-hz", "1000"):
+        source = running.sources[SourceKind.ODOMETRY]
+        wait_until(lambda: board.odometry, "odometry")
+        before, started_s = source.counts.values, time.monotonic()
+        wait_until(lambda: source.counts.values >= before + 20, "20 values")
+        assert time.monotonic() - started_s > 0.9, "no more than 20 a second are read"
+        wait_until(lambda: age_s(board) < 0.1, "the newest, not one from a queue")
+
+
+def test_a_topic_every_ten_seconds_keeps_its_value_between(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake([ODOMETRY], board), simulated_robot(tmp_path, "--odometry-hz", "0.1"):
+        first = wait_until(lambda: board.odometry, "the first message", within_s=40)
+        second = wait_until(
+            lambda: board.odometry if board.odometry is not first else None, "the second", within_s=40
+        )
+    assert second.at_s - first.at_s == pytest.approx(10, abs=1)
+
+
+def test_the_board_holds_what_an_ordinary_subscriber_saw_last(talker: Talker) -> None:
+    """Differential: the same messages through rclpy's own way and through ours."""
+    board, seen = Board(), []
+    with intake([ODOMETRY], board) as running:
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        plain = talker.node.create_subscription(OdometryMessage, ODOMETRY.topic, seen.append, qos)
+        publisher = talker.meet(running, ODOMETRY.topic, OdometryMessage)
+        wait_until(lambda: plain.get_publisher_count() > 0, "the plain subscriber")
+        for number in range(1, 301):
+            message = OdometryMessage()
+            message.twist.twist.linear.x = number * 0.5
+            message.twist.twist.angular.z = -number * 0.25
+            publisher.publish(message)
+        last = wait_until(lambda: plain.handle.take_message(OdometryMessage, False), "the last message")[0]
+        twist = last.twist.twist
+        wait_until(
+            lambda: (
+                board.odometry
+                and (board.odometry.value.vx_mps, board.odometry.value.wz_rad_s)
+                == (twist.linear.x, twist.angular.z)
+            ),
+            f"{twist.linear.x} on the board",
+        )
+        assert twist.linear.x == 150.0
+
+
+def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
+    process = psutil.Process()
+
+    def once() -> None:
+        with intake(DEFAULT_SOURCES, Board()):
+            pass
+
+    once()  # what is loaded once stays loaded
+    files, threads = process.num_fds(), process.num_threads()
+    for _ in range(10):
+        once()
+    wait_until(lambda: process.num_threads() <= threads, "the threads to end")
+    wait_until(lambda: process.num_fds() <= files, "the files to be closed")
+    assert "ros-sampler" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_the_sampler_says_when_it_last_looked(ros_domain: int) -> None:
+    with intake(DEFAULT_SOURCES, Board()) as running:
+        first = wait_until(lambda: running.sampler.last_pass_at_s, "the first pass")
+        wait_until(lambda: (running.sampler.last_pass_at_s or 0) > first, "another pass")

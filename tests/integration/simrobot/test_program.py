@@ -1,0 +1,123 @@
+"""The simulated robot as a program: its command line, its control socket, its end."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from common.errors import UserError
+from gateway.config import DEFAULT_SOURCES
+from gateway.ros.intake import intake
+from gateway.status.board import Board
+from tests.support.ros import simulated_robot
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.ros
+
+SIMROBOT = [sys.executable, "-c", "from simrobot.cli import main; main()"]
+
+
+def simrobot(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*SIMROBOT, *arguments],
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])} | environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path, "battery_percent=40", "speed_mps=0.75"):
+        wait_until(
+            lambda: board.odometry and board.vision and board.detections and board.battery, "all sources"
+        )
+    assert not board.unusable
+    assert board.odometry
+    assert board.odometry.value.vx_mps == 0.75
+    assert board.battery
+    assert board.battery.value.charge_percent == pytest.approx(40, abs=1)
+    assert board.detections
+    assert board.detections.value.count == 3
+
+
+def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
+        robot.change(battery_percent=7, infer_errors_per_s=50, detection_count=250, speed_mps=-1.25)
+        wait_until(lambda: board.odometry and board.odometry.value.vx_mps == -1.25, "the new speed")
+        wait_until(lambda: board.vision and board.vision.value.infer_error_count > 10, "inference errors")
+        found = wait_until(
+            lambda: board.detections if board.detections and board.detections.value.count == 250 else None,
+            "many boxes",
+        )
+        assert len(found.value.items) == 100
+        wait_until(
+            lambda: (
+                board.battery
+                and board.battery.value.charge_percent is not None
+                and board.battery.value.charge_percent < 8
+            ),
+            "a low battery",
+        )
+        robot.change(not_a_number=["battery", "detections"])
+        wait_until(
+            lambda: board.battery and board.battery.value.charge_percent is None, "a charge that is not known"
+        )
+        wait_until(lambda: board.detections and not board.detections.value.items, "no box to draw")
+
+
+def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) -> None:
+    with simulated_robot(tmp_path) as robot:
+        started = time.monotonic()
+        robot.process.terminate()
+        assert robot.process.wait(30) == 0
+        assert time.monotonic() - started < 2.0
+        assert not robot.control.exists()
+
+
+def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> None:
+    with simulated_robot(tmp_path) as robot:
+        at = ("--control", str(robot.control))
+        assert '"odometry"' in simrobot("control", *at, "silence", "odometry", "battery").stdout
+        assert set(robot.change()["silent"]) == {"battery", "odometry"}
+        assert simrobot("control", *at, "resume", "odometry").returncode == 0
+        assert robot.change()["silent"] == ["battery"]
+        assert simrobot("control", *at, "set", "speed_mps=2.5").returncode == 0
+        assert robot.change()["speed_mps"] == 2.5
+        with pytest.raises(UserError, match="silent"):
+            robot.change(silent=["sonar"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (("run", "speed_mps=fast"), 2, "speed_mps"),
+        (("run", "wings=2"), 2, "wings"),
+        (("run", "--control", "/nonexistent/robot.sock"), 1, "/nonexistent/robot.sock"),
+        (("control", "--control", "/nonexistent/robot.sock", "show"), 3, "no simulated robot answers"),
+    ],
+)
+def test_a_mistake_is_one_line(ros_domain: int, arguments: tuple[str, ...], code: int, said: str) -> None:
+    done = simrobot(*arguments)
+    assert done.returncode == code, done.stderr
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_without_its_message_packages_it_says_what_to_type(ros_domain: int, tmp_path: Path) -> None:
+    """A package of the same name that has nothing in it stands in the way of the real one."""
+    (tmp_path / "omniseer_msgs").mkdir()
+    (tmp_path / "omniseer_msgs" / "__init__.py").touch()
+    root = Path(__file__).parents[3]
+    done = simrobot("run", PYTHONPATH=f"{tmp_path}:{root}")
+    assert done.returncode == 1
+    assert "omniseer_msgs" in done.stderr
+    assert "scripts/setup" in done.stderr
+    assert "Traceback" not in done.stderr
