@@ -184,7 +184,7 @@ class PreviewSettings(Settings):
     socket: Path = Path("/run/robot-gateway/preview.sock")
     """The Unix socket the gateway speaks to."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
-    source: Source = V4l2Source(card="rkisp_mainpath")
+    source: Source = Field(default_factory=lambda: V4l2Source(card="rkisp_mainpath"))
     profiles: ProfilesSettings = ProfilesSettings()
     srt: SrtSettings = SrtSettings()
     encoders: EncoderSettings = EncoderSettings()

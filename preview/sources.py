@@ -115,7 +115,7 @@ def _file(path: Path) -> SourcePlan:
     return SourcePlan(
         f"video file {path}",
         # Only the picture is decoded; clocksync plays it at its own speed.
-        "filesrc name=file ! decodebin name=decoder caps=video/x-raw expose-all-streams=false"
+        'filesrc name=file ! decodebin caps="video/x-raw(ANY)" expose-all-streams=false'
         " ! clocksync name=pace",
         _REMEDY_FILE,
         properties={"file": {"location": str(path)}},

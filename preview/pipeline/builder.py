@@ -81,7 +81,8 @@ def _source(plan: Plan) -> Any:
     if plan.source.capture_fps:
         # The camera's best rate up to this; a camera that has none in reach says so itself.
         description += f" ! video/x-raw,framerate=[ 1/1, {plan.source.capture_fps}/1 ]"
-    source = _parsed(description, plan.source.remedy)
+    # A description may end in caps only when something follows.
+    source = _parsed(f"{description} ! identity silent=true", plan.source.remedy)
     source.set_name("source")
     for name, properties in plan.source.properties.items():
         for key, value in properties.items():

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
 from preview.pipeline.watchdogs import Silent
 from preview.plan import Plan
+
+_DETAILS: Final = 120
+"""Characters of GStreamer's details that a person is told; the log has them all."""
 
 
 class Blame(Enum):
@@ -93,7 +96,7 @@ def _reason(text: str, debug: str) -> str:
     last = debug.strip().rsplit("\n", 1)[-1].strip().rstrip(".")
     if not last or "(): " in last or last in text or last.startswith(("../", "/")):
         return text
-    return f"{text} ({last})"
+    return f"{text} ({last[:_DETAILS] + '...' if len(last) > _DETAILS else last})"
 
 
 def _with_remedy(text: str, plan: Plan) -> str:
