@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from common.health import Health
 from common.version import project_version
 from gateway.config import GatewaySettings, SourceSettings
 from gateway.platform.sampler import PlatformSampler
@@ -16,7 +17,7 @@ from gateway.preview_link.link import PreviewLink
 from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
-from gateway.rpc.server import serving
+from gateway.rpc.server import SERVICE, serving
 from gateway.rpc.servicer import RobotGateway
 from gateway.status.board import Board
 from gateway.status.events import EventLog
@@ -25,6 +26,8 @@ from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 
 _log = logging.getLogger(__name__)
 
+PREVIEW_HEALTH: Final = "preview"
+"""The preview service's name in the health service. Without it the gateway as a whole serves all the same."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often the gateway looks for events by itself."""
 _PASSPHRASE_BYTES: Final = 24
@@ -48,14 +51,15 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         PreviewControl(link, settings.preview.settle_ms / 1000),
         Callers(settings.preview.advertised_host),
     )
+    health = Health(SERVICE)
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
         async with (
             asyncio.TaskGroup() as timers,
-            serving(gateway, settings.grpc.host, settings.grpc.port),
+            serving(gateway, settings.grpc.host, settings.grpc.port, health),
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events), name="observer"),
+                timers.create_task(_observe(snapshot, events, health), name="observer"),
             ]
             await stop.wait()
             for task in background:
@@ -107,11 +111,12 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
-async def _observe(snapshot: Callable[[], Snapshot], events: EventLog) -> None:
+async def _observe(snapshot: Callable[[], Snapshot], events: EventLog, health: Health) -> None:
     """Notes what changes, whether or not anybody asks."""
     observer = Observer()
     while True:
         now = snapshot()
+        health.set_serving(PREVIEW_HEALTH, serving=now.preview.service_reachable)
         for message in observer.observe(now):
             _log.info("event: %s", message)
             events.add(message, now.at_s)

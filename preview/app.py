@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from typing import Final
 
 from common import listen, rpc
+from common.health import Health
 from preview.config import PreviewSettings
 from preview.encoder_note import EncoderNote
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.probe import Prober
 from preview.manager import Manager
-from preview.rpc.servicer import PreviewServicer
+from preview.rpc.servicer import SERVICE, PreviewServicer
 from preview.selection import Selection
 from preview.values import Target
 
@@ -36,6 +37,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     server = rpc.new_server()
     servicer = PreviewServicer(manager, prober, preference(settings))
     servicer.register(server)
+    Health(SERVICE).register(server)
     listen.bind_unix(server, settings.socket)
     await server.start()
     _log.info("serving on %s", settings.socket)

@@ -1,3 +1,3 @@
 """Fixtures that every test may use; each plugin says what it offers."""
 
-pytest_plugins = ["tests.support.ros"]
+pytest_plugins = ["tests.support.engine", "tests.support.ros"]

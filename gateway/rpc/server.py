@@ -8,6 +8,7 @@ from typing import Any, Final
 import grpc
 from google.protobuf.message import Message
 
+from common.health import Health
 from common.listen import bind_tcp, bracketed
 from common.rpc import STOP_GRACE_S, Handler, new_server
 from gateway.rpc.servicer import RobotGateway
@@ -33,8 +34,16 @@ def method_handlers(gateway: RobotGateway) -> dict[str, Handler]:
 
 
 @asynccontextmanager
-async def serving(gateway: RobotGateway, host: str, port: int) -> AsyncIterator[int]:
+async def serving(
+    gateway: RobotGateway, host: str, port: int, health: Health | None = None
+) -> AsyncIterator[int]:
     """Serves until the block ends; calls that are running then get STOP_GRACE_S to finish.
+
+    Args:
+        gateway: answers the contract's methods.
+        host: an address of this machine.
+        port: 0 takes any free one.
+        health: answers the health service; by default one that knows the contract's service alone.
 
     Yields:
         The port.
@@ -46,6 +55,7 @@ async def serving(gateway: RobotGateway, host: str, port: int) -> AsyncIterator[
     server.add_generic_rpc_handlers(
         (grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),)
     )
+    (health or Health(SERVICE)).register(server)
     bound = bind_tcp(server, host, port)
     await server.start()
     _log.info("serving operators at %s:%d", bracketed(host), bound)

@@ -14,6 +14,8 @@ from preview.encoders.probe import Prober
 from preview.manager import Manager
 from preview.rpc import mapping
 
+SERVICE: Final = pb.DESCRIPTOR.services_by_name["PreviewService"].full_name
+
 _SIGN_OF_LIFE_S: Final = 2.0
 _SIGN_OF_LIFE_WITH_PIPELINE_S: Final = 0.5
 

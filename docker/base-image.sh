@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# Makes debian:bookworm-slim from the distribution's own packages where no image registry can be reached. Every
+# Dockerfile that says FROM debian:bookworm-slim then builds. Does nothing when the image is there; --force makes
+# it anew. Uses the package mirrors this machine uses, or the one named in DEBIAN_MIRROR.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+suite=bookworm
+image=debian:$suite-slim
+
+fail() { echo "base-image: $1" >&2; exit 1; }
+say() { echo "base-image: $1" >&2; }
+
+as_root() {
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+# One line per package source of the suite this machine knows: address, release, section.
+sources() {
+  if [ -n "${DEBIAN_MIRROR:-}" ]; then
+    echo "$DEBIAN_MIRROR $suite main"
+  else
+    apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
+      awk -v suite=$suite '$2 ~ "^" suite "(-updates|-security)?$" && $3 == "main"' | sort -u
+  fi
+}
+
+[ "${1:-}" = --force ] || ! docker image inspect "$image" > /dev/null 2>&1 || exit 0
+command -v debootstrap > /dev/null || fail "debootstrap is missing. Type: sudo apt install debootstrap"
+mirror=$(sources | awk -v suite=$suite '$2 == suite { print $1; exit }')
+[ -n "$mirror" ] || fail "this machine has no package source for Debian $suite. Name one: DEBIAN_MIRROR=http://... $0"
+
+mkdir -p .cache
+root=$(mktemp -d .cache/base-image.XXXXXX)
+trap 'as_root rm -rf "$root"' EXIT
+started=$SECONDS
+say "making $image from packages"
+as_root debootstrap --variant=minbase "$suite" "$root/system" "$mirror" > .cache/base-image.log 2>&1 ||
+  { tail -n 10 .cache/base-image.log >&2; fail "debootstrap failed; the lines above say why"; }
+sources | sed 's/^/deb /' | as_root tee "$root/system/etc/apt/sources.list" > /dev/null
+# What the official slim image leaves out, too: nobody reads manual pages in a container.
+as_root rm -rf "$root/system/var/cache/apt/archives" "$root/system"/usr/share/{doc,man,info,locale}/* \
+  "$root/system"/var/lib/apt/lists/*
+printf 'path-exclude /usr/share/%s/*\n' doc man info locale |
+  as_root tee "$root/system/etc/dpkg/dpkg.cfg.d/slim" > /dev/null
+as_root tar -C "$root/system" -c . | docker import --change 'CMD ["bash"]' - "$image" > /dev/null
+say "$image is there, $((SECONDS - started)) s"

@@ -1,0 +1,88 @@
+# The gateway. One switch, ROS: where rclpy comes from.
+#   packages  the official ROS 2 image, arm64 and amd64: the robot
+#   wheels    Debian 12 and the Python index's wheels, amd64: tests, and machines without a ROS image
+# Everything above rclpy is the same.
+ARG ROS=packages
+
+FROM debian:bookworm-slim AS system-wheels
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends python3 tini \
+ && rm -rf /var/lib/apt/lists/*
+
+FROM ros:jazzy-ros-core AS system-packages
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends ros-jazzy-vision-msgs tini \
+ && rm -rf /var/lib/apt/lists/*
+# What sourcing setup.sh would set, for every process of the container and without a shell.
+ENV AMENT_PREFIX_PATH=/opt/robot-gateway/ros:/opt/ros/jazzy \
+    LD_LIBRARY_PATH=/opt/robot-gateway/ros/lib:/opt/ros/jazzy/lib:/opt/ros/jazzy/lib/aarch64-linux-gnu:/opt/ros/jazzy/lib/x86_64-linux-gnu \
+    PYTHONPATH=/opt/robot-gateway/ros/lib/python3.12/site-packages:/opt/ros/jazzy/lib/python3.12/site-packages
+
+FROM system-${ROS} AS system
+
+FROM system AS tools
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends cmake g++ ninja-build python3-dev python3-venv \
+ && rm -rf /var/lib/apt/lists/*
+WORKDIR /opt/robot-gateway
+COPY docker/fetching.sh docker/
+COPY requirements/tools.txt requirements/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && python3 -m venv .cache/tools \
+ && .cache/tools/bin/pip install --quiet --no-cache-dir --require-hashes -r requirements/tools.txt
+
+FROM tools AS rclpy-wheels
+COPY requirements/gateway.txt requirements/ros-wheels.txt requirements/interfaces-build.txt requirements/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && python3 -m venv --without-pip .venv \
+ && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
+      -r requirements/gateway.txt -r requirements/ros-wheels.txt
+COPY interfaces interfaces
+COPY scripts/build-interfaces scripts/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && scripts/build-interfaces \
+ && mkdir ros
+
+FROM tools AS rclpy-packages
+COPY requirements/gateway.txt requirements/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && python3 -m venv --without-pip --system-site-packages .venv \
+ && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
+      -r requirements/gateway.txt
+COPY interfaces interfaces
+COPY docker/build-interfaces-ros docker/
+RUN docker/build-interfaces-ros
+
+FROM rclpy-${ROS} AS built
+COPY pyproject.toml README.md LICENSE ./
+COPY common common
+COPY console console
+COPY gateway gateway
+COPY preview preview
+COPY simrobot simrobot
+COPY proto/python proto/python
+RUN .cache/tools/bin/python -m hatchling build -t wheel \
+ && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ && .venv/bin/robot-gateway --help > /dev/null
+
+FROM system
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-gateway" \
+      org.opencontainers.image.description="One typed door between a ROS 2 robot and its operator" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"
+COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
+COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
+ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    HOME=/tmp \
+    HEALTH_TARGET=127.0.0.1:50051
+# The group is shared with the preview: it owns the socket between the two.
+USER 10001:10000
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
+  CMD ["python", "-m", "common.healthcheck"]
+ENTRYPOINT ["tini", "--"]
+CMD ["robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]

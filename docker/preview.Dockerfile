@@ -1,0 +1,62 @@
+# The preview, on Debian 12: the system whose GStreamer the boards' makers build their encoder plugins for.
+# EXTRA_PACKAGES adds Debian packages (drivers), docker/vendor/ packages of the board's maker.
+FROM debian:bookworm-slim AS system
+ARG EXTRA_PACKAGES=""
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends \
+      gir1.2-gst-plugins-base-1.0 gir1.2-gstreamer-1.0 \
+      gstreamer1.0-plugins-bad gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly \
+      python3 python3-gi tini ${EXTRA_PACKAGES} \
+ && rm -rf /var/lib/apt/lists/*
+COPY docker/vendor /tmp/vendor
+RUN if ls /tmp/vendor/*.deb > /dev/null 2>&1; then \
+      apt-get update && apt-get install -y --no-install-recommends /tmp/vendor/*.deb && rm -rf /var/lib/apt/lists/*; \
+    fi; \
+    rm -rf /tmp/vendor
+
+FROM debian:bookworm-slim AS built
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends python3-venv \
+ && rm -rf /var/lib/apt/lists/*
+WORKDIR /opt/robot-gateway
+COPY docker/fetching.sh docker/
+COPY requirements/tools.txt requirements/preview-image.txt requirements/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && python3 -m venv .cache/tools \
+ && .cache/tools/bin/pip install --quiet --no-cache-dir --require-hashes -r requirements/tools.txt \
+ && python3 -m venv --without-pip --system-site-packages .venv \
+ && .cache/tools/bin/uv pip install --quiet --require-hashes --no-deps --compile-bytecode --python .venv/bin/python \
+      -r requirements/preview-image.txt
+COPY pyproject.toml README.md LICENSE ./
+COPY common common
+COPY console console
+COPY gateway gateway
+COPY preview preview
+COPY simrobot simrobot
+COPY proto/python proto/python
+RUN .cache/tools/bin/python -m hatchling build -t wheel \
+ && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ && .venv/bin/robot-preview --help > /dev/null
+
+FROM system
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-preview" \
+      org.opencontainers.image.description="Live video of a robot, on demand over SRT" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"
+COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
+# The registry is made anew by every container: one made where the encoder's device was missing keeps hiding it.
+ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    HOME=/tmp \
+    XDG_RUNTIME_DIR=/tmp \
+    GST_REGISTRY=/tmp/gstreamer-registry.bin \
+    HEALTH_TARGET=unix:/run/robot-gateway/preview.sock
+USER 10002:10000
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
+  CMD ["python", "-m", "common.healthcheck"]
+ENTRYPOINT ["tini", "--"]
+CMD ["robot-preview", "serve", "--config", "/etc/robot-gateway/preview.yaml"]

@@ -1,0 +1,151 @@
+"""The compose files at work: a project of its own per test, on free ports, removed with everything in it."""
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from testcontainers.compose import DockerCompose
+
+from console.client.blocking import GatewayClient
+from console.client.results import SystemStatus
+from tests.support.engine import ROOT, TAG
+from tests.support.ports import free_tcp_port, free_udp_port
+from tests.support.ros import free_domain
+from tests.support.waiting import wait_until
+
+SERVICES = ("gateway", "preview")
+
+
+class Deployment:
+    """A running compose project.
+
+    Attributes:
+        compose: testcontainers' hold on it.
+        gateway_port: TCP, on this machine.
+        preview_port: UDP, on this machine.
+        domain: the ROS domain of its graph.
+    """
+
+    def __init__(
+        self, compose: DockerCompose, project: str, gateway_port: int, preview_port: int, domain: int
+    ) -> None:
+        self.compose = compose
+        self.project = project
+        self.gateway_port = gateway_port
+        self.preview_port = preview_port
+        self.domain = domain
+
+    def client(self) -> GatewayClient:
+        """An operator."""
+        return GatewayClient(f"127.0.0.1:{self.gateway_port}")
+
+    def run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+        """`docker compose ...` on this project."""
+        done = subprocess.run(
+            [*self.compose.compose_command_property, *words],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert not check or done.returncode == 0, f"{' '.join(words)}: {done.stderr}"
+        return done
+
+    def inspect(self, service: str) -> dict[str, Any]:
+        """What the engine knows of a service's container."""
+        found: dict[str, Any] = json.loads(docker("inspect", f"{self.project}-{service}-1"))[0]
+        return found
+
+    def logs(self, service: str) -> str:
+        """What a service has written."""
+        return self.run("logs", "--no-log-prefix", service).stdout
+
+    def pids(self, service: str) -> list[int]:
+        """Its processes as this machine numbers them, the container's first one first."""
+        lines = docker("top", f"{self.project}-{service}-1", "-eo", "pid").split()[1:]
+        return sorted(int(line) for line in lines)
+
+    def program_pid(self, service: str) -> int:
+        """The program itself; the first process is tini, whose child it is."""
+        first = self.inspect(service)["State"]["Pid"]
+        children = Path(f"/proc/{first}/task/{first}/children").read_text(encoding="ascii").split()
+        return int(children[0])
+
+    def signal_all(self, service: str, number: signal.Signals) -> None:
+        """Sends a signal from outside, as the kernel would: the engine is not asked and does not know."""
+        for pid in self.pids(service):
+            os.kill(pid, number)
+
+    def restarts(self, service: str) -> int:
+        """How often the engine has started it again."""
+        return int(self.inspect(service)["RestartCount"])
+
+    def wait_healthy(self, *services: str) -> None:
+        """Waits for the containers' own health checks."""
+        for service in services:
+            wait_until(
+                lambda service=service: self.inspect(service)["State"]["Health"]["Status"] == "healthy",
+                f"{service} is healthy",
+                60,
+            )
+
+    def wait_for_status(self, robot: GatewayClient) -> SystemStatus:
+        """Waits until the robot's graph is seen and the preview is there."""
+        return wait_until(lambda: ready(robot), "odometry, vision and the preview reach the operator", 40)
+
+
+def ready(robot: GatewayClient) -> SystemStatus | None:
+    """The status when all is there, None before."""
+    status = robot.status()
+    return status if status.health.ready and status.preview.service_reachable else None
+
+
+@contextmanager
+def deployed(
+    directory: Path, *overlays: str, up: bool = True, services: tuple[str, ...] = (), **settings: str
+) -> Iterator[Deployment]:
+    """compose.yaml with overlays and `.env` settings, until the block ends."""
+    with free_domain() as domain:
+        gateway_port, preview_port = free_tcp_port(), free_udp_port()
+        project = f"robot-gateway-e2e-{domain}-{gateway_port}"
+        values = {
+            "COMPOSE_PROJECT_NAME": project,
+            "TAG": TAG,
+            "ROS_DOMAIN_ID": str(domain),
+            "GATEWAY_PORT": str(gateway_port),
+            "PREVIEW_PORT": str(preview_port),
+            "PREVIEW_BIND": "127.0.0.1",
+            **settings,
+        }
+        env_file = directory / f"{project}.env"
+        env_file.write_text("".join(f"{key}={value}\n" for key, value in values.items()), encoding="utf-8")
+        compose = DockerCompose(
+            ROOT,
+            [str(ROOT / "compose.yaml"), *overlays],
+            env_file=str(env_file),
+            wait=False,
+            services=list(services) or None,
+        )
+        deployment = Deployment(compose, project, gateway_port, preview_port, domain)
+        try:
+            if up:
+                compose.start()
+            yield deployment
+        finally:
+            deployment.run("down", "--volumes", "--timeout", "5", check=False)
+
+
+def demo_overlay() -> str:
+    """The simulated robot's overlay."""
+    return str(ROOT / "compose.demo.yaml")
+
+
+def docker(*words: str) -> str:
+    """The output of a docker command."""
+    return subprocess.run(["docker", *words], capture_output=True, text=True, timeout=120, check=True).stdout

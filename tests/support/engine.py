@@ -1,0 +1,59 @@
+"""The Docker engine for tests: found, or the tests skipped with one line; images built once per run."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TAG = "e2e"
+_BUILD_WITHIN_S = 1500
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--require-docker`: where continuous integration runs, a missing engine is a failure."""
+    parser.addoption(
+        "--require-docker", action="store_true", help="fail, rather than skip, where no Docker engine answers"
+    )
+
+
+@pytest.fixture(scope="session")
+def engine(request: pytest.FixtureRequest) -> None:
+    """A Docker engine with compose."""
+    trouble = _trouble()
+    if not trouble:
+        # Its reaper is an image of its own, which can't be had everywhere; every test removes what is its own.
+        os.environ["TESTCONTAINERS_RYUK_DISABLED"] = "true"
+        return
+    if request.config.getoption("--require-docker"):
+        pytest.fail(f"--require-docker: {trouble}")
+    pytest.skip(f"{trouble}. Type: docker/engine start")
+
+
+@pytest.fixture(scope="session")
+def images(engine: None) -> str:  # noqa: ARG001 - they are built by it
+    """Both images, built from this tree; their tag."""
+    built = subprocess.run(
+        [ROOT / "scripts/images", "build", "--ros", "wheels"],
+        env={**os.environ, "TAG": TAG, "COMPOSE_FILE": "compose.yaml"},
+        capture_output=True,
+        text=True,
+        timeout=_BUILD_WITHIN_S,
+        check=False,
+    )
+    assert built.returncode == 0, f"scripts/images build: {built.stderr[-3000:]}"
+    return TAG
+
+
+def _trouble() -> str:
+    for command in (["docker", "info"], ["docker", "compose", "version"]):
+        try:
+            asked = subprocess.run(command, capture_output=True, timeout=30, check=False)
+        except FileNotFoundError:
+            return "Docker is not installed"
+        except subprocess.TimeoutExpired:
+            return f"'{' '.join(command)}' does not answer"
+        if asked.returncode:
+            return f"'{' '.join(command)}' fails: no engine runs, or compose is missing"
+    return ""
