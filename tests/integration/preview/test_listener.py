@@ -1,0 +1,159 @@
+"""Viewers, good and bad, at the SRT listener."""
+
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from console.receiver.address import StreamAddress
+from console.receiver.errors import StreamError
+from console.receiver.receiver import Receiver
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.running_preview import RunningPreview
+from tests.support.watcher import Watcher
+
+pytestmark = pytest.mark.gst
+
+PASSPHRASE = "correct horse battery staple"
+
+
+@contextmanager
+def player(port: int) -> Iterator[subprocess.Popen[bytes]]:
+    """A viewer in a process of its own, so that it can be stopped and killed."""
+    process = subprocess.Popen(
+        ["gst-launch-1.0", "-q", "srtsrc", f"uri=srt://127.0.0.1:{port}", "latency=20", "!", "fakesink"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def watch_for_ever(receiver: Receiver) -> None:
+    while True:
+        receiver.next_frame(timeout_s=10)
+
+
+def viewers(preview: RunningPreview, count: int) -> pb.ActualState:
+    return preview.wait_for(lambda a: a.measurement.viewer_count == count, f"{count} viewers")
+
+
+def test_a_viewer_that_joins_does_not_wait_for_the_next_key_frame(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, {"encoders": {"key_frame_interval_s": 30}}) as preview:
+        preview.wish()
+        preview.running()
+        for _ in range(3):
+            with Watcher(preview.port) as watcher:
+                # Without a key frame of its own it would wait for half a minute.
+                watcher.wait_for_pictures(10)
+
+
+def test_ten_viewers_at_once(preview: RunningPreview) -> None:
+    preview.wish()
+    preview.running()
+    with ExitStack() as stack:
+        for _ in range(9):
+            stack.enter_context(player(preview.port))
+        watcher = stack.enter_context(Watcher(preview.port))
+        viewers(preview, 10)
+        watcher.wait_for_pictures(30)
+    assert watcher.reconnects == 0
+    state = viewers(preview, 0)
+    assert state.counters.faults == 0
+
+
+def test_a_viewer_that_freezes_or_dies_hurts_nobody_else(preview: RunningPreview) -> None:
+    preview.wish()
+    preview.running()
+    with player(preview.port) as freezing, player(preview.port) as dying, Watcher(preview.port) as watcher:
+        viewers(preview, 3)
+        watcher.wait_for_pictures(5)
+        freezing.send_signal(signal.SIGSTOP)
+        dying.kill()
+        watcher.wait_for_pictures(60)
+        # Both are given up after SRT's own 5 s.
+        viewers(preview, 1)
+        assert watcher.reconnects == 0
+        assert watcher.longest_pause_s < 1.0
+    assert preview.running().counters.faults == 0
+
+
+def test_comers_and_goers(preview: RunningPreview) -> None:
+    preview.wish()
+    preview.running()
+    with Watcher(preview.port) as watcher:
+        watcher.wait_for_pictures(5)
+        for _ in range(20):
+            with Receiver(StreamAddress("127.0.0.1", preview.port, latency_ms=20)) as guest:
+                guest.next_frame(timeout_s=10)
+        watcher.wait_for_pictures(5)
+        assert watcher.reconnects == 0
+    assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_garbage_on_the_port_is_ignored(preview: RunningPreview) -> None:
+    preview.wish()
+    preview.running()
+    with Watcher(preview.port) as watcher, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        watcher.wait_for_pictures(5)
+        for size in range(1400):
+            stranger.sendto(bytes([size % 256]) * size, ("127.0.0.1", preview.port))
+        # A handshake that is cut short.
+        stranger.sendto(
+            b"\x80\x00" + bytes(14) + b"\x00\x00\x00\x05" + bytes(12), ("127.0.0.1", preview.port)
+        )
+        watcher.wait_for_pictures(30)
+        assert watcher.reconnects == 0
+    assert preview.running().counters.faults == 0
+
+
+@pytest.mark.parametrize("key_length_bytes", [16, 32])
+def test_a_passphrase_lets_in_who_knows_it(tmp_path: Path, key_length_bytes: int) -> None:
+    with RunningPreview(tmp_path, {"srt": {"key_length_bytes": key_length_bytes}}) as preview:
+        preview.wish(passphrase=PASSPHRASE)
+        state = preview.running()
+        assert state.stream.encrypted
+        for wrong in ("", "incorrect horse battery staple"):
+            address = StreamAddress("127.0.0.1", preview.port, latency_ms=20, passphrase=wrong)
+            with Receiver(address) as stranger, pytest.raises(StreamError):
+                stranger.next_frame(timeout_s=8)
+        with Watcher(preview.port, PASSPHRASE) as watcher:
+            watcher.wait_for_pictures(10)
+        assert preview.running().counters.faults == 0
+        assert PASSPHRASE not in preview.log.read_text(encoding="utf-8")
+
+
+def test_another_passphrase_shuts_out_who_had_the_old_one(preview: RunningPreview) -> None:
+    preview.wish(passphrase=PASSPHRASE)
+    preview.running()
+    with Receiver(StreamAddress("127.0.0.1", preview.port, 20, PASSPHRASE)) as old:
+        old.next_frame(timeout_s=10)
+        preview.wish(passphrase="another horse battery")
+        state = preview.running(revision=preview.revision)
+        with pytest.raises(StreamError):
+            watch_for_ever(old)
+    with Watcher(preview.port, "another horse battery") as watcher:
+        watcher.wait_for_pictures(5)
+    assert state.stream.encrypted
+
+
+def test_a_port_that_is_taken_is_named_and_used_when_it_is_free(preview: RunningPreview) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", preview.port))
+        preview.wish()
+        state = preview.faulted(f"UDP port {preview.port} on 127.0.0.1 can't be used")
+        assert f"sport = :{preview.port}" in state.last_error
+        assert state.counters.fallbacks == 0
+    freed_at = time.monotonic()
+    preview.wish()
+    preview.wait_for(lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING, "running")
+    assert time.monotonic() - freed_at < 10

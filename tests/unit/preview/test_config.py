@@ -1,0 +1,74 @@
+"""The settings, and the catalogue they name."""
+
+from pathlib import Path
+
+import pytest
+
+from common.config import load
+from common.errors import UserError
+from preview.config import PreviewSettings, V4l2Source
+from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER
+from preview.values import Codec, Profile
+
+
+def from_text(tmp_path: Path, text: str) -> PreviewSettings:
+    path = tmp_path / "preview.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load(PreviewSettings, path)
+
+
+def test_the_defaults_suit_the_first_robot() -> None:
+    settings = load(PreviewSettings, None)
+    assert settings.source == V4l2Source(card="rkisp_mainpath")
+    targets = settings.profiles.targets
+    assert {p: (t.width_px, t.height_px, t.fps, t.bitrate_kbps) for p, t in targets.items()} == {
+        Profile.LOW_BW: (1280, 720, 15, 1000),
+        Profile.BALANCED: (1280, 720, 30, 2500),
+        Profile.HIGH_QUALITY: (1280, 720, 60, 4500),
+    }
+    assert (settings.srt.port, settings.srt.latency_ms) == (7100, 125)
+    assert settings.encoders.allowed[0] == "mpp-h265"
+    assert settings.encoders.allowed[-1] == "x264"
+    assert not settings.adaptive.enabled
+
+
+def test_a_source_replaces_the_default_whole(tmp_path: Path) -> None:
+    assert from_text(tmp_path, "source: {kind: v4l2, device: /dev/video3}").source.device == "/dev/video3"  # type: ignore[union-attr]
+
+
+def test_one_figure_of_a_profile_may_be_changed(tmp_path: Path) -> None:
+    low = from_text(tmp_path, "profiles: {low_bw: {bitrate_kbps: 700}}").profiles.low_bw
+    assert (low.bitrate_kbps, low.fps, low.floor_kbps) == (700, 15, 300)
+
+
+def test_a_codec_restricts_the_order() -> None:
+    settings = PreviewSettings(encoders={"codec": "h264"})  # type: ignore[arg-type]
+    assert all(CATALOGUE[name].codec is Codec.H264 for name in settings.encoders.allowed)
+    assert settings.encoders.allowed[-1] == "x264"
+
+
+@pytest.mark.parametrize(
+    "text", ["encoders: {order: []}", "encoders: {order: [x264, x264]}", "srt: {key_length_bytes: 8}"]
+)
+def test_nonsense_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(UserError):
+        from_text(tmp_path, text)
+
+
+def test_hardware_h265_comes_before_hardware_h264_before_software() -> None:
+    entries = [CATALOGUE[name] for name in DEFAULT_ORDER]
+    ranks = [(not e.hardware, e.codec is Codec.H264) for e in entries]
+    assert ranks == sorted(ranks)
+    assert {e.family for e in CATALOGUE.values()} == {
+        *("mpp", "v4l2", "va", "nv", "nvv4l2", "qsv", "msdk", "x264", "x265"),
+    }
+    for family in ("mpp", "v4l2", "va", "nv", "nvv4l2", "qsv", "msdk"):
+        assert {e.codec for e in entries if e.family == family} == set(Codec)
+
+
+def test_every_encoder_can_be_told_its_bit_rate_and_key_frames() -> None:
+    for encoder in CATALOGUE.values():
+        spelling = encoder.spelling
+        told = set(spelling.controls.values())
+        assert spelling.bitrate or "bitrate" in told, encoder.name
+        assert spelling.gop or "gop" in told, encoder.name

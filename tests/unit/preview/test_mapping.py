@@ -1,0 +1,96 @@
+"""The mapping is total: every domain value has its message, every field is filled."""
+
+import pytest
+
+from common.errors import InvalidRequestError
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from preview.encoders.catalogue import CATALOGUE
+from preview.lifecycle import Counters, State
+from preview.rpc import mapping
+from preview.selection import Verdict
+from preview.status import Status, StreamStatus
+from preview.values import Codec, EncoderChoice, Measurement, Profile, Target
+
+FULL = Status(
+    instance_id="abc",
+    applied_revision=7,
+    state=State.RUNNING,
+    profile=Profile.HIGH_QUALITY,
+    last_error="something",
+    counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+    port=7100,
+    latency_ms=125,
+    stream=StreamStatus(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
+    encoder=EncoderChoice("va-h265", Codec.H265, hardware=True, wanted="mpp-h265", fallback_reason="why"),
+    measurement=Measurement(59.5, 4400.0, 2, 12, 30.5, 1.5),
+)
+
+
+@pytest.mark.parametrize(
+    ("table", "ours", "theirs"),
+    [
+        (mapping.STATES, State, pb.LifecycleState),
+        (mapping.PROFILES, Profile, pb.Profile),
+        (mapping.CODECS, Codec, pb.Codec),
+    ],
+)
+def test_every_enum_is_covered_on_both_sides(table, ours, theirs) -> None:  # type: ignore[no-untyped-def]
+    assert set(table) == set(ours)
+    assert sorted(table.values()) == sorted(number for number in theirs.values() if number)
+
+
+def unset_fields(message: object, prefix: str = "") -> list[str]:
+    unset = []
+    present = {field.name: value for field, value in message.ListFields()}  # type: ignore[attr-defined]
+    for field in message.DESCRIPTOR.fields:  # type: ignore[attr-defined]
+        if field.name not in present:
+            unset.append(prefix + field.name)
+        elif field.message_type:
+            unset += unset_fields(present[field.name], f"{prefix}{field.name}.")
+    return unset
+
+
+def test_a_full_status_fills_every_field() -> None:
+    assert unset_fields(mapping.actual(FULL)) == []
+
+
+def test_numbers_arrive_where_they_belong() -> None:
+    actual = mapping.actual(FULL)
+    assert actual.counters == pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4)
+    assert (actual.stream.target_bitrate_kbps, actual.stream.fps) == (3000, 60)
+    assert (actual.listener.port, actual.listener.latency_ms) == (7100, 125)
+    assert (actual.measurement.worst_rtt_ms, actual.measurement.worst_loss_percent) == (30.5, 1.5)
+
+
+def test_an_empty_status_leaves_out_what_is_not_there() -> None:
+    empty = Status("abc", 0, State.DISABLED, Profile.BALANCED, "", Counters(), 7100, 125)
+    actual = mapping.actual(empty)
+    assert not any(actual.HasField(name) for name in ("stream", "encoder", "measurement"))
+
+
+def test_a_candidate_fills_every_field() -> None:
+    candidate = mapping.candidate(CATALOGUE["mpp-h265"], Verdict(True, True, "reason", 12.0))
+    assert unset_fields(candidate) == []
+    assert not mapping.candidate(CATALOGUE["x264"], Verdict(False, False)).HasField("first_byte_ms")
+
+
+def test_a_wish_and_its_passphrase() -> None:
+    desired = pb.DesiredState(revision=3, enabled=True, profile=pb.PROFILE_LOW_BW, passphrase="0123456789")
+    wish = mapping.wish(desired)
+    assert (wish.revision, wish.enabled, wish.profile) == (3, True, Profile.LOW_BW)
+    assert wish.passphrase == "0123456789"
+    assert "0123456789" not in repr(wish)
+
+
+@pytest.mark.parametrize("passphrase", ["short", "x" * 80, "ä" * 40])
+def test_a_passphrase_that_srt_does_not_take_is_refused_without_repeating_it(passphrase: str) -> None:
+    desired = pb.DesiredState(enabled=True, profile=pb.PROFILE_LOW_BW, passphrase=passphrase)
+    with pytest.raises(InvalidRequestError) as refusal:
+        mapping.wish(desired)
+    assert passphrase not in str(refusal.value)
+
+
+def test_an_unknown_profile_is_refused_only_when_it_is_wanted() -> None:
+    with pytest.raises(InvalidRequestError, match="known are LOW_BW, BALANCED, HIGH_QUALITY"):
+        mapping.wish(pb.DesiredState(enabled=True, profile=9))  # type: ignore[arg-type]
+    assert not mapping.wish(pb.DesiredState(enabled=False, profile=9)).enabled  # type: ignore[arg-type]
