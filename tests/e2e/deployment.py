@@ -12,6 +12,7 @@ from typing import Any
 from testcontainers.compose import DockerCompose
 
 from console.client.blocking import GatewayClient
+from console.client.errors import Unreachable
 from console.client.results import SystemStatus
 from tests.support.engine import ROOT, TAG
 from tests.support.ports import free_tcp_port, free_udp_port
@@ -102,7 +103,10 @@ class Deployment:
 
 def ready(robot: GatewayClient) -> SystemStatus | None:
     """The status when all is there, None before."""
-    status = robot.status()
+    try:
+        status = robot.status()
+    except Unreachable:
+        return None
     return status if status.health.ready and status.preview.service_reachable else None
 
 

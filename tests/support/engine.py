@@ -23,7 +23,7 @@ def engine(request: pytest.FixtureRequest) -> None:
     """A Docker engine with compose."""
     trouble = _trouble()
     if not trouble:
-        # Its reaper is an image of its own, which can't be had everywhere; every test removes what is its own.
+        # Its reaper is one more image, which can't be had everywhere; every test removes what is its own.
         os.environ["TESTCONTAINERS_RYUK_DISABLED"] = "true"
         return
     if request.config.getoption("--require-docker"):
@@ -32,7 +32,7 @@ def engine(request: pytest.FixtureRequest) -> None:
 
 
 @pytest.fixture(scope="session")
-def images(engine: None) -> str:  # noqa: ARG001 - they are built by it
+def images(engine: None) -> str:
     """Both images, built from this tree; their tag."""
     built = subprocess.run(
         [ROOT / "scripts/images", "build", "--ros", "wheels"],

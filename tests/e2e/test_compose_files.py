@@ -1,0 +1,103 @@
+"""What each overlay adds up to, as compose itself resolves it. Needs compose, no engine's work."""
+
+import json
+import subprocess
+from typing import Any
+
+import pytest
+
+from tests.support.engine import ROOT
+
+pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("engine")]
+
+OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo")
+
+
+def config(*overlays: str) -> dict[str, Any]:
+    files = ["compose.yaml", *(f"compose.{name}.yaml" for name in overlays if name)]
+    words = [word for name in files for word in ("-f", name)]
+    done = subprocess.run(
+        ["docker", "compose", *words, "config", "--format", "json"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr, "compose warns of something"
+    resolved: dict[str, Any] = json.loads(done.stdout)
+    return resolved
+
+
+@pytest.mark.parametrize("overlay", OVERLAYS)
+def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) -> None:
+    services = config(overlay)["services"]
+    for name, service in services.items():
+        assert service["read_only"], name
+        assert service["cap_drop"] == ["ALL"], name
+        assert "no-new-privileges:true" in service["security_opt"], name
+        assert not service.get("privileged"), name
+        assert "cap_add" not in service, name
+    for name in ("gateway", "preview"):
+        assert services[name]["restart"] == "unless-stopped"
+        assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
+        assert int(services[name]["mem_limit"]) <= 512 << 20
+        assert services[name]["pids_limit"] <= 256
+
+
+def test_video_yields_to_the_mission() -> None:
+    services = config()["services"]
+    assert services["preview"]["cpu_shares"] < 1024
+    assert services["preview"]["oom_score_adj"] > services["gateway"].get("oom_score_adj", 0)
+
+
+def test_the_gateway_is_where_the_robots_nodes_are() -> None:
+    gateway = config()["services"]["gateway"]
+    assert (gateway["network_mode"], gateway["ipc"]) == ("host", "host")
+    assert {"ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"} <= gateway["environment"].keys()
+
+
+@pytest.mark.parametrize("overlay", ["", "rockchip", "v4l2", "vaapi"])
+def test_the_preview_publishes_one_udp_port_and_reaches_nothing(overlay: str) -> None:
+    resolved = config(overlay)
+    preview = resolved["services"]["preview"]
+    assert [(port["protocol"], port["target"]) for port in preview["ports"]] == [("udp", 7100)]
+    assert list(preview["networks"]) == ["viewers"]
+    options = resolved["networks"]["viewers"]["driver_opts"]
+    assert options["com.docker.network.bridge.enable_ip_masquerade"] == "false"
+
+
+@pytest.mark.parametrize(
+    ("overlay", "devices", "groups"),
+    [
+        (
+            "rockchip",
+            ["/dev/mpp_service", "/dev/rga", "/dev/dma_heap", "/dev/dri", "/dev/video11"],
+            ["44", "105"],
+        ),
+        ("v4l2", ["/dev/video0"], ["44"]),
+        ("vaapi", ["/dev/dri/renderD128"], ["105"]),
+    ],
+)
+def test_devices_are_named_one_by_one(overlay: str, devices: list[str], groups: list[str]) -> None:
+    preview = config(overlay)["services"]["preview"]
+    assert [
+        device.split(":")[0] if isinstance(device, str) else device["source"] for device in preview["devices"]
+    ] == devices
+    assert preview["group_add"] == groups
+
+
+def test_overlays_of_camera_and_encoder_add_up() -> None:
+    preview = config("v4l2", "vaapi")["services"]["preview"]
+    assert len(preview["devices"]) == 2
+    assert preview["group_add"] == ["44", "105"]
+    assert preview["build"]["args"]["EXTRA_PACKAGES"].split() == ["intel-media-va-driver", "mesa-va-drivers"]
+
+
+def test_the_demo_is_published_to_this_machine_alone() -> None:
+    services = config("demo")["services"]
+    ports = [port for service in services.values() for port in service.get("ports", [])]
+    assert len(ports) == 2
+    assert all(port["host_ip"] == "127.0.0.1" for port in ports)
+    assert "network_mode" not in services["gateway"]

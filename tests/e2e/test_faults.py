@@ -1,0 +1,115 @@
+"""What robots do to software: programs killed and stopped from outside, in the middle of a stream."""
+
+import signal
+import time
+from datetime import datetime
+
+import pytest
+
+from console.client.results import PreviewProfile, PreviewState
+from tests.e2e.deployment import Deployment
+from tests.e2e.lookout import Lookout
+from tests.support.waiting import wait_until
+from tests.support.watcher import Watcher
+
+pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timeout(900)]
+
+BACK_WITHIN_S = 5.0
+NOTICED_WITHIN_S = 3.0
+# Far below the two seconds after which a client gives up: an answer from memory never waits for the preview.
+ANSWERED_WITHIN_S = 1.0
+
+
+def started_s(deployment: Deployment, service: str) -> float:
+    """When the container that runs now was started, wall clock."""
+    text = deployment.inspect(service)["State"]["StartedAt"]
+    return datetime.fromisoformat(text[:26].rstrip("Z") + "+00:00").timestamp()
+
+
+def restarted_s(deployment: Deployment, service: str, restarts: int) -> float:
+    """Waits until the engine has started the container again; when that was."""
+    wait_until(
+        lambda: deployment.restarts(service) > restarts and deployment.inspect(service)["State"]["Running"],
+        f"{service} is started again by the engine",
+        30,
+    )
+    return started_s(deployment, service)
+
+
+def first_picture_s(viewer: Watcher, since_s: float) -> float:
+    """When the first picture after `since_s` came, wall clock both."""
+    offset_s = time.time() - time.monotonic()
+
+    def first() -> float | None:
+        return next((at + offset_s for at in list(viewer.arrivals_s) if at + offset_s > since_s), None)
+
+    return wait_until(first, "pictures again", 30)
+
+
+def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> None:
+    with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
+        robot.enable_preview(PreviewProfile.BALANCED)
+        viewer.wait_for_pictures(30)
+        killed_s = time.time()
+        demo.signal_all("preview", signal.SIGKILL)
+
+        told = lookout.wait_for(PreviewState.FAULTED, killed_s, 10)
+        assert "preview service unreachable" in told.status.preview.last_error
+        assert not told.status.preview.service_reachable
+        back_s = restarted_s(demo, "preview", 0)
+        assert first_picture_s(viewer, back_s) - back_s < BACK_WITHIN_S
+        lookout.wait_for(PreviewState.RUNNING, back_s, BACK_WITHIN_S)
+
+        assert not lookout.errors, "the gateway answered throughout"
+        assert lookout.slowest_s < ANSWERED_WITHIN_S
+        assert robot.status().preview.profile is PreviewProfile.BALANCED
+        assert demo.restarts("gateway") == 0
+
+
+def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
+    with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
+        robot.enable_preview(PreviewProfile.LOW_BW)
+        viewer.wait_for_pictures(15)
+        stopped_s = time.time()
+        demo.signal_all("preview", signal.SIGSTOP)
+        try:
+            told = lookout.wait_for(PreviewState.FAULTED, stopped_s, 10)
+        finally:
+            demo.signal_all("preview", signal.SIGCONT)
+        assert told.at_s - stopped_s < NOTICED_WITHIN_S
+        assert "preview service unreachable" in told.status.preview.last_error
+
+        again_s = time.time()
+        lookout.wait_for(PreviewState.RUNNING, again_s, 10)
+        first_picture_s(viewer, again_s)
+        assert not lookout.errors
+        assert lookout.slowest_s < ANSWERED_WITHIN_S
+
+
+def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
+    """Viewers keep their picture: the preview goes on without its gateway for 30 s (timeouts.without_gateway_s)."""
+    with demo.client() as robot, Watcher(demo.preview_port) as viewer:
+        robot.enable_preview(PreviewProfile.BALANCED)
+        viewer.wait_for_pictures(30)
+        demo.signal_all("gateway", signal.SIGKILL)
+        back_s = restarted_s(demo, "gateway", 0)
+        status = demo.wait_for_status(robot)
+        viewer.wait_for_pictures(30)
+
+        assert time.time() - back_s < 30
+        assert viewer.reconnects == 0
+        assert viewer.longest_pause_s < 1
+        assert demo.restarts("preview") == 0
+        # A new gateway wants nothing yet, but tells what it finds.
+        assert status.preview.state in (PreviewState.RUNNING, PreviewState.STOPPING, PreviewState.DISABLED)
+
+
+@pytest.mark.parametrize("order", [("gateway", "preview"), ("preview", "gateway")])
+def test_both_restarted_in_either_order_find_each_other(demo: Deployment, order: tuple[str, str]) -> None:
+    for service in order:
+        demo.run("restart", service)
+    with demo.client() as robot:
+        demo.wait_for_status(robot)
+        assert robot.enable_preview(PreviewProfile.BALANCED).preview.state is PreviewState.RUNNING
+        with Watcher(demo.preview_port) as viewer:
+            viewer.wait_for_pictures(30)
