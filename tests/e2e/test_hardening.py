@@ -1,0 +1,122 @@
+"""Reads the running containers: what a program that was broken into could do there."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.deployment import Deployment
+
+pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
+
+SERVICES = ("gateway", "preview", "robot")
+USERS = {"gateway": 10001, "preview": 10002, "robot": 10001}
+GROUP = 10000
+WRITABLE = {
+    "gateway": {"/tmp", "/dev/shm"},
+    "preview": {"/tmp", "/run/robot-gateway", "/dev/shm"},
+    "robot": {"/tmp", "/dev/shm"},
+}
+# What every container has from the runtime: devices, and the kernel's own trees.
+_RUNTIME = ("/proc", "/sys", "/dev")
+_LISTENING = "0A"
+
+
+def status_fields(pid: int) -> dict[str, str]:
+    lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    return {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory, images: str) -> object:
+    from tests.e2e.deployment import demo_overlay, deployed  # noqa: PLC0415
+
+    with deployed(tmp_path_factory.mktemp("hardening"), demo_overlay()) as deployment:
+        with deployment.client() as robot:
+            deployment.wait_for_status(robot)
+            robot.enable_preview()
+        yield deployment
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_every_process_is_an_ordinary_user_without_privileges(running: Deployment, service: str) -> None:
+    pids = running.pids(service)
+    assert pids
+    for pid in pids:
+        fields = status_fields(pid)
+        assert set(fields["Uid"].split()) == {str(USERS[service])}
+        assert set(fields["Gid"].split()) == {str(GROUP)}
+        for kind in ("CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb"):
+            assert int(fields[kind], 16) == 0, f"{service}: {kind} {fields[kind]}"
+        assert fields["NoNewPrivs"] == "1"
+        assert fields["Seccomp"] == "2", "the engine's system call filter is on"
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_nothing_can_be_written_beyond_what_is_declared(running: Deployment, service: str) -> None:
+    pid = running.program_pid(service)
+    mounts = [
+        line.split() for line in Path(f"/proc/{pid}/mountinfo").read_text(encoding="ascii").splitlines()
+    ]
+    writable = {fields[4] for fields in mounts if "rw" in fields[5].split(",")}
+    beyond = {path for path in writable - WRITABLE[service] if not path.startswith(_RUNTIME)}
+    assert not beyond
+    root = next(fields for fields in mounts if fields[4] == "/")
+    assert "ro" in root[5].split(",")
+    for path in WRITABLE[service] - {"/dev/shm"}:
+        options = next(fields for fields in mounts if fields[4] == path)[5].split(",")
+        assert {"noexec", "nosuid", "nodev"} <= set(options), path
+
+
+def test_the_gateway_cannot_write_where_the_preview_listens(running: Deployment) -> None:
+    tried = running.run("exec", "gateway", "touch", "/run/robot-gateway/other.sock", check=False)
+    assert tried.returncode != 0
+    assert "Read-only file system" in tried.stderr
+
+
+def test_the_socket_is_for_the_two_alone(running: Deployment) -> None:
+    directory = Path(f"/proc/{running.program_pid('preview')}/root/run/robot-gateway")
+    assert (directory.stat().st_mode & 0o777, directory.stat().st_uid) == (0o750, USERS["preview"])
+    socket = (directory / "preview.sock").stat()
+    assert (socket.st_mode & 0o777, socket.st_uid, socket.st_gid) == (0o660, USERS["preview"], GROUP)
+
+
+def listening_tcp(pid: int) -> set[int]:
+    """Ports of TCP listeners in a process's network; the engine's own name server is left out."""
+    ports = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/{pid}/net/{table}").read_text(encoding="ascii").splitlines()[1:]:
+            fields = line.split()
+            address, _, port = fields[1].partition(":")
+            if fields[3] == _LISTENING and address != _engine_dns():
+                ports.add(int(port, 16))
+    return ports
+
+
+def _engine_dns() -> str:
+    """127.0.0.11 as /proc writes it."""
+    return "0B00007F"
+
+
+def test_only_the_declared_ports_listen(running: Deployment) -> None:
+    assert listening_tcp(running.program_pid("gateway")) == {50051}
+    assert listening_tcp(running.program_pid("preview")) == set()
+    assert listening_tcp(running.program_pid("robot")) == set()
+    udp = Path(f"/proc/{running.program_pid('preview')}/net/udp").read_text(encoding="ascii").splitlines()[1:]
+    bound = {line.split()[1] for line in udp if not line.split()[1].startswith(_engine_dns())}
+    assert {int(one.partition(":")[2], 16) for one in bound} == {running.preview_port}
+
+
+def test_the_preview_reaches_no_other_machine_and_the_images_have_no_compiler(running: Deployment) -> None:
+    for service in ("gateway", "preview"):
+        for tool in ("gcc", "cc", "g++", "cmake", "pip", "uv"):
+            found = running.run("exec", service, "sh", "-c", f"command -v {tool}", check=False)
+            assert found.returncode, f"{service} has {tool}: {found.stdout}"
+
+
+def test_limits_are_in_force(running: Deployment) -> None:
+    preview = running.inspect("preview")["HostConfig"]
+    assert (preview["Memory"], preview["PidsLimit"]) == (512 << 20, 256)
+    assert preview["NanoCpus"] == min(1.5, os.cpu_count() or 1) * 1e9
+    score = Path(f"/proc/{running.program_pid('preview')}/oom_score_adj").read_text(encoding="ascii")
+    assert int(score) == 500
