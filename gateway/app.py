@@ -6,6 +6,7 @@ import secrets
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 from common.version import project_version
@@ -21,12 +22,13 @@ from gateway.rpc.servicer import RobotGateway
 from gateway.status.board import Board
 from gateway.status.events import EventLog
 from gateway.status.observer import Observer
+from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 
 _log = logging.getLogger(__name__)
 
 OBSERVE_EVERY_S: Final = 0.2
-"""How often the gateway looks for events by itself."""
+"""How often the gateway looks for events by itself; news of the preview make it look at once."""
 _PASSPHRASE_BYTES: Final = 24
 """Gives 32 characters, and more chance than AES-256 can use of its key."""
 
@@ -55,7 +57,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events), name="observer"),
+                timers.create_task(_observe(snapshot, events, link), name="observer"),
             ]
             await stop.wait()
             for task in background:
@@ -107,12 +109,16 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
-async def _observe(snapshot: Callable[[], Snapshot], events: EventLog) -> None:
-    """Notes what changes, whether or not anybody asks."""
+async def _observe(snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink) -> None:
+    """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     observer = Observer()
     while True:
         now = snapshot()
         for message in observer.observe(now):
             _log.info("event: %s", message)
             events.add(message, now.at_s)
-        await asyncio.sleep(OBSERVE_EVERY_S)
+        await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
+
+
+def _differs(link: PreviewLink, seen: PreviewView) -> bool:
+    return link.view is not seen
