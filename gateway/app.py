@@ -6,6 +6,7 @@ import secrets
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 from common.health import Health
@@ -22,6 +23,7 @@ from gateway.rpc.servicer import RobotGateway
 from gateway.status.board import Board
 from gateway.status.events import EventLog
 from gateway.status.observer import Observer
+from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 
 _log = logging.getLogger(__name__)
@@ -29,7 +31,7 @@ _log = logging.getLogger(__name__)
 PREVIEW_HEALTH: Final = "preview"
 """The preview service's name in the health service. Without it the gateway as a whole serves all the same."""
 OBSERVE_EVERY_S: Final = 0.2
-"""How often the gateway looks for events by itself."""
+"""How often the gateway looks for events by itself; news of the preview make it look at once."""
 _PASSPHRASE_BYTES: Final = 24
 """Gives 32 characters, and more chance than AES-256 can use of its key."""
 
@@ -59,7 +61,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events, health), name="observer"),
+                timers.create_task(_observe(snapshot, events, link, health), name="observer"),
             ]
             await stop.wait()
             for task in background:
@@ -111,8 +113,10 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
-async def _observe(snapshot: Callable[[], Snapshot], events: EventLog, health: Health) -> None:
-    """Notes what changes, whether or not anybody asks."""
+async def _observe(
+    snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink, health: Health
+) -> None:
+    """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     observer = Observer()
     while True:
         now = snapshot()
@@ -120,4 +124,8 @@ async def _observe(snapshot: Callable[[], Snapshot], events: EventLog, health: H
         for message in observer.observe(now):
             _log.info("event: %s", message)
             events.add(message, now.at_s)
-        await asyncio.sleep(OBSERVE_EVERY_S)
+        await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
+
+
+def _differs(link: PreviewLink, seen: PreviewView) -> bool:
+    return link.view is not seen

@@ -1,18 +1,26 @@
 """The bit rate follows what the viewers' links carry. Pure: told figures and times, says a bit rate and why.
 
-Down fast, up slowly: a congested link is left at once by a factor, a quiet one is tried with small steps. A
-link counts as congested when packets are given up at the sender (its buffer could not empty in time), when
-many are lost or sent again, or when the round trip has grown well beyond its own lowest value: the packets
-are then standing in a queue somewhere. A little loss alone is not congestion: SRT repairs it, and a lower bit
-rate would not make a bad radio better.
+Down fast, up slowly: a congested link is left at once by a factor, a quiet one is tried with small steps, and
+with smaller ones near the rate that was too much the last time. A link counts as congested when packets are
+given up at the sender (its buffer could not empty in time), when many are lost or sent again, or when the
+round trip has grown well beyond its own lowest value: the packets are then standing in a queue somewhere. A
+little loss alone is not congestion: SRT repairs it, and a lower bit rate would not make a bad radio better.
 """
 
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 _DECREASE: Final = 0.7
+_SEVERE_DECREASE: Final = 0.5
+"""Where a large part of the packets does not get through at all."""
+_SEVERE_LOSS_PERCENT: Final = 20.0
+_SEVERE_DROPPED_PERCENT: Final = 10.0
 _INCREASE_SHARE: Final = 0.05
 """Of the target, per step up."""
+_CAREFUL_FROM: Final = 0.8
+"""From this share of the rate at which the link was last congested, steps are small."""
+_CAREFUL: Final = 4
+"""How many times smaller."""
 _HOLD_AFTER_DECREASE_S: Final = 1.0
 """A lower rate needs this long to show in the figures."""
 _QUIET_BEFORE_INCREASE_S: Final = 3.0
@@ -79,6 +87,7 @@ class BitrateController:
         """Another profile: begins at its target."""
         self._target_kbps = target_kbps
         self._floor_kbps = min(floor_kbps, target_kbps)
+        self._too_much_kbps = target_kbps
         self._decision = Decision(target_kbps)
 
     def decide(self, link: Link | None, now: float) -> Decision:
@@ -97,7 +106,7 @@ class BitrateController:
         if trouble:
             self._last_trouble_at = now
             if now - self._last_decrease_at >= _HOLD_AFTER_DECREASE_S:
-                self._decrease(trouble, now)
+                self._decrease(trouble, _factor(link), now)
         elif self._may_increase(now):
             self._increase(now)
         return self._decision
@@ -117,9 +126,10 @@ class BitrateController:
         ]
         return ", ".join(text for bad, text in signs if bad)
 
-    def _decrease(self, trouble: str, now: float) -> None:
+    def _decrease(self, trouble: str, factor: float, now: float) -> None:
         before = self._decision.bitrate_kbps
-        after = max(self._floor_kbps, round(before * _DECREASE))
+        after = max(self._floor_kbps, round(before * factor))
+        self._too_much_kbps = before
         self._last_decrease_at = now
         if after == before:
             if after < self._target_kbps:
@@ -136,9 +146,15 @@ class BitrateController:
 
     def _increase(self, now: float) -> None:
         before = self._decision.bitrate_kbps
-        step = max(1, round(self._target_kbps * _INCREASE_SHARE))
+        careful = _CAREFUL if before >= self._too_much_kbps * _CAREFUL_FROM else 1
+        step = max(1, round(self._target_kbps * _INCREASE_SHARE / careful))
         after = min(self._target_kbps, before + step)
         self._last_increase_at = now
         self._decision = Decision(
             after, "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
         )
+
+
+def _factor(link: Link) -> float:
+    severe = link.loss_percent > _SEVERE_LOSS_PERCENT or link.dropped_percent > _SEVERE_DROPPED_PERCENT
+    return _SEVERE_DECREASE if severe else _DECREASE

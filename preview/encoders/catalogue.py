@@ -138,7 +138,11 @@ _X264 = Spelling(
 )
 _X265 = Spelling(
     # The element knows no VBV: it comes with the options, and so does all that delays a frame.
-    fixed={"tune": "zerolatency", "speed-preset": "ultrafast", "option-string": "bframes=0:repeat-headers=1"},
+    fixed={
+        "tune": "zerolatency",
+        "speed-preset": "ultrafast",
+        "option-string": "bframes=0:open-gop=0:repeat-headers=1",
+    },
     input_caps="video/x-raw,format=I420",
     live_bitrate=True,
 )

@@ -38,6 +38,7 @@ class Parts:
     rate_caps: Any
     size_caps: Any
     encoder: Any
+    parser_pad: Any
     muxer_pad: Any
     sink: Any
 
@@ -133,6 +134,7 @@ def _parts(pipeline: Any, source: Any, body: Any) -> Parts:
         rate_caps=body.get_by_name("rate_caps"),
         size_caps=body.get_by_name("size"),
         encoder=body.get_by_name("encoder"),
+        parser_pad=body.get_by_name("parser").get_static_pad("src"),
         muxer_pad=body.get_by_name("muxer").get_static_pad("src"),
         sink=body.get_by_name("sink"),
     )

@@ -5,8 +5,7 @@ it hands out all packets of a picture as one list, and this probe on its source 
 slices of at most 1316 bytes, the last one ending where the picture ends.
 
 The slices get the packets' memory and timestamps but none of their flags: the muxer flags everything that
-starts with its tables as HEADER, and srtsink, which has the tables from the caps already, drops such
-buffers whole.
+starts with its tables as HEADER, and a srtsink that got tables with the caps drops such buffers whole.
 
 This runs in Python once per picture, never per packet; it also is where pictures are counted.
 """
@@ -36,17 +35,34 @@ class Framing:
         self.last_picture_at = 0.0
         """time.monotonic() of the newest picture."""
         self._on_first_picture = on_first_picture
-        self._detach: Callable[[], None] = lambda: None
+        self._detach: tuple[Callable[[], None], ...] = ()
 
     def attach(self, muxer_pad: Any) -> None:
         """Puts the probe on the muxer's source pad, which is linked to the listener."""
+        tables = muxer_pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, self._plain_caps)
         probe = muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
-        self._detach = partial(muxer_pad.remove_probe, probe)
+        self._detach = (partial(muxer_pad.remove_probe, tables), partial(muxer_pad.remove_probe, probe))
 
     def detach(self) -> None:
         """Takes the probe away: through it the pipeline and this object would keep each other alive."""
-        self._detach()
-        self._detach = lambda: None
+        for release in self._detach:
+            release()
+        self._detach = ()
+
+    def _plain_caps(self, pad: Any, info: Any) -> Any:
+        """Takes the tables out of the caps.
+
+        srtsink would send them to every new viewer once more, with counters that don't continue in the
+        stream; the key frame that a new viewer gets brings them along anyway.
+        """
+        event = info.get_event()
+        if event.type != Gst.EventType.CAPS or not event.parse_caps().get_structure(0).has_field(
+            "streamheader"
+        ):
+            return Gst.PadProbeReturn.OK
+        plain = Gst.Caps.from_string(f"video/mpegts,systemstream=true,packetsize={PACKET_BYTES}")
+        pad.get_peer().send_event(Gst.Event.new_caps(plain))
+        return Gst.PadProbeReturn.DROP
 
     def _probe(self, pad: Any, info: Any) -> Any:
         if info.type & Gst.PadProbeType.BUFFER_LIST:

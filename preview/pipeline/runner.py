@@ -18,8 +18,8 @@ What can fail, how it is noticed, and what follows:
 | a viewer is slow, frozen, gone, a stranger | the listener drops it | others notice nothing |
 
 A process with an abandoned pipeline ends, with code 70, when the preview is next disabled: only that frees
-the driver. GStreamer's threads touch this object in two places, the first picture and a viewer's arrival, and
-both only hand over to the loop. State changes run in threads of their own with a deadline.
+the driver. GStreamer's threads meet us in few places (framing.py, joining.py, looping.py) and hand over to
+the loop. State changes run in threads of their own with a deadline.
 """
 
 import asyncio
@@ -38,6 +38,7 @@ from preview.pipeline import builder, faults, statistics
 from preview.pipeline.crossing import Crossing, in_thread
 from preview.pipeline.faults import Fault
 from preview.pipeline.framing import Framing
+from preview.pipeline.joining import Joining
 from preview.pipeline.looping import Looping
 from preview.pipeline.watchdogs import Silent, Watchdogs
 from preview.plan import Plan
@@ -47,8 +48,6 @@ _log = logging.getLogger(__name__)
 
 _LOOK_EVERY_S: Final = 0.1
 MEASURE_EVERY_S: Final = 0.5
-_KEY_FRAMES_APART_S: Final = 0.3
-"""A crowd of viewers that joins at once gets its key frame at the end of this pause, not one each."""
 _INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
 
@@ -96,15 +95,11 @@ class Runner:
         self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture))
         self._framing.attach(self._parts.muxer_pad)
         self._looping = Looping(self._parts, self._crossing, self._loop_failed) if plan.source.loops else None
-        self._joins = self._parts.sink.connect(
-            "caller-added", lambda *_: self._crossing.hand_over(self._viewer_joined)
-        )
+        self._joining = Joining(self._parts, self._crossing, self._request_key_frame)
         self._bus = self._parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._watch: asyncio.Task[None] | None = None
         self._faulted = False
-        self._key_frame_after = 0.0
-        self._key_frame_timer: asyncio.TimerHandle | None = None
 
     async def start(self) -> None:
         """Starts the pipeline. What fails is told through `on_fault`, also after this has returned."""
@@ -150,7 +145,7 @@ class Runner:
 
     def _let_go(self) -> list[Any]:
         """Cuts every tie to the pipeline; what is returned is the last reference to it."""
-        self._parts.sink.disconnect(self._joins)
+        self._joining.detach()
         self._framing.detach()
         if self._looping:
             self._looping.detach()
@@ -214,17 +209,7 @@ class Runner:
     def _loop_failed(self) -> None:
         self.fail(faults.ended(self.plan))
 
-    def _viewer_joined(self) -> None:
-        """Gives a new viewer a picture to begin with; many at once share one."""
-        wait_s = self._key_frame_after - time.monotonic()
-        if wait_s <= 0:
-            self._request_key_frame()
-        elif self._key_frame_timer is None:
-            self._key_frame_timer = self._loop.call_later(wait_s, self._request_key_frame)
-
     def _request_key_frame(self) -> None:
-        self._key_frame_timer = None
-        self._key_frame_after = time.monotonic() + _KEY_FRAMES_APART_S
         sink_pad = self._parts.sink.get_static_pad("sink")
         settings.request_key_frame(self._parts.encoder, self.plan.encoder, sink_pad)
 
@@ -267,8 +252,6 @@ class Runner:
 
     async def _stop_watching(self) -> None:
         self._loop.remove_reader(self._bus_fd)
-        if self._key_frame_timer:
-            self._key_frame_timer.cancel()
         if self._watch:
             self._watch.cancel()
             with suppress(asyncio.CancelledError):

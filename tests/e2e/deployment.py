@@ -161,3 +161,9 @@ def demo_overlay() -> str:
 def docker(*words: str) -> str:
     """The output of a docker command."""
     return subprocess.run(["docker", *words], capture_output=True, text=True, timeout=120, check=True).stdout
+
+
+def udp_ports(deployment: Deployment, service: str) -> set[int]:
+    """The UDP ports that are bound in a service's network."""
+    table = Path(f"/proc/{deployment.program_pid(service)}/net/udp").read_text(encoding="ascii")
+    return {int(line.split()[1].rpartition(":")[2], 16) for line in table.splitlines()[1:]}

@@ -2,11 +2,12 @@
 
 import signal
 import time
+from pathlib import Path
 
 import pytest
 
 from console.client.results import PreviewProfile, PreviewState
-from tests.e2e.deployment import Deployment
+from tests.e2e.deployment import Deployment, demo_overlay, deployed, udp_ports
 from tests.e2e.lookout import Lookout
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -93,8 +94,21 @@ def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
         assert viewer.reconnects == 0
         assert viewer.longest_pause_s < 1
         assert demo.restarts("preview") == 0
-        # A new gateway wants nothing yet, but tells what it finds.
-        assert status.preview.state in (PreviewState.RUNNING, PreviewState.STOPPING, PreviewState.DISABLED)
+        # The new gateway takes over what the earlier one had applied.
+        assert status.preview.state is PreviewState.RUNNING
+        assert status.preview.profile is PreviewProfile.BALANCED
+
+
+def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path, images: str) -> None:
+    """Documented: after timeouts.without_gateway_s, here 2 s, and the port is free again."""
+    config = tmp_path / "preview.yaml"
+    config.write_text("source: {kind: test}\ntimeouts: {without_gateway_s: 2}\n", encoding="utf-8")
+    with deployed(tmp_path, demo_overlay(), PREVIEW_CONFIG=str(config)) as demo, demo.client() as robot:
+        demo.wait_for_status(robot)
+        robot.enable_preview()
+        assert demo.preview_port in udp_ports(demo, "preview")
+        demo.run("stop", "gateway")
+        wait_until(lambda: demo.preview_port not in udp_ports(demo, "preview"), "the port is free", 10)
 
 
 @pytest.mark.parametrize("order", [("gateway", "preview"), ("preview", "gateway")])

@@ -1,13 +1,12 @@
 """The main job through the containers, on the compose file itself."""
 
 import time
-from pathlib import Path
 
 import pytest
 
 from common.healthcheck import state_of
 from console.client.results import PreviewProfile, PreviewState
-from tests.e2e.deployment import Deployment
+from tests.e2e.deployment import Deployment, udp_ports
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -58,9 +57,3 @@ def test_a_stop_takes_less_than_three_seconds(demo: Deployment, service: str) ->
     # The engine would kill after stop_grace_period, with code 137: the program ended by itself, and in time.
     assert demo.inspect(service)["State"]["ExitCode"] == 0, demo.logs(service)
     assert demo.time_s(service, "FinishedAt") - asked_s < 3
-
-
-def udp_ports(deployment: Deployment, service: str) -> set[int]:
-    """The UDP ports that are bound in a service's network."""
-    table = Path(f"/proc/{deployment.program_pid(service)}/net/udp").read_text(encoding="ascii")
-    return {int(line.split()[1].rpartition(":")[2], 16) for line in table.splitlines()[1:]}

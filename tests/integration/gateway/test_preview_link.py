@@ -301,3 +301,16 @@ class TestSwitching:
         sequences = [event.sequence for event in overlay.events]
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
         assert len(sequences) <= 8
+
+    async def test_a_preview_that_was_on_for_a_moment_was_seen(
+        self, operator: Operator, double: PreviewDouble
+    ) -> None:
+        for _ in range(2):
+            await operator.switch(True)
+            await operator.switch(False)
+        expected = ["preview running, BALANCED", "preview off"] * 2
+        await eventually(
+            operator.overlay,
+            lambda it: [event.message for event in it.events][-4:] == expected,
+            "an event for each of the four",
+        )

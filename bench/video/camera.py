@@ -1,0 +1,75 @@
+"""A camera for benchmarks: footage with a stamp, 1280x720 NV12, offered through shared memory.
+
+Both senders read it by the same GStreamer description, so the way from the camera is the same for both. The
+pictures are made ahead by ffmpeg (a moving test picture with noise as a sensor makes it), so that the camera
+itself needs next to no CPU: it draws the stamp and hands a picture over.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.video import foreign
+
+WIDTH_PX = 1280
+HEIGHT_PX = 720
+FRAME_BYTES = WIDTH_PX * HEIGHT_PX * 3 // 2
+_FRAMES = 45
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera that runs.
+
+    Args:
+        socket: where its shared memory is announced.
+        fps: pictures per second.
+    """
+
+    socket: Path
+    fps: int
+
+    @property
+    def source(self) -> str:
+        """What GStreamer reads it with; ends in raw video."""
+        return f"shmsrc socket-path={self.socket} is-live=true do-timestamp=true ! {caps(self.fps)}"
+
+
+@contextmanager
+def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
+    """Runs a camera in a process of its own until the block ends.
+
+    Raises:
+        RuntimeError: it did not begin.
+    """
+    footage = workdir / "footage.nv12"
+    if not footage.exists():
+        _make(footage)
+    made = Camera(workdir / f"camera-{fps}", fps)
+    command = [sys.executable, "-m", "bench.video.camera_process", str(footage), str(made.socket), str(fps)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        try:
+            if process.stdout.readline().strip() != "ready":
+                raise RuntimeError("the camera did not begin")
+            yield made
+        finally:
+            process.terminate()
+
+
+def caps(fps: int) -> str:
+    """Complete: shared memory knows nothing of its content, so nobody downstream could fill a gap."""
+    return (
+        f"video/x-raw,format=NV12,width={WIDTH_PX},height={HEIGHT_PX},framerate={fps}/1"
+        ",pixel-aspect-ratio=1/1,interlace-mode=progressive,colorimetry=bt709"
+    )
+
+
+def _make(footage: Path) -> None:
+    picture = f"testsrc2=size={WIDTH_PX}x{HEIGHT_PX}:rate=30,noise=alls=6:allf=t+u"
+    command = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", picture, "-frames:v", str(_FRAMES)]
+    command += ["-pix_fmt", "nv12", "-f", "rawvideo", str(footage)]
+    subprocess.run(command, env=foreign.environment(), check=True)

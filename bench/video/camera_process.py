@@ -1,0 +1,56 @@
+"""The process that plays the camera; see camera.py."""
+
+import argparse
+import mmap
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from itertools import chain, count
+from pathlib import Path
+
+from bench.video import stamp
+from bench.video.camera import FRAME_BYTES, WIDTH_PX, caps
+from common.gst import GLib, Gst
+
+
+def serve(footage: Path, socket: Path, fps: int) -> None:
+    """Offers pictures until SIGTERM; says "ready" on standard output when a reader may come."""
+    pipeline = Gst.parse_launch(
+        "appsrc name=in is-live=true format=time max-bytes=0"
+        f" caps={caps(fps)}"
+        f" ! shmsink socket-path={socket} shm-size={8 * FRAME_BYTES} wait-for-connection=false sync=false"
+    )
+    way_in = pipeline.get_by_name("in")
+    pipeline.set_state(Gst.State.PLAYING)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    print("ready", flush=True)
+    for frame in _frames(footage, fps, stop):
+        way_in.emit("push-buffer", Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(frame)))
+    pipeline.set_state(Gst.State.NULL)
+
+
+def _frames(footage: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
+    """Stamped pictures at their time; forth and back through the footage, so that nothing ever jumps."""
+    with footage.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        available = len(content) // FRAME_BYTES
+        order = [*range(available), *range(available - 2, 0, -1)]
+        begun_s = time.monotonic()
+        for number, index in zip(count(), chain.from_iterable(order for _ in count()), strict=False):
+            due_s = begun_s + number / fps
+            if stop.wait(max(0.0, due_s - time.monotonic())):
+                return
+            picture = bytearray(content[index * FRAME_BYTES : (index + 1) * FRAME_BYTES])
+            stamp.draw(picture, WIDTH_PX, time.monotonic())
+            yield bytes(picture)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("footage", type=Path)
+    parser.add_argument("socket", type=Path)
+    parser.add_argument("fps", type=int)
+    given = parser.parse_args()
+    serve(given.footage, given.socket, given.fps)

@@ -1,0 +1,47 @@
+"""An operator switches the preview on and watches: how long until the first picture."""
+
+import statistics
+import time
+from pathlib import Path
+
+from bench.rows import Row
+from bench.video import product, stamp
+from bench.video.camera import camera
+from bench.video.progress import tell
+from bench.video.viewing import PATIENCE_S
+
+ROUNDS = 7
+LATENCY_MS = 125
+
+
+def rows(workdir: Path) -> list[Row]:
+    with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+        times_ms = [_once(robot) for _ in range(ROUNDS)]
+    return [
+        Row(
+            name="video.enable_to_frame_ms",
+            what=f"SetPreviewMode sent, to the first decoded picture (SRT {LATENCY_MS} ms)",
+            unit="ms",
+            value=statistics.median(times_ms),
+            reference=None,
+            bar=450,
+        )
+    ]
+
+
+def _once(robot: product.Robot) -> float:
+    """One enable, in ms; the way of the picture step by step on standard error."""
+    sent_s = time.monotonic()
+    with robot.preview():
+        answered_s = time.monotonic()
+        with robot.viewer() as viewer:
+            frame = viewer.next_frame(PATIENCE_S)
+    captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
+    steps = [
+        ("SetPreviewMode answered, preview RUNNING, viewer calls", answered_s),
+        ("first picture captured", captured_s),
+        ("decoded", frame.arrival_s),
+    ]
+    told = "; ".join(f"{at_s - sent_s:.3f} s {what}" for what, at_s in steps if at_s is not None)
+    tell(f"enable: {told}")
+    return (frame.arrival_s - sent_s) * 1000

@@ -1,0 +1,47 @@
+"""A viewer watches while the profile changes under it."""
+
+import statistics
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from bench.rows import Row
+from bench.video import product
+from bench.video.camera import camera
+from bench.video.progress import tell
+from bench.video.viewing import longest_gap_ms, watch
+from console.client import PreviewProfile
+
+ROUNDS = 3
+SETTLE_S = 1.5
+WATCH_S = 2.0
+LATENCY_MS = 125
+_WAY = (PreviewProfile.LOW_BW, PreviewProfile.HIGH_QUALITY, PreviewProfile.BALANCED)
+
+
+def rows(workdir: Path) -> list[Row]:
+    with camera(workdir, fps=60) as source, product.robot(workdir, source, LATENCY_MS) as robot:
+        longest_ms = [_round(robot) for _ in range(ROUNDS)]
+    return [
+        Row(
+            name="video.switch_gap_ms",
+            what="longest time without a picture over the switches of profile, one SRT connection",
+            unit="ms",
+            value=statistics.median(longest_ms),
+            reference=None,
+            bar=150,
+        )
+    ]
+
+
+def _round(robot: product.Robot) -> float:
+    """Through all profiles; the viewer does not call again, so a lost connection would end it."""
+    gaps = []
+    with robot.preview(), robot.viewer() as viewer, ThreadPoolExecutor(1) as operator:
+        watch(viewer, SETTLE_S)
+        for profile in _WAY:
+            switching = operator.submit(robot.client.enable_preview, profile)
+            gaps.append(longest_gap_ms(watch(viewer, WATCH_S)))
+            switching.result()
+    told = ", ".join(f"{gap:.0f} ms to {profile.value}" for gap, profile in zip(gaps, _WAY, strict=True))
+    tell(f"longest gaps: {told}")
+    return max(gaps)

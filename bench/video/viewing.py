@@ -1,0 +1,61 @@
+"""Watching a stream and noting when each picture was taken and when it was decoded."""
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+from bench.video import stamp
+from console.receiver.frame import Frame
+
+PATIENCE_S = 15.0
+
+
+class Viewer(Protocol):
+    """Who watches."""
+
+    def next_frame(self, timeout_s: float) -> Frame:
+        """The next decoded picture."""
+
+
+Connect = Callable[[], AbstractContextManager[Viewer]]
+"""Begins to watch."""
+
+
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """A picture's way, on `time.monotonic()`."""
+
+    captured_s: float
+    decoded_s: float
+
+    @property
+    def latency_ms(self) -> float:
+        """From capture to the end of decoding."""
+        return (self.decoded_s - self.captured_s) * 1000
+
+
+def watch(viewer: Viewer, seconds: float) -> list[Glance]:
+    """What comes in the next `seconds`; pictures whose stamp can't be read are left out."""
+    until_s = time.monotonic() + seconds
+    glances = []
+    while time.monotonic() < until_s:
+        frame = viewer.next_frame(PATIENCE_S)
+        captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
+        if captured_s is not None:
+            glances.append(Glance(captured_s, frame.arrival_s))
+    return glances
+
+
+def longest_gap_ms(glances: list[Glance]) -> float:
+    """The longest time between two decoded pictures."""
+    return max(later.decoded_s - earlier.decoded_s for earlier, later in pairwise(glances)) * 1000
+
+
+def first_frame_ms(connect: Connect) -> float:
+    """From beginning to connect to the first decoded picture."""
+    begun_s = time.monotonic()
+    with connect() as viewer:
+        return (viewer.next_frame(PATIENCE_S).arrival_s - begun_s) * 1000
