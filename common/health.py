@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from typing import Literal, TypeAlias
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
@@ -9,6 +10,7 @@ from grpc_health.v1.health_pb2_grpc import HealthServicer, add_HealthServicer_to
 
 from common.rpc import Context
 
+_State: TypeAlias = Literal[0, 1, 2, 3]
 _SERVING = HealthCheckResponse.SERVING
 _NOT_SERVING = HealthCheckResponse.NOT_SERVING
 _UNKNOWN = HealthCheckResponse.SERVICE_UNKNOWN
@@ -24,12 +26,12 @@ class Health(HealthServicer):
     """
 
     def __init__(self, *services: str) -> None:
-        self._states = dict.fromkeys(("", *services), _SERVING)
+        self._states: dict[str, _State] = dict.fromkeys(("", *services), _SERVING)
         self._changed = asyncio.Event()
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the service to a server that has not been started."""
-        add_HealthServicer_to_server(self, server)  # type: ignore[no-untyped-call]  # it has no annotations
+        add_HealthServicer_to_server(self, server)
 
     def set_serving(self, service: str, *, serving: bool) -> None:
         """Tells how a part is; those who watch learn it when it is news."""

@@ -10,8 +10,8 @@ from typing import Final
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
-from grpc_health.v1.health_pb2_grpc import HealthStub
 
+_METHOD: Final = "/grpc.health.v1.Health/Check"
 _ANSWER_WITHIN_S: Final = 3.0
 
 
@@ -23,8 +23,11 @@ def state_of(target: str, service: str = "") -> str:
         service: its full name, or a name the server made up for a part of it.
     """
     with grpc.insecure_channel(target) as channel:
+        check = channel.unary_unary(
+            _METHOD, HealthCheckRequest.SerializeToString, HealthCheckResponse.FromString
+        )
         try:
-            answer = HealthStub(channel).Check(HealthCheckRequest(service=service), timeout=_ANSWER_WITHIN_S)
+            answer = check(HealthCheckRequest(service=service), timeout=_ANSWER_WITHIN_S)
         except grpc.RpcError as error:
             return f"{error.code().name}: {error.details()}"
     return HealthCheckResponse.ServingStatus.Name(answer.status)

@@ -7,12 +7,12 @@ ARG ROS=packages
 FROM debian:bookworm-slim AS system-wheels
 RUN apt-get update \
  && apt-get install -y --no-install-recommends python3 tini \
- && rm -rf /var/lib/apt/lists/*
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 
 FROM ros:jazzy-ros-core AS system-packages
 RUN apt-get update \
  && apt-get install -y --no-install-recommends ros-jazzy-vision-msgs tini \
- && rm -rf /var/lib/apt/lists/*
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 # What sourcing setup.sh would set, for every process of the container and without a shell.
 ENV AMENT_PREFIX_PATH=/opt/robot-gateway/ros:/opt/ros/jazzy \
     LD_LIBRARY_PATH=/opt/robot-gateway/ros/lib:/opt/ros/jazzy/lib:/opt/ros/jazzy/lib/aarch64-linux-gnu:/opt/ros/jazzy/lib/x86_64-linux-gnu \
@@ -23,7 +23,7 @@ FROM system-${ROS} AS system
 FROM system AS tools
 RUN apt-get update \
  && apt-get install -y --no-install-recommends cmake g++ ninja-build python3-dev python3-venv \
- && rm -rf /var/lib/apt/lists/*
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/
@@ -41,6 +41,7 @@ COPY interfaces interfaces
 COPY scripts/build-interfaces scripts/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && scripts/build-interfaces \
+ && rm -rf .venv/include \
  && mkdir ros
 
 FROM tools AS rclpy-packages

@@ -7,17 +7,17 @@ RUN apt-get update \
       gir1.2-gst-plugins-base-1.0 gir1.2-gstreamer-1.0 \
       gstreamer1.0-plugins-bad gstreamer1.0-plugins-base gstreamer1.0-plugins-good gstreamer1.0-plugins-ugly \
       python3 python3-gi tini ${EXTRA_PACKAGES} \
- && rm -rf /var/lib/apt/lists/*
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 COPY docker/vendor /tmp/vendor
 RUN if ls /tmp/vendor/*.deb > /dev/null 2>&1; then \
-      apt-get update && apt-get install -y --no-install-recommends /tmp/vendor/*.deb && rm -rf /var/lib/apt/lists/*; \
+      apt-get update && apt-get install -y --no-install-recommends /tmp/vendor/*.deb && rm -rf /var/lib/apt/lists/* /var/cache/apt/*; \
     fi; \
     rm -rf /tmp/vendor
 
 FROM debian:bookworm-slim AS built
 RUN apt-get update \
  && apt-get install -y --no-install-recommends python3-venv \
- && rm -rf /var/lib/apt/lists/*
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 WORKDIR /opt/robot-gateway
 COPY docker/fetching.sh docker/
 COPY requirements/tools.txt requirements/preview-image.txt requirements/
