@@ -11,6 +11,7 @@ from typing import Final
 
 from common.version import project_version
 from gateway.config import GatewaySettings, SourceSettings
+from gateway.fault_settings import FaultSettings
 from gateway.platform.sampler import PlatformSampler
 from gateway.preview_link.control import PreviewControl
 from gateway.preview_link.link import PreviewLink
@@ -21,6 +22,8 @@ from gateway.rpc.server import serving
 from gateway.rpc.servicer import RobotGateway
 from gateway.status.board import Board
 from gateway.status.events import EventLog
+from gateway.status.faults.book import FaultBook
+from gateway.status.faults.rules import FaultRules
 from gateway.status.observer import Observer
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
@@ -43,7 +46,9 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
     board, events = Board(), EventLog()
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
-    snapshot = _snapshots(settings, board, events, link)
+    book = FaultBook(settings.faults.clear_after_ms / 1000, settings.faults.keep_cleared_ms / 1000)
+    snapshot = _snapshots(settings, board, events, link, book)
+    observer = Observer(book, _fault_rules(settings.faults))
     gateway = RobotGateway(
         snapshot,
         Answers(snapshot, lambda: link.view, time.monotonic),
@@ -57,7 +62,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events, link), name="observer"),
+                timers.create_task(_observe(snapshot, events, link, observer), name="observer"),
             ]
             await stop.wait()
             for task in background:
@@ -76,7 +81,7 @@ def _new_passphrase() -> str:
 
 
 def _snapshots(
-    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink
+    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink, book: FaultBook
 ) -> Callable[[], Snapshot]:
     identity = Identity(settings.name, project_version(), settings.security.insecure)
     rules = Rules(
@@ -91,8 +96,13 @@ def _snapshots(
         board=board,
         preview=link.view,
         events=events.newest(),
+        faults=book.faults,
         now_s=time.monotonic(),
     )
+
+
+def _fault_rules(settings: FaultSettings) -> FaultRules:
+    return FaultRules(settings.platform_limits(), settings.startup_grace_ms / 1000)
 
 
 @contextmanager
@@ -109,9 +119,10 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
-async def _observe(snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink) -> None:
+async def _observe(
+    snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink, observer: Observer
+) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
-    observer = Observer()
     while True:
         now = snapshot()
         for message in observer.observe(now):
