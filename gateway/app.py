@@ -12,6 +12,7 @@ from typing import Final
 from common.health import Health
 from common.version import project_version
 from gateway.config import GatewaySettings, SourceSettings
+from gateway.fault_settings import FaultSettings
 from gateway.platform.sampler import PlatformSampler
 from gateway.preview_link.control import PreviewControl
 from gateway.preview_link.link import PreviewLink
@@ -22,6 +23,8 @@ from gateway.rpc.server import SERVICE, serving
 from gateway.rpc.servicer import RobotGateway
 from gateway.status.board import Board
 from gateway.status.events import EventLog
+from gateway.status.faults.book import FaultBook
+from gateway.status.faults.rules import FaultRules
 from gateway.status.observer import Observer
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
@@ -46,7 +49,9 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
     board, events = Board(), EventLog()
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
-    snapshot = _snapshots(settings, board, events, link)
+    book = FaultBook(settings.faults.clear_after_ms / 1000, settings.faults.keep_cleared_ms / 1000)
+    snapshot = _snapshots(settings, board, events, link, book)
+    observer = Observer(book, _fault_rules(settings.faults))
     gateway = RobotGateway(
         snapshot,
         Answers(snapshot, lambda: link.view, time.monotonic),
@@ -61,7 +66,8 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events, link, health), name="observer"),
+                timers.create_task(_observe(snapshot, events, link, observer), name="observer"),
+                timers.create_task(_tell_health(link, health), name="health"),
             ]
             await stop.wait()
             for task in background:
@@ -80,7 +86,7 @@ def _new_passphrase() -> str:
 
 
 def _snapshots(
-    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink
+    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink, book: FaultBook
 ) -> Callable[[], Snapshot]:
     identity = Identity(settings.name, project_version(), settings.security.insecure)
     rules = Rules(
@@ -95,8 +101,13 @@ def _snapshots(
         board=board,
         preview=link.view,
         events=events.newest(),
+        faults=book.faults,
         now_s=time.monotonic(),
     )
+
+
+def _fault_rules(settings: FaultSettings) -> FaultRules:
+    return FaultRules(settings.platform_limits(), settings.startup_grace_ms / 1000)
 
 
 @contextmanager
@@ -114,17 +125,23 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
 
 
 async def _observe(
-    snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink, health: Health
+    snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink, observer: Observer
 ) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
-    observer = Observer()
     while True:
         now = snapshot()
-        health.set_serving(PREVIEW_HEALTH, serving=now.preview.service_reachable)
         for message in observer.observe(now):
             _log.info("event: %s", message)
             events.add(message, now.at_s)
         await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
+
+
+async def _tell_health(link: PreviewLink, health: Health) -> None:
+    """Keeps the health service's word on the preview true."""
+    while True:
+        seen = link.view
+        health.set_serving(PREVIEW_HEALTH, serving=seen.service_reachable)
+        await link.news.wait_until(partial(_differs, link, seen), OBSERVE_EVERY_S)
 
 
 def _differs(link: PreviewLink, seen: PreviewView) -> bool:

@@ -10,6 +10,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, load
 from common.errors import ExitCode, UserError
+from gateway.fault_settings import FaultSettings
 from gateway.status.board import SourceKind
 
 
@@ -112,6 +113,7 @@ class GatewaySettings(Settings):
     security: SecuritySettings = SecuritySettings()
     preview: PreviewSettings = PreviewSettings()
     platform: PlatformSettings = PlatformSettings()
+    faults: FaultSettings = FaultSettings()
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """None at all makes a gateway that needs no ROS."""
 

@@ -9,6 +9,8 @@ from console.client.results import (
     Battery,
     Compute,
     EffectiveCommand,
+    Fault,
+    FaultSeverity,
     Freshness,
     HealthState,
     Network,
@@ -59,6 +61,13 @@ _PREVIEW = {
     PreviewState.UNKNOWN: Tone.QUIET,
 }
 
+_SEVERITY = {
+    FaultSeverity.ERROR: Tone.BAD,
+    FaultSeverity.WARNING: Tone.WARNING,
+    FaultSeverity.INFO: Tone.QUIET,
+    FaultSeverity.UNKNOWN: Tone.WARNING,
+}
+
 
 def status_rows(status: SystemStatus) -> list[Row]:
     """Everything worth a line, most important first."""
@@ -66,6 +75,7 @@ def status_rows(status: SystemStatus) -> list[Row]:
     power = status.platform.power
     rows = [
         Row("health", health.state.value.upper(), _HEALTH[health.state], health.summary),
+        *_fault_rows(status.faults),
         _sampled("motion", status.odometry, _motion(status.odometry)),
         _sampled("vision", status.vision, _vision(status.vision)),
         *preview_rows(status.preview),
@@ -107,6 +117,16 @@ def preview_rows(preview: PreviewStatus) -> Iterator[Row]:
         lock = "encrypted" if preview.endpoint.encrypted else ""
         latency = f"latency {preview.endpoint.latency_ms} ms"
         yield Row("", "watch", Tone.QUIET, joined(preview.endpoint.uri, latency, lock))
+
+
+def _fault_rows(faults: tuple[Fault, ...]) -> Iterator[Row]:
+    for fault in faults:
+        if fault.active:
+            text = f"{fault.message} -> {fault.remedy}" if fault.remedy else fault.message
+            mark = fault.severity.value
+            yield Row("fault", mark, _SEVERITY[fault.severity], text, age(fault.age_ms))
+        else:
+            yield Row("fault", "over", Tone.QUIET, fault.message, age(fault.cleared_age_ms))
 
 
 def _sampled(label: str, sample: Sample, text: str) -> Row:

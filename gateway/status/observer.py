@@ -1,65 +1,48 @@
-"""Turns a series of snapshots into events: what has changed since the last one, in a sentence each."""
+"""Looks at one snapshot after the other: keeps the book of faults, and says what is news."""
 
-from gateway.status.freshness import Freshness
+from gateway.status.faults.book import FaultBook
+from gateway.status.faults.rules import FaultRules, conditions
+from gateway.status.faults.sentences import sentences
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 
 
 class Observer:
-    """Compares each snapshot with the one before. The first one is the ground and makes no events."""
+    """The only one who writes into the book. The first snapshot is the ground of all news.
 
-    def __init__(self) -> None:
-        self._conditions: dict[str, str] | None = None
+    Args:
+        book: where faults are kept.
+        rules: what counts as a fault.
+    """
+
+    def __init__(self, book: FaultBook, rules: FaultRules) -> None:
+        self._book = book
+        self._rules = rules
+        self._started_s: float | None = None
+        self._preview = ""
 
     def observe(self, snapshot: Snapshot) -> list[str]:
-        """The events that this snapshot brings."""
-        conditions = _conditions(snapshot)
-        before = self._conditions
-        if before is None:
-            self._conditions = conditions
-            return []
-        # A condition that is not told now (a preview on its way) stands as it was.
-        self._conditions = before | conditions
-        return [text for key, text in conditions.items() if before.get(key) != text]
-
-
-def _conditions(snapshot: Snapshot) -> dict[str, str]:
-    """One sentence per thing an operator wants to be told of."""
-    sources = {
-        "odometry": snapshot.odometry.freshness,
-        "vision telemetry": snapshot.vision.freshness,
-        "detections": snapshot.detections.freshness,
-        "battery": snapshot.battery.freshness,
-    }
-    conditions = {name: f"{name} {_word(freshness)}" for name, freshness in sources.items()}
-    conditions["service"] = (
-        "preview service connected" if snapshot.preview.service_reachable else "preview service unreachable"
-    )
-    preview = _preview_sentence(snapshot.preview)
-    if preview:
-        conditions["preview"] = preview
-    return conditions
-
-
-def _word(freshness: Freshness) -> str:
-    if not freshness.available:
-        return "never received"
-    return "stale" if freshness.stale else "received"
+        """The events that this snapshot brings, a sentence each."""
+        first = self._started_s is None
+        if self._started_s is None:
+            self._started_s = snapshot.at_s
+        up_s = snapshot.at_s - self._started_s
+        found = conditions(snapshot, self._rules, self._book.active_ids, up_s)
+        news = list(sentences(self._book.update(found, snapshot.at_s)))
+        # A preview on its way is as it was.
+        preview = _preview_sentence(snapshot.preview) or self._preview
+        if preview != self._preview and not first:
+            news.append(preview)
+        self._preview = preview
+        return news
 
 
 def _preview_sentence(preview: PreviewView) -> str:
-    """Empty on the way from one state to another: each retry of a faulted preview would be news."""
+    """Empty on the way from one state to another, and for what the book of faults tells."""
     match preview.state:
         case PreviewState.RUNNING:
-            profile = preview.profile.value if preview.profile else "?"
-            encoder = preview.encoder
-            if encoder and encoder.fallback_reason:
-                why = f"{encoder.name} instead of {encoder.wanted}: {encoder.fallback_reason}"
-                return f"preview running, {profile}, encoder {why}"
-            return f"preview running, {profile}"
-        case PreviewState.FAULTED:
-            return f"preview faulted: {preview.last_error}"
+            return f"preview running, {preview.profile.value if preview.profile else '?'}"
         case PreviewState.DISABLED:
             return "preview off"
-        case PreviewState.STARTING | PreviewState.STOPPING:
+        case PreviewState.STARTING | PreviewState.STOPPING | PreviewState.FAULTED:
             return ""

@@ -1,14 +1,16 @@
 """One instant of everything: the newest values, their freshness and the verdict that follows."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import Event
+from gateway.status.faults.fault import Fault
 from gateway.status.freshness import Freshness, Sample, sample
 from gateway.status.health import Health, assess
 from gateway.status.preview import Measurement, PreviewView
+from gateway.status.sources import SourceView, state_of
 from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Vision
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
@@ -65,7 +67,9 @@ class Snapshot:
     onboard_battery: Sample[Battery]
     preview: PreviewView
     preview_measured: Sample[Measurement]
+    sources: tuple[SourceView, ...]
     events: tuple[Event, ...]
+    faults: tuple[Fault, ...]
 
 
 def take(
@@ -76,6 +80,7 @@ def take(
     preview: PreviewView,
     events: tuple[Event, ...],
     now_s: float,
+    faults: tuple[Fault, ...] = (),
 ) -> Snapshot:
     """What is true at `now_s`, from the newest values alone."""
     odometry = sample(board.odometry, rules.stale_after_ms(SourceKind.ODOMETRY), now_s)
@@ -96,5 +101,22 @@ def take(
         onboard_battery=sample(board.onboard_battery, rules.platform_stale_after_ms, now_s),
         preview=preview,
         preview_measured=sample(preview.measured, MEASUREMENT_STALE_AFTER_MS, now_s),
+        sources=tuple(_sources(rules, board, now_s)),
         events=events,
+        faults=faults,
     )
+
+
+def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
+    for kind, rule in rules.sources.items():
+        freshness = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
+        unusable = board.unusable.get(kind)
+        yield SourceView(
+            kind=kind,
+            name=kind.value,
+            words=kind.value.replace("_", " "),
+            state=state_of(freshness, unusable),
+            freshness=freshness,
+            required=rule.required,
+            detail=unusable or "",
+        )

@@ -29,6 +29,7 @@ NEEDS_NO_AGE = {
     "EncoderStatus": _SERVICE,
     "VideoFormat": _SERVICE,
     "PreviewCounters": "counted by the gateway itself",
+    "Fault": "a verdict of the gateway's own with an age, found again five times a second",
     "OperatorEvent": "an event of the gateway's own; it has an age and is never stale",
     "SetPreviewModeResponse.accepted": _ITSELF,
     "SetPreviewModeResponse.message": _ITSELF,

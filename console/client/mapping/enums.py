@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from console.client.results import (
+    FaultSeverity,
     HealthState,
     PreviewProfile,
     PreviewState,
@@ -12,6 +13,7 @@ from console.client.results import (
     TeleopState,
     VideoCodec,
 )
+from omniseer.gateway.v1 import fault_pb2 as faults
 from omniseer.gateway.v1 import preview_pb2 as preview
 from omniseer.gateway.v1 import states_pb2 as states
 
@@ -45,6 +47,12 @@ _TRANSPORTS: Final[Mapping[int, StreamTransport]] = {
 _CONTAINERS: Final[Mapping[int, StreamContainer]] = {
     preview.STREAM_CONTAINER_UNSPECIFIED: StreamContainer.UNKNOWN,
     preview.STREAM_CONTAINER_MPEG_TS: StreamContainer.MPEG_TS,
+}
+_SEVERITIES: Final[Mapping[int, FaultSeverity]] = {
+    faults.FAULT_SEVERITY_UNSPECIFIED: FaultSeverity.UNKNOWN,
+    faults.FAULT_SEVERITY_INFO: FaultSeverity.INFO,
+    faults.FAULT_SEVERITY_WARNING: FaultSeverity.WARNING,
+    faults.FAULT_SEVERITY_ERROR: FaultSeverity.ERROR,
 }
 # Both directions are needed: answers carry a profile, and so do requests.
 _PROFILE_NUMBERS: Final[Mapping[PreviewProfile, preview.PreviewProfile.ValueType]] = {
@@ -84,6 +92,11 @@ def stream_transport(number: int) -> StreamTransport:
 def stream_container(number: int) -> StreamContainer:
     """What the stream is packed in."""
     return _CONTAINERS.get(number, StreamContainer.UNKNOWN)
+
+
+def fault_severity(number: int) -> FaultSeverity:
+    """How much a fault matters."""
+    return _SEVERITIES.get(number, FaultSeverity.UNKNOWN)
 
 
 def preview_profile(number: int) -> PreviewProfile:

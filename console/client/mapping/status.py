@@ -1,6 +1,7 @@
 """The whole status, from the contract's messages."""
 
 from console.client.mapping import enums
+from console.client.mapping.faults import fault
 from console.client.mapping.known import number, number_when, when
 from console.client.mapping.platform import platform
 from console.client.mapping.preview import preview
@@ -29,6 +30,7 @@ def system_status(message: wire.SystemStatus) -> SystemStatus:
         platform=platform(message.platform),
         effective_command=_effective_command(message.effective_command),
         teleop=_teleop(message.teleop),
+        faults=tuple(fault(each) for each in message.faults),
     )
 
 

@@ -4,6 +4,7 @@ None means "not known". Enumerations have a member `UNKNOWN`: the gateway did no
 this client and said something this client has no word for.
 """
 
+from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
@@ -40,6 +41,8 @@ __all__ = [
     "Detections",
     "EffectiveCommand",
     "Encoder",
+    "Fault",
+    "FaultSeverity",
     "Freshness",
     "Health",
     "HealthState",

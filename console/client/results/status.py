@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from console.client.results.fault import Fault
 from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
 from console.client.results.sample import Sample
@@ -109,3 +110,5 @@ class SystemStatus:
     platform: Platform
     effective_command: EffectiveCommand
     teleop: Teleop
+    faults: tuple[Fault, ...]
+    """What is wrong, the worst first; then what was wrong a moment ago, the newest first."""

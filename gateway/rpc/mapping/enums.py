@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from typing import Final
 
 from common.errors import InvalidRequestError
+from gateway.status.faults.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile
-from omniseer.gateway.v1 import preview_pb2, states_pb2
+from omniseer.gateway.v1 import fault_pb2, preview_pb2, states_pb2
 
 PREVIEW_STATES: Final[Mapping[PreviewState, states_pb2.PreviewState.ValueType]] = {
     PreviewState.DISABLED: states_pb2.PREVIEW_DISABLED,
@@ -29,6 +30,11 @@ CODECS: Final[Mapping[Codec | None, preview_pb2.VideoCodec.ValueType]] = {
 HEALTH_STATES: Final[Mapping[HealthState, states_pb2.RobotHealthState.ValueType]] = {
     HealthState.OK: states_pb2.ROBOT_HEALTH_OK,
     HealthState.DEGRADED: states_pb2.ROBOT_HEALTH_DEGRADED,
+}
+SEVERITIES: Final[Mapping[Severity, fault_pb2.FaultSeverity.ValueType]] = {
+    Severity.INFO: fault_pb2.FAULT_SEVERITY_INFO,
+    Severity.WARNING: fault_pb2.FAULT_SEVERITY_WARNING,
+    Severity.ERROR: fault_pb2.FAULT_SEVERITY_ERROR,
 }
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 

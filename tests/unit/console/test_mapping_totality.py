@@ -11,6 +11,7 @@ from console.client.mapping import enums
 from console.client.mapping.methods import METHODS, SET_PREVIEW_MODE, PreviewWish
 from console.client.results import PreviewProfile
 from omniseer.gateway.v1 import (
+    fault_pb2,
     overlay_pb2,
     platform_pb2,
     preview_pb2,
@@ -19,12 +20,13 @@ from omniseer.gateway.v1 import (
     system_status_pb2,
 )
 
-FILES = (overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2)
+FILES = (fault_pb2, overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2)
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
 DECODERS = {method.name: method.decode for method in METHODS}
 
 ENUM_MAPPINGS = {
     "PreviewState": enums.preview_state,
+    "FaultSeverity": enums.fault_severity,
     "RobotHealthState": enums.health_state,
     "TeleopState": enums.teleop_state,
     "PreviewProfile": enums.preview_profile,

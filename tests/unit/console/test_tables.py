@@ -12,6 +12,7 @@ from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STAT
 from console.client.results import SystemStatus
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
+from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus as StatusMessage
 from tests.support.gateway_double import healthy_status
 
@@ -87,6 +88,25 @@ def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_wanted() -> Non
     assert any(row.tone is Tone.BAD and row.text == "camera unplugged" for row in rows)
     assert any(row.text == "wanted mpp-h265, /dev/mpp_service is missing" for row in rows)
     assert "preview faulted (camera unplugged)" in watch_line(decoded(message))
+
+
+def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
+    message = healthy_status()
+    message.faults.add(
+        id="platform.disk",
+        severity=FAULT_SEVERITY_ERROR,
+        message="the disk is nearly full",
+        remedy="make room",
+        active=True,
+        age_ms=65_000,
+    )
+    message.faults.add(
+        id="odometry.stale", message="odometry stopped coming", age_ms=9000, cleared_age_ms=500
+    )
+    _, disk, odometry = status_rows(decoded(message))[:3]
+    assert (disk.mark, disk.tone, disk.age) == ("error", Tone.BAD, "1 min 05 s")
+    assert disk.text == "the disk is nearly full -> make room"
+    assert (odometry.mark, odometry.text, odometry.age) == ("over", "odometry stopped coming", "500 ms")
 
 
 def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:

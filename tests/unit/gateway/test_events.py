@@ -2,10 +2,10 @@ from dataclasses import replace
 
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import KEPT, EventLog
-from gateway.status.observer import Observer
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 from gateway.status.values import Odometry, Received
+from tests.support.fault_rules import new_observer
 
 OFF = PreviewView(
     state=PreviewState.DISABLED,
@@ -40,45 +40,56 @@ def test_the_newest_events_are_kept_and_numbered_from_one() -> None:
 
 
 def test_the_first_look_is_the_ground_and_no_news() -> None:
-    assert Observer().observe(snapshot(Board())) == []
+    assert new_observer(startup_grace_s=5).observe(snapshot(Board())) == []
 
 
 def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
-    observer, board = Observer(), Board()
-    observer.observe(snapshot(board))
+    observer, board = new_observer(startup_grace_s=0.2), Board()
+    assert observer.observe(snapshot(board, now_s=99.0)) == []
+    missing = "no odometry since the gateway started, and nobody on the robot offers it"
+    assert observer.observe(snapshot(board, now_s=99.2)) == [f"error: {missing}"]
     board.odometry = Received(Odometry(0, 0, 0), at_s=100.0)
-    assert observer.observe(snapshot(board, now_s=100.1)) == ["odometry received"]
+    assert observer.observe(snapshot(board, now_s=100.1)) == [f"over: {missing}"]
     assert observer.observe(snapshot(board, now_s=100.2)) == []
-    assert observer.observe(snapshot(board, now_s=101.5)) == ["odometry stale"]
+    assert observer.observe(snapshot(board, now_s=101.5)) == ["error: odometry stopped coming"]
     board.odometry = Received(Odometry(0, 0, 0), at_s=102.0)
-    assert observer.observe(snapshot(board, now_s=102.0)) == ["odometry received"]
+    assert observer.observe(snapshot(board, now_s=102.0)) == ["over: odometry stopped coming"]
 
 
 def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
-    observer = Observer()
+    observer = new_observer(startup_grace_s=60)
     observer.observe(snapshot(Board()))
     faulted = replace(OFF, state=PreviewState.FAULTED, last_error="no camera")
-    assert observer.observe(snapshot(Board(), faulted)) == ["preview faulted: no camera"]
+    starting = replace(faulted, state=PreviewState.STARTING)
+    message = "the preview does not work: no camera"
+    assert observer.observe(snapshot(Board(), faulted)) == [f"error: {message}"]
     for _ in range(3):
-        assert observer.observe(snapshot(Board(), replace(OFF, state=PreviewState.STARTING))) == []
+        assert observer.observe(snapshot(Board(), starting)) == []
         assert observer.observe(snapshot(Board(), faulted)) == []
     running = replace(OFF, state=PreviewState.RUNNING)
-    assert observer.observe(snapshot(Board(), running)) == ["preview running, BALANCED"]
+    assert observer.observe(snapshot(Board(), running)) == [f"over: {message}", "preview running, BALANCED"]
 
 
 def test_a_fallback_to_another_encoder_is_news() -> None:
-    observer = Observer()
+    observer = new_observer(startup_grace_s=60)
     running = replace(OFF, state=PreviewState.RUNNING, encoder=Encoder("mpp-h265", True, "mpp-h265", ""))
     observer.observe(snapshot(Board(), running))
     fallen = replace(running, encoder=Encoder("x264", False, "mpp-h265", "no output for 2 s"))
     assert observer.observe(snapshot(Board(), fallen)) == [
-        "preview running, BALANCED, encoder x264 instead of mpp-h265: no output for 2 s"
+        "warning: x264 encodes on the robot's own processor instead of mpp-h265: no output for 2 s"
     ]
 
 
-def test_an_unreachable_service_is_news() -> None:
-    observer = Observer()
+def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> None:
+    observer = new_observer()
     observer.observe(snapshot(Board()))
     gone = replace(OFF, service_reachable=False)
-    assert observer.observe(snapshot(Board(), gone)) == ["preview service unreachable"]
-    assert observer.observe(snapshot(Board(), OFF)) == ["preview service connected"]
+    message = "the preview service does not answer: there can be no video"
+
+    def news(preview: PreviewView) -> list[str]:
+        told = observer.observe(snapshot(Board(), preview))
+        return [each for each in told if "preview service" in each]
+
+    assert news(gone) == [f"warning: {message}"]
+    assert news(replace(gone, state=PreviewState.FAULTED)) == [f"error now: {message}"]
+    assert news(OFF) == [f"over: {message}"]

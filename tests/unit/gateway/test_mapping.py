@@ -1,20 +1,23 @@
 """The mapping is total: every state has a value, every field of the contract is set by some snapshot."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import Enum
 from typing import Any
 
 import pytest
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
 from gateway.preview_link import wire
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping import enums
-from gateway.rpc.mapping.status import overlay_snapshot
+from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.server import SERVICE, method_handlers
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import Event
+from gateway.status.faults.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import (
     Codec,
@@ -38,11 +41,19 @@ from gateway.status.values import (
     Received,
     Vision,
 )
-from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
+from omniseer.gateway.v1 import (
+    fault_pb2,
+    overlay_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    states_pb2,
+    system_status_pb2,
+)
 from omniseer.preview.v1 import preview_service_pb2
 
 NOW_S = 1000.0
 CALLER = Caller(robot_host="10.1.2.3", may_watch=True)
+FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "look at it")
 NOT_SERVED = {
     # Declared by the locked contract, implemented with teleoperation and command attribution.
     "omniseer.gateway.v1.SystemStatus.teleop",
@@ -56,6 +67,7 @@ NOT_SERVED = {
         (PreviewState, enums.PREVIEW_STATES, states_pb2.PreviewState),
         (Profile, enums.PROFILES, preview_pb2.PreviewProfile),
         (Codec, enums.CODECS, preview_pb2.VideoCodec),
+        (Severity, enums.SEVERITIES, fault_pb2.FaultSeverity),
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
     ],
 )
@@ -125,8 +137,19 @@ def everything() -> Snapshot:
         board=board,
         preview=preview,
         events=(Event(1, at_s, "something happened"),),
+        faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
     )
+
+
+def merged(items: Any) -> Any:
+    """What any of the items has set."""
+    if not isinstance(items[0], Message):
+        return items[0]
+    whole = type(items[0])()
+    for item in items:
+        whole.MergeFrom(item)
+    return whole
 
 
 def unset(message: Any, descriptor: Descriptor) -> Iterator[str]:
@@ -138,7 +161,7 @@ def unset(message: Any, descriptor: Descriptor) -> Iterator[str]:
             if not value:
                 yield field.full_name
                 continue
-            value = value[0]
+            value = merged(value)
         if field.type == FieldDescriptor.TYPE_MESSAGE:
             if not field.is_repeated and not message.HasField(field.name):
                 yield field.full_name
@@ -166,6 +189,14 @@ def test_the_values_arrive_where_the_contract_has_them() -> None:
     assert status.platform.power.onboard_battery.voltage == 12.0
     assert status.preview.measured.last_frame_age_ms == 12 + 10_000
     assert status.preview.endpoint.uri == "srt://10.1.2.3:7100?mode=caller&latency=125"
+
+
+def test_an_active_fault_has_no_end_and_one_that_is_over_has() -> None:
+    active = replace(everything(), faults=(Fault(FAULT, NOW_S - 4, NOW_S, None, 1),))
+    (message,) = system_status(active, CALLER).faults
+    assert (message.active, message.age_ms, message.HasField("cleared_age_ms")) == (True, 4000, False)
+    _, over = system_status(everything(), CALLER).faults
+    assert (over.active, over.age_ms, over.cleared_age_ms) == (False, 13_000, 10_000)
 
 
 def test_the_passphrase_goes_only_to_those_who_may_watch() -> None:

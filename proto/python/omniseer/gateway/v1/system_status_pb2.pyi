@@ -3,8 +3,11 @@
 isort:skip_file
 """
 
+from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
+from google.protobuf.internal import containers as _containers
+from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
@@ -37,6 +40,7 @@ class SystemStatus(_message.Message):
     PLATFORM_FIELD_NUMBER: _builtins.int
     EFFECTIVE_COMMAND_FIELD_NUMBER: _builtins.int
     INSECURE_FIELD_NUMBER: _builtins.int
+    FAULTS_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -69,6 +73,13 @@ class SystemStatus(_message.Message):
     def effective_command(self) -> Global___EffectiveCommand:
         """The velocity command that the robot is following."""
 
+    @_builtins.property
+    def faults(self) -> _containers.RepeatedCompositeFieldContainer[_fault_pb2.Fault]:
+        """What is wrong: active faults, the worst and then the oldest first (at most 32; when there are
+        more, one of them, "faults.capped", says how many are not listed), then those that are over,
+        the newest first (at most 8). Empty when all is well.
+        """
+
     def __init__(
         self,
         *,
@@ -81,10 +92,11 @@ class SystemStatus(_message.Message):
         platform: _platform_pb2.PlatformStatus | None = ...,
         effective_command: Global___EffectiveCommand | None = ...,
         insecure: _builtins.bool = ...,
+        faults: _abc.Iterable[_fault_pb2.Fault] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

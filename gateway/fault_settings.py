@@ -1,0 +1,67 @@
+"""What counts as a fault: the part of the settings that the robot's owner tunes."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from common.config import Section
+from gateway.status.faults.limits import Limit, PlatformLimits
+
+
+class UpperLimit(Section):
+    """Large values are wrong."""
+
+    raise_at: float
+    clear_at: float
+    """Below `raise_at`, so that a value at the edge is not news again and again."""
+
+    @model_validator(mode="after")
+    def _leave_a_gap(self) -> Self:
+        if self.clear_at >= self.raise_at:
+            raise ValueError(f"clear_at ({self.clear_at:g}) must be below raise_at ({self.raise_at:g})")
+        return self
+
+
+class LowerLimit(Section):
+    """Small values are wrong."""
+
+    raise_at: float
+    clear_at: float
+    """Above `raise_at`, for the same reason."""
+
+    @model_validator(mode="after")
+    def _leave_a_gap(self) -> Self:
+        if self.clear_at <= self.raise_at:
+            raise ValueError(f"clear_at ({self.clear_at:g}) must be above raise_at ({self.raise_at:g})")
+        return self
+
+
+class FaultSettings(Section):
+    """When something is a fault, and how long it is remembered."""
+
+    startup_grace_ms: int = Field(default=5000, ge=0, le=600_000)
+    """How long after the start nothing is missed: a robot's programs take their time."""
+    clear_after_ms: int = Field(default=2000, ge=0, le=600_000)
+    """How long a trouble must stay away before its fault is over."""
+    keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
+    """How long a fault that is over stays in the status."""
+    temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
+    memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)
+    disk_percent: UpperLimit = UpperLimit(raise_at=95, clear_at=93)
+    battery_percent: LowerLimit = LowerLimit(raise_at=20, clear_at=25)
+    """Of the robot's battery and of the computer's."""
+    wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
+
+    def platform_limits(self) -> PlatformLimits:
+        """The limits as the rules take them."""
+        return PlatformLimits(
+            temperature_c=_limit(self.temperature_c),
+            memory_percent=_limit(self.memory_percent),
+            disk_percent=_limit(self.disk_percent),
+            battery_percent=_limit(self.battery_percent),
+            wifi_signal_dbm=_limit(self.wifi_signal_dbm),
+        )
+
+
+def _limit(settings: UpperLimit | LowerLimit) -> Limit:
+    return Limit(settings.raise_at, settings.clear_at)

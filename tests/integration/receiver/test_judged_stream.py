@@ -1,0 +1,57 @@
+"""What the preview service sends, before independent judges."""
+
+from pathlib import Path
+
+import pytest
+
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.judges import complaints, decoded_pictures
+from tests.support.mpegts import analyse
+from tests.support.recording import record
+from tests.support.running_preview import RunningPreview
+
+pytestmark = pytest.mark.gst
+
+SECONDS = 4
+
+
+@pytest.mark.parametrize(
+    ("encoder", "codec", "profile"),
+    [
+        pytest.param(
+            "x264",
+            "h264",
+            pb.PROFILE_LOW_BW,
+            marks=pytest.mark.xfail(
+                reason="the muxer writes clock references with pictures only, here every 67 ms", strict=True
+            ),
+        ),
+        ("x264", "h264", pb.PROFILE_BALANCED),
+        ("x264", "h264", pb.PROFILE_HIGH_QUALITY),
+        ("x265", "h265", pb.PROFILE_BALANCED),
+    ],
+)
+def test_the_judges_have_nothing_to_say(
+    tmp_path: Path, encoder: str, codec: str, profile: "pb.Profile.ValueType"
+) -> None:
+    settings = {"encoders": {"order": [encoder], "key_frame_interval_s": 1}}
+    with RunningPreview(tmp_path, settings) as preview:
+        preview.wish(profile)
+        preview.running()
+        recording = record(preview.port, SECONDS)
+    stream = analyse(recording)
+    assert stream.codec == codec
+    assert stream.counter_gaps == []
+    assert stream.broken_tables == 0
+    assert stream.longest_without_pat_ms <= 100
+    assert stream.longest_without_pmt_ms <= 100
+    assert stream.longest_without_pcr_ms <= 40
+    assert stream.pictures[0].key, "a viewer that joins begins with a key frame"
+    keys = [picture for picture in stream.pictures if picture.key]
+    assert len(keys) >= SECONDS - 1
+    assert all(picture.headed for picture in keys)
+    assert all(picture.sized for picture in stream.pictures)
+    file = tmp_path / "recording.ts"
+    file.write_bytes(recording[: stream.whole_bytes])
+    assert complaints(file) == ""
+    assert decoded_pictures(file) == len(stream.pictures) - 1
