@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.engine import ROOT
 
-pytestmark = [pytest.mark.docker, pytest.mark.usefixtures("engine")]
+pytestmark = pytest.mark.docker
 
 OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo")
 

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -18,22 +19,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-@pytest.fixture(scope="session")
-def engine(request: pytest.FixtureRequest) -> None:
-    """A Docker engine with compose."""
-    trouble = _trouble()
-    if not trouble:
-        # Its reaper is one more image, which can't be had everywhere; every test removes what is its own.
-        os.environ["TESTCONTAINERS_RYUK_DISABLED"] = "true"
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skips what needs Docker where there is none: here, so that all of it makes one line of the summary."""
+    if item.get_closest_marker("docker") is None or not (trouble := _trouble()):
         return
-    if request.config.getoption("--require-docker"):
-        pytest.fail(f"--require-docker: {trouble}")
+    if item.config.getoption("--require-docker"):
+        pytest.fail(f"--require-docker: {trouble}", pytrace=False)
     pytest.skip(f"{trouble}. Type: docker/engine start")
 
 
 @pytest.fixture(scope="session")
-def images(engine: None) -> str:
+def images() -> str:
     """Both images, built from this tree; their tag."""
+    # Its reaper is one more image, which can't be had everywhere; every test removes what is its own.
+    os.environ["TESTCONTAINERS_RYUK_DISABLED"] = "true"
     built = subprocess.run(
         [ROOT / "scripts/images", "build", "--ros", "wheels"],
         env={**os.environ, "TAG": TAG, "COMPOSE_FILE": "compose.yaml"},
@@ -46,7 +46,9 @@ def images(engine: None) -> str:
     return TAG
 
 
+@cache
 def _trouble() -> str:
+    """Why tests can't use Docker; empty when they can."""
     for command in (["docker", "info"], ["docker", "compose", "version"]):
         try:
             asked = subprocess.run(command, capture_output=True, timeout=30, check=False)
