@@ -21,7 +21,7 @@ BITRATE_KBPS = 2500
 GOP_FRAMES = 60
 
 
-def rows(workdir: Path) -> list[Row]:
+def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         port = free_udp_port()
         theirs, ours = [], []
