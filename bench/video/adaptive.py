@@ -47,7 +47,7 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
                 "video.adaptive_limited",
                 f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s: pictures delivered, adaptive against fixed",
                 rate_kbps=LIMIT_KBPS,
-                bar=1.5,
+                bar=5,
             )
         )
     if "video.adaptive_lossy" in wanted:
