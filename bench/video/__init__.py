@@ -4,27 +4,29 @@ Every round measures the reference, then ours, each alone on the machine; the me
 carry the moment of their capture (stamp.py) from before the encoder to behind the decoder.
 """
 
+import importlib
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from bench.rows import Row
-from bench.video import cpu, enabling, latency, switching
 
-_BENCHES: dict[tuple[str, ...], Callable[[Path], list[Row]]] = {
-    ("video.excess_latency_20",): lambda workdir: latency.rows(workdir, 20),
-    ("video.excess_latency_125", "video.first_frame"): lambda workdir: latency.rows(workdir, 125),
-    ("video.enable_to_frame_ms",): enabling.rows,
-    ("video.cpu",): cpu.rows,
-    ("video.switch_gap_ms",): switching.rows,
+_MODULES = {
+    "bench.video.latency": ("video.excess_latency_20", "video.excess_latency_125", "video.first_frame"),
+    "bench.video.enabling": ("video.enable_to_frame_ms",),
+    "bench.video.cpu": ("video.cpu",),
+    "bench.video.switching": ("video.switch_gap_ms",),
+    "bench.video.adaptive": ("video.adaptive_limited", "video.adaptive_lossy"),
 }
+"""Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
 
 def run(names: list[str]) -> list[Row]:
     rows: list[Row] = []
     # The camera's pictures and its shared memory: in RAM where there is a place for it.
-    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as workdir:
-        for offered, bench in _BENCHES.items():
-            if not names or set(names) & set(offered):
-                rows += bench(Path(workdir))
-    return [row for row in rows if not names or row.name in names]
+    in_ram = Path("/dev/shm")
+    with tempfile.TemporaryDirectory(dir=in_ram if in_ram.is_dir() else None) as workdir:
+        for module, offered in _MODULES.items():
+            wanted = {name for name in offered if not names or name in names}
+            if wanted:
+                rows += importlib.import_module(module).rows(Path(workdir), wanted)
+    return rows

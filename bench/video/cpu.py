@@ -3,6 +3,7 @@
 import statistics
 from pathlib import Path
 
+from bench.ports import free_udp_port
 from bench.processes import cpu_share
 from bench.rows import Row
 from bench.video import product, reference
@@ -11,7 +12,6 @@ from bench.video.progress import tell
 from bench.video.viewing import watch
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.settings import vbv_ms
-from tests.support.ports import free_udp_port
 
 ROUNDS = 5
 WINDOW_S = 5.0
@@ -21,7 +21,7 @@ BITRATE_KBPS = 2500
 GOP_FRAMES = 60
 
 
-def rows(workdir: Path) -> list[Row]:
+def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         port = free_udp_port()
         theirs, ours = [], []

@@ -14,7 +14,7 @@ ROUNDS = 7
 LATENCY_MS = 125
 
 
-def rows(workdir: Path) -> list[Row]:
+def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         times_ms = [_once(robot) for _ in range(ROUNDS)]
     return [

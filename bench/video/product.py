@@ -9,13 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.ports import free_tcp_port, free_udp_port
 from bench.video import foreign
 from bench.video.camera import Camera
 from console.client import GatewayClient, PreviewProfile, PreviewState, Unreachable
 from console.receiver.address import StreamAddress
 from console.receiver.receiver import Receiver
-from tests.support.ports import free_udp_port
-from tests.support.running_gateway import free_tcp_port
 
 _UP_WITHIN_S = 20.0
 _PROGRAMS = Path(sys.executable).parent
@@ -52,16 +51,27 @@ class Robot:
 
 
 @contextmanager
-def robot(workdir: Path, source: Camera, latency_ms: int) -> Iterator[Robot]:
-    """Runs both programs until the block ends; their logs go to standard error."""
-    name = f"{latency_ms}-{source.fps}"
+def robot(
+    workdir: Path, source: Camera, latency_ms: int, *, host: str = "127.0.0.1", adaptive: bool = False
+) -> Iterator[Robot]:
+    """Runs both programs until the block ends; their logs go to standard error.
+
+    Args:
+        workdir: for configuration and sockets.
+        source: what they show.
+        latency_ms: of SRT.
+        host: the address that viewers call.
+        adaptive: whether the bit rate follows the link.
+    """
+    name = f"{latency_ms}-{source.fps}-{'adaptive' if adaptive else 'fixed'}"
     socket, udp, tcp = workdir / f"{name}.sock", free_udp_port(), free_tcp_port()
     preview = {
         "socket": str(socket),
         "log_level": "warning",
         "source": {"kind": "gst", "description": source.source},
-        "srt": {"bind": "127.0.0.1", "port": udp, "latency_ms": latency_ms},
+        "srt": {"bind": host, "port": udp, "latency_ms": latency_ms},
         "encoders": {"order": ["x264"]},
+        "adaptive": {"enabled": adaptive},
         "runtime_dir": str(workdir / name),
     }
     gateway = {
@@ -77,7 +87,7 @@ def robot(workdir: Path, source: Camera, latency_ms: int) -> Iterator[Robot]:
     ):
         _wait_until_ready(client)
         # Once on and off: what is tried and remembered at the first start is not what we measure.
-        found = Robot(client, service, StreamAddress("127.0.0.1", udp, latency_ms))
+        found = Robot(client, service, StreamAddress(host, udp, latency_ms))
         with found.preview():
             pass
         yield found

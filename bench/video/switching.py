@@ -18,7 +18,7 @@ LATENCY_MS = 125
 _WAY = (PreviewProfile.LOW_BW, PreviewProfile.HIGH_QUALITY, PreviewProfile.BALANCED)
 
 
-def rows(workdir: Path) -> list[Row]:
+def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir, fps=60) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         longest_ms = [_round(robot) for _ in range(ROUNDS)]
     return [

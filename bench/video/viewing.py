@@ -30,6 +30,8 @@ class Glance:
 
     captured_s: float
     decoded_s: float
+    corrupt: bool = False
+    """Whether the decoder had to guess parts of it."""
 
     @property
     def latency_ms(self) -> float:
@@ -45,7 +47,7 @@ def watch(viewer: Viewer, seconds: float) -> list[Glance]:
         frame = viewer.next_frame(PATIENCE_S)
         captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
         if captured_s is not None:
-            glances.append(Glance(captured_s, frame.arrival_s))
+            glances.append(Glance(captured_s, frame.arrival_s, frame.corrupt))
     return glances
 
 

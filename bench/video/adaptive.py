@@ -1,0 +1,111 @@
+"""HIGH_QUALITY over links that don't carry it: with the bit rate that follows the link, and without."""
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from bench.rows import Row
+from bench.video import product
+from bench.video.bad_link import BadLink, bad_link, possible
+from bench.video.camera import camera
+from bench.video.progress import tell
+from bench.video.viewing import Glance
+from common.errors import UserError
+from console.client import PreviewProfile
+
+FPS = 60
+SETTLE_S = 8.0
+"""For the first fall of the bit rate; the same without."""
+WATCH_S = 20.0
+LATENCY_MS = 125
+LIMIT_KBPS = 1500
+LOSS_PERCENT = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came through a link."""
+
+    delivered_percent: float
+    """Whole pictures decoded, of those the camera took."""
+    freeze_ms: float
+    """Longest time without a whole picture."""
+
+
+def rows(workdir: Path, wanted: set[str]) -> list[Row]:
+    if not possible():
+        raise UserError("video.adaptive_* make networks with bad links", "Run scripts/bench as root for them")
+    found = []
+    if "video.adaptive_limited" in wanted:
+        found.append(
+            _row(
+                workdir,
+                "video.adaptive_limited",
+                f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s: pictures delivered, adaptive against fixed",
+                rate_kbps=LIMIT_KBPS,
+                bar=5,
+            )
+        )
+    if "video.adaptive_lossy" in wanted:
+        found.append(
+            _row(
+                workdir,
+                "video.adaptive_lossy",
+                f"HIGH_QUALITY, {LOSS_PERCENT} % random loss: pictures delivered, adaptive against fixed",
+                loss_percent=LOSS_PERCENT,
+                bar=0.98,
+            )
+        )
+    return found
+
+
+def _row(
+    workdir: Path, name: str, what: str, *, bar: float, rate_kbps: int | None = None, loss_percent: int = 0
+) -> Row:
+    outcomes = {}
+    for adaptive in (False, True):
+        with bad_link(rate_kbps=rate_kbps, loss_percent=loss_percent) as link:
+            outcomes[adaptive] = outcome = _watch_through(workdir, link, adaptive=adaptive)
+        how = "adaptive" if adaptive else "fixed"
+        share, freeze = f"{outcome.delivered_percent:.1f} %", f"{outcome.freeze_ms:.0f} ms"
+        tell(f"{name}, {how}: {share} delivered, longest freeze {freeze}")
+    return Row(
+        name=name,
+        what=what,
+        unit="%",
+        value=outcomes[True].delivered_percent,
+        reference=outcomes[False].delivered_percent,
+        bar=bar,
+        better="higher",
+    )
+
+
+def _watch_through(workdir: Path, link: BadLink, *, adaptive: bool) -> Outcome:
+    with (
+        camera(workdir, FPS) as source,
+        product.robot(workdir, source, LATENCY_MS, host=link.robot, adaptive=adaptive) as robot,
+        robot.preview(PreviewProfile.HIGH_QUALITY),
+    ):
+        where = (link.robot, str(robot.address.port), str(LATENCY_MS))
+        command = [*link.enter, sys.executable, "-m", "bench.video.far_viewer", *where]
+        begun_s = time.monotonic()
+        seconds = SETTLE_S + WATCH_S
+        report = subprocess.run(
+            [*command, str(seconds)], stdout=subprocess.PIPE, check=True, timeout=seconds + 30
+        ).stdout
+        preview = robot.client.status().preview
+        tell(f"target at the end: {preview.target_bitrate_kbps} kbit/s {preview.bitrate_reason}")
+    return _judge([Glance(*one) for one in json.loads(report)], begun_s + SETTLE_S)
+
+
+def _judge(seen: list[Glance], from_s: float) -> Outcome:
+    """Over `WATCH_S` from `from_s` on."""
+    until_s = from_s + WATCH_S
+    whole = [one for one in seen if not one.corrupt and from_s <= one.decoded_s < until_s]
+    moments_s = [from_s, *(one.decoded_s for one in whole), until_s]
+    freeze_s = max(later - earlier for earlier, later in pairwise(moments_s))
+    return Outcome(100 * len({one.captured_s for one in whole}) / (FPS * WATCH_S), freeze_s * 1000)
