@@ -67,13 +67,6 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-gateway --help > /dev/null
 
 FROM system
-ARG VERSION=0.0.0
-ARG REVISION=unknown
-LABEL org.opencontainers.image.title="robot-gateway" \
-      org.opencontainers.image.description="One typed door between a ROS 2 robot and its operator" \
-      org.opencontainers.image.licenses="Apache-2.0" \
-      org.opencontainers.image.version="${VERSION}" \
-      org.opencontainers.image.revision="${REVISION}"
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
@@ -87,3 +80,11 @@ HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-m", "common.healthcheck"]
 ENTRYPOINT ["tini", "--"]
 CMD ["robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]
+# Last, because they change with every commit and nothing above does.
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-gateway" \
+      org.opencontainers.image.description="One typed door between a ROS 2 robot and its operator" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"

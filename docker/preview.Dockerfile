@@ -39,13 +39,6 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-preview --help > /dev/null
 
 FROM system
-ARG VERSION=0.0.0
-ARG REVISION=unknown
-LABEL org.opencontainers.image.title="robot-preview" \
-      org.opencontainers.image.description="Live video of a robot, on demand over SRT" \
-      org.opencontainers.image.licenses="Apache-2.0" \
-      org.opencontainers.image.version="${VERSION}" \
-      org.opencontainers.image.revision="${REVISION}"
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # The registry is made anew by every container: one made where the encoder's device was missing keeps hiding it.
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
@@ -60,3 +53,11 @@ HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-m", "common.healthcheck"]
 ENTRYPOINT ["tini", "--"]
 CMD ["robot-preview", "serve", "--config", "/etc/robot-gateway/preview.yaml"]
+# Last, because they change with every commit and nothing above does.
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-preview" \
+      org.opencontainers.image.description="Live video of a robot, on demand over SRT" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"
