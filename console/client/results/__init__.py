@@ -5,6 +5,7 @@ this client and said something this client has no word for.
 """
 
 from console.client.results.fault import Fault, FaultSeverity
+from console.client.results.info import GatewayFacts, GatewayInfo, MethodCounts
 from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
@@ -44,8 +45,11 @@ __all__ = [
     "Fault",
     "FaultSeverity",
     "Freshness",
+    "GatewayFacts",
+    "GatewayInfo",
     "Health",
     "HealthState",
+    "MethodCounts",
     "Network",
     "Odometry",
     "OperatorEvent",

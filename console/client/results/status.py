@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from console.client.results.fault import Fault
+from console.client.results.info import GatewayFacts
 from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
 from console.client.results.sample import Sample
@@ -112,3 +113,4 @@ class SystemStatus:
     teleop: Teleop
     faults: tuple[Fault, ...]
     """What is wrong, the worst first; then what was wrong a moment ago, the newest first."""
+    gateway: GatewayFacts

@@ -12,6 +12,7 @@ from console.client.mapping.methods import METHODS, SET_PREVIEW_MODE, PreviewWis
 from console.client.results import PreviewProfile
 from omniseer.gateway.v1 import (
     fault_pb2,
+    gateway_info_pb2,
     overlay_pb2,
     platform_pb2,
     preview_pb2,
@@ -20,7 +21,16 @@ from omniseer.gateway.v1 import (
     system_status_pb2,
 )
 
-FILES = (fault_pb2, overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2)
+FILES = (
+    fault_pb2,
+    gateway_info_pb2,
+    overlay_pb2,
+    platform_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    states_pb2,
+    system_status_pb2,
+)
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
 DECODERS = {method.name: method.decode for method in METHODS}
 

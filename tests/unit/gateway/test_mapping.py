@@ -13,8 +13,10 @@ from common.errors import InvalidRequestError
 from gateway.preview_link import wire
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping import enums
+from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.server import SERVICE, method_handlers
+from gateway.rpc.tally import Counts, Tally
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import Event
 from gateway.status.faults.fault import Condition, Fault, Severity
@@ -30,6 +32,7 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
+from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 from gateway.status.values import (
     Battery,
@@ -101,6 +104,8 @@ def test_every_method_of_the_contract_has_a_handler() -> None:
 
 
 class _AnyGateway:
+    tally = Tally()
+
     def __getattr__(self, name: str) -> object:
         return name
 
@@ -137,6 +142,7 @@ def everything() -> Snapshot:
         board=board,
         preview=preview,
         events=(Event(1, at_s, "something happened"),),
+        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2),
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
     )
@@ -177,6 +183,11 @@ def test_a_full_snapshot_sets_every_field_of_the_contract() -> None:
     assert {field.full_name for field in system_status_pb2.SystemStatus.DESCRIPTOR.fields} >= NOT_SERVED, (
         "the list of exceptions names fields that don't exist"
     )
+
+
+def test_the_info_sets_every_field_of_its_answer() -> None:
+    info = gateway_info(everything(), {"GetSystemStatus": Counts(3, 2, 1)}, 1_700_000_000_000, "{}")
+    assert not list(unset(info, robot_gateway_pb2.GetGatewayInfoResponse.DESCRIPTOR))
 
 
 def test_the_values_arrive_where_the_contract_has_them() -> None:
