@@ -11,7 +11,7 @@ from gateway.status.freshness import Freshness, Sample, sample
 from gateway.status.health import Health, assess
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.runtime import UNKNOWN, Runtime
-from gateway.status.sources import SourceView, state_of
+from gateway.status.sources import SourceView, sentence, state_of
 from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Vision
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
@@ -114,13 +114,13 @@ def take(
 def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
     for kind, rule in rules.sources.items():
         freshness = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
-        unusable = board.unusable.get(kind)
+        state, words = state_of(freshness, board.unusable.get(kind)), kind.value.replace("_", " ")
         yield SourceView(
             kind=kind,
             name=kind.value,
-            words=kind.value.replace("_", " "),
-            state=state_of(freshness, unusable),
+            words=words,
+            state=state,
             freshness=freshness,
             required=rule.required,
-            detail=unusable or "",
+            detail=sentence(state, words),
         )

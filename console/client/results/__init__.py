@@ -23,6 +23,7 @@ from console.client.results.preview import (
     VideoFormat,
 )
 from console.client.results.sample import Freshness, Sample
+from console.client.results.source import Source, SourceState
 from console.client.results.status import (
     EffectiveCommand,
     Health,
@@ -63,6 +64,8 @@ __all__ = [
     "PreviewState",
     "PreviewStatus",
     "Sample",
+    "Source",
+    "SourceState",
     "StreamContainer",
     "StreamEndpoint",
     "StreamTransport",

@@ -17,11 +17,13 @@ from omniseer.gateway.v1 import (
     platform_pb2,
     preview_pb2,
     robot_gateway_pb2,
+    source_pb2,
     states_pb2,
     system_status_pb2,
 )
 
 FILES = (
+    source_pb2,
     fault_pb2,
     gateway_info_pb2,
     overlay_pb2,
@@ -36,6 +38,7 @@ DECODERS = {method.name: method.decode for method in METHODS}
 
 ENUM_MAPPINGS = {
     "PreviewState": enums.preview_state,
+    "SourceState": enums.source_state,
     "FaultSeverity": enums.fault_severity,
     "RobotHealthState": enums.health_state,
     "TeleopState": enums.teleop_state,

@@ -34,6 +34,7 @@ from gateway.status.preview import (
 )
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import SourceState
 from gateway.status.values import (
     Battery,
     Compute,
@@ -49,6 +50,7 @@ from omniseer.gateway.v1 import (
     overlay_pb2,
     preview_pb2,
     robot_gateway_pb2,
+    source_pb2,
     states_pb2,
     system_status_pb2,
 )
@@ -70,6 +72,7 @@ NOT_SERVED = {
         (PreviewState, enums.PREVIEW_STATES, states_pb2.PreviewState),
         (Profile, enums.PROFILES, preview_pb2.PreviewProfile),
         (Codec, enums.CODECS, preview_pb2.VideoCodec),
+        (SourceState, enums.SOURCE_STATES, source_pb2.SourceState),
         (Severity, enums.SEVERITIES, fault_pb2.FaultSeverity),
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
     ],
@@ -138,7 +141,9 @@ def everything() -> Snapshot:
     )
     return take(
         identity=Identity("lab", "1.2.3", insecure=True),
-        rules=Rules({kind: SourceRule(1000, required=False) for kind in SourceKind}, 3000),
+        rules=Rules(
+            {kind: SourceRule(1000, required=kind is SourceKind.BATTERY) for kind in SourceKind}, 3000
+        ),
         board=board,
         preview=preview,
         events=(Event(1, at_s, "something happened"),),
