@@ -3,14 +3,12 @@
 import argparse
 import importlib
 import json
-import platform
 import sys
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
 
-from bench.rows import Row
+from bench import report
 
 # Each module has `run(names) -> list[Row]`; `names` are the rows asked for, empty for the whole group.
 GROUPS = {
@@ -19,6 +17,7 @@ GROUPS = {
     "idle": "bench.idle",
     "video": "bench.video",
 }
+_PIPE_WIDTH = 200
 
 
 def main() -> int:
@@ -28,6 +27,7 @@ def main() -> int:
         "names", nargs="*", metavar="NAME", help=f"a row or a group ({', '.join(GROUPS)}); all by default"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here, too")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write them as a page, too")
     arguments = parser.parse_args()
 
     wanted: dict[str, list[str]] = {}
@@ -42,28 +42,15 @@ def main() -> int:
     rows = [
         row for group, names in wanted.items() for row in importlib.import_module(GROUPS[group]).run(names)
     ]
-    Console().print(_table(rows))
+    # In a pipe nobody knows the width of the screen; a table folded to 80 columns can't be read.
+    Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH).print(report.table(rows))
     if arguments.json:
-        machine = {
-            "machine": platform.machine(),
-            "system": platform.platform(),
-            "python": platform.python_version(),
-        }
-        text = json.dumps({"on": machine, "rows": [row.as_json() for row in rows]}, indent=2)
+        text = json.dumps({"on": report.machine(), "rows": [row.as_json() for row in rows]}, indent=2)
         arguments.json.write_text(text + "\n", encoding="utf-8")
+    if arguments.markdown:
+        command = " ".join(("scripts/bench", *arguments.names))
+        arguments.markdown.write_text(report.page(rows, command), encoding="utf-8")
     return 0 if all(row.ok for row in rows) else 1
-
-
-def _table(rows: list[Row]) -> Table:
-    table = Table("name", "what", "value", "reference", "ratio", "bar", "ok")
-    for row in rows:
-        reference = "" if row.reference is None else f"{row.reference:.4g} {row.unit}"
-        ratio = "" if row.ratio is None else f"{row.ratio:.3f}"
-        sign = "<=" if row.better == "lower" else ">="
-        bar = f"{sign} {row.bar:g} {row.unit if row.ratio is None else 'x'}"
-        value = f"{row.value:.4g} {row.unit}"
-        table.add_row(row.name, row.what, value, reference, ratio, bar, "yes" if row.ok else "NO")
-    return table
 
 
 if __name__ == "__main__":

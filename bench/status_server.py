@@ -21,8 +21,10 @@ from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.server import SERVICE, method_handlers
 from gateway.rpc.servicer import RobotGateway
+from gateway.rpc.tally import Tally
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import EventLog
+from gateway.status.faults.fault import Condition, Fault, Severity
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -33,10 +35,13 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
+from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 from gateway.status.values import Battery, Compute, Network, Odometry, Received, Vision
 
 EMPTY_METHOD = "/bench.Reference/Empty"
+_TOO_HOT = Condition("platform.temperature", Severity.WARNING, "computer", "it is too hot", "let it cool")
+FAULTS = (Fault(_TOO_HOT, onset_s=0.0, seen_s=1.0, cleared_s=None, times_raised=1),) * 5
 _NEWS_EVERY_S = 0.05
 """The gateway reads its sources 20 times a second."""
 
@@ -47,7 +52,7 @@ def main() -> None:
 
 async def _serve() -> None:
     board, events = Board(), EventLog()
-    reconciler = Reconciler(1)
+    reconciler, tally = Reconciler(1), Tally()
     link = PreviewLink(Path("/nonexistent"), reconciler)
     for number in range(8):
         events.add(f"odometry received, for the {number}th time", time.monotonic())
@@ -59,6 +64,8 @@ async def _serve() -> None:
             board=board,
             preview=link.view,
             events=events.newest(),
+            faults=FAULTS,
+            gateway=Runtime("a" * 40, "b" * 36, 1, tally.client_count(), tally.served, tally.refused),
             now_s=time.monotonic(),
         )
 
@@ -67,6 +74,8 @@ async def _serve() -> None:
         Answers(snapshot, lambda: link.view, time.monotonic),
         PreviewControl(link, 1.0),
         Callers(None),
+        tally=tally,
+        configuration_json="{}",
     )
     server = new_server()
     server.add_generic_rpc_handlers(

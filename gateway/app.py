@@ -4,15 +4,14 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Final
 
 from common.health import Health
-from common.version import project_version
 from gateway.config import GatewaySettings, SourceSettings
-from gateway.fault_settings import FaultSettings
+from gateway.knowledge import Knowledge
 from gateway.platform.sampler import PlatformSampler
 from gateway.preview_link.control import PreviewControl
 from gateway.preview_link.link import PreviewLink
@@ -21,13 +20,10 @@ from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.server import SERVICE, serving
 from gateway.rpc.servicer import RobotGateway
+from gateway.rpc.tally import Tally
+from gateway.shown_settings import shown_settings
 from gateway.status.board import Board
-from gateway.status.events import EventLog
-from gateway.status.faults.book import FaultBook
-from gateway.status.faults.rules import FaultRules
-from gateway.status.observer import Observer
 from gateway.status.preview import PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 
 _log = logging.getLogger(__name__)
 
@@ -47,18 +43,18 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     """
     if settings.security.insecure:
         _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
-    board, events = Board(), EventLog()
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
-    book = FaultBook(settings.faults.clear_after_ms / 1000, settings.faults.keep_cleared_ms / 1000)
-    snapshot = _snapshots(settings, board, events, link, book)
-    observer = Observer(book, _fault_rules(settings.faults))
+    tally = Tally()
+    knowledge = Knowledge(settings, lambda: link.view, tally)
     gateway = RobotGateway(
-        snapshot,
-        Answers(snapshot, lambda: link.view, time.monotonic),
+        knowledge.snapshot,
+        Answers(knowledge.snapshot, lambda: link.view, time.monotonic),
         PreviewControl(link, settings.preview.settle_ms / 1000),
         Callers(settings.preview.advertised_host),
+        tally=tally,
+        configuration_json=shown_settings(settings),
     )
-    health = Health(SERVICE)
+    board, health = knowledge.board, Health(SERVICE)
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
         async with (
             serving(gateway, settings.grpc.host, settings.grpc.port, health),
@@ -66,7 +62,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(snapshot, events, link, observer), name="observer"),
+                timers.create_task(_observe(knowledge, link), name="observer"),
                 timers.create_task(_tell_health(link, health), name="health"),
             ]
             await stop.wait()
@@ -85,31 +81,6 @@ def _new_passphrase() -> str:
     return secrets.token_urlsafe(_PASSPHRASE_BYTES)
 
 
-def _snapshots(
-    settings: GatewaySettings, board: Board, events: EventLog, link: PreviewLink, book: FaultBook
-) -> Callable[[], Snapshot]:
-    identity = Identity(settings.name, project_version(), settings.security.insecure)
-    rules = Rules(
-        sources={
-            source.kind: SourceRule(source.stale_after_ms, source.required) for source in settings.sources
-        },
-        platform_stale_after_ms=settings.platform.stale_after_ms,
-    )
-    return lambda: take(
-        identity=identity,
-        rules=rules,
-        board=board,
-        preview=link.view,
-        events=events.newest(),
-        faults=book.faults,
-        now_s=time.monotonic(),
-    )
-
-
-def _fault_rules(settings: FaultSettings) -> FaultRules:
-    return FaultRules(settings.platform_limits(), settings.startup_grace_ms / 1000)
-
-
 @contextmanager
 def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[None]:
     """Reads ROS while the block lasts. A gateway without sources needs no ROS at all."""
@@ -124,15 +95,12 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
-async def _observe(
-    snapshot: Callable[[], Snapshot], events: EventLog, link: PreviewLink, observer: Observer
-) -> None:
+async def _observe(knowledge: Knowledge, link: PreviewLink) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     while True:
-        now = snapshot()
-        for message in observer.observe(now):
+        now = knowledge.snapshot()
+        for message in knowledge.observe(now):
             _log.info("event: %s", message)
-            events.add(message, now.at_s)
         await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
 
 

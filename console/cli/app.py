@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from common.version import project_version
+from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
 from console.cli.options import JsonOption, TargetOption, remember, session_of
 from console.cli.preview import preview_app
@@ -70,6 +71,18 @@ def overlay(context: typer.Context, target: TargetOption = None, as_json: JsonOp
         session.print_json(json_form(snapshot))
     else:
         session.out.print(overlay_view(snapshot, robot.target))
+
+
+@app.command()
+def info(context: typer.Context, target: TargetOption = None, as_json: JsonOption = False) -> None:
+    """Show the gateway program: its build, its calls, its configuration."""
+    session = session_of(context, target, as_json)
+    with session.connect() as robot:
+        answer = robot.info()
+    if session.as_json:
+        session.print_json(info_json(answer))
+    else:
+        session.out.print(info_view(answer, robot.target))
 
 
 @app.command()

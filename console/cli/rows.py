@@ -12,12 +12,14 @@ from console.client.results import (
     Fault,
     FaultSeverity,
     Freshness,
+    GatewayFacts,
     HealthState,
     Network,
     Odometry,
     PreviewState,
     PreviewStatus,
     Sample,
+    SourceState,
     SystemStatus,
     Teleop,
     TeleopState,
@@ -98,6 +100,8 @@ def status_rows(status: SystemStatus) -> list[Row]:
         _sampled("command", status.effective_command, _command(status.effective_command)),
     )
     rows += [row for row in optional if row.text]
+    rows += _source_rows(status)
+    rows += _gateway_rows(status.gateway)
     return rows + list(_teleop_rows(status.teleop))
 
 
@@ -218,6 +222,28 @@ def _command(command: EffectiveCommand) -> str:
         f"left {signed(command.vy_mps)} m/s",
         f"turning {signed(command.wz_rad_s)} rad/s",
     )
+
+
+def _source_rows(status: SystemStatus) -> Iterator[Row]:
+    told = {fault.message for fault in status.faults if fault.active}
+    for source in status.sources:
+        # What comes has a line of its own, and what is a fault has one, too.
+        if source.state is not SourceState.RECEIVING and source.detail not in told:
+            mark = source.state.value.replace("_", " ")
+            yield Row("source", mark, Tone.QUIET, source.detail or source.name, age(source.age_ms))
+
+
+def _gateway_rows(gateway: GatewayFacts) -> Iterator[Row]:
+    # A gateway that does not say how long it has been running says nothing of itself.
+    if gateway.uptime_ms is None:
+        return
+    text = joined(
+        plural(gateway.client_count, "client"),
+        plural(gateway.requests_served, "answer"),
+        plural(gateway.requests_refused, "refusal") if gateway.requests_refused else "",
+        f"revision {gateway.revision[:12]}" if gateway.revision else "",
+    )
+    yield Row("gateway", "up", Tone.QUIET, text, age(gateway.uptime_ms))
 
 
 def _teleop_rows(teleop: Teleop) -> Iterator[Row]:

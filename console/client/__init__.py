@@ -26,6 +26,7 @@ from console.client.errors import (
 )
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
+    GatewayInfo,
     OverlaySnapshot,
     PreviewChange,
     PreviewProfile,
@@ -45,6 +46,7 @@ __all__ = [
     "GatewayClient",
     "GatewayError",
     "GatewayFailed",
+    "GatewayInfo",
     "InvalidRequest",
     "NotAllowed",
     "OverlaySnapshot",

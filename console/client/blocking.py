@@ -11,7 +11,7 @@ from console.client.errors import Cancelled, GatewayError
 from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
 from console.client.mapping.methods import METHODS, PreviewWish
 from console.client.options import ClientOptions
-from console.client.results import OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from console.client.results import GatewayInfo, OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
 from console.client.target import DEFAULT_TARGET, parse_target
 
 ResultT = TypeVar("ResultT")
@@ -61,6 +61,10 @@ class GatewayClient:
     def overlay(self) -> OverlaySnapshot:
         """Status, detections and the newest events, at one instant."""
         return self._run(self._exchanges.overlay())
+
+    def info(self) -> GatewayInfo:
+        """What is known of the gateway program: its build, its calls, its configuration."""
+        return self._run(self._exchanges.info())
 
     def enable_preview(
         self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0

@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 from console.client.errors import GatewayError, Unreachable
 from console.client.mapping.methods import (
+    GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
     SET_PREVIEW_MODE,
@@ -20,6 +21,7 @@ from console.client.mapping.methods import (
 )
 from console.client.options import ClientOptions
 from console.client.results import (
+    GatewayInfo,
     OverlaySnapshot,
     PreviewChange,
     PreviewProfile,
@@ -90,6 +92,10 @@ class Exchanges:
     def overlay(self) -> Exchange[OverlaySnapshot]:
         """One look at what a screen draws over the picture."""
         return self.ask(GET_OVERLAY_SNAPSHOT, None, self._options.answer_within_s)
+
+    def info(self) -> Exchange[GatewayInfo]:
+        """One look at the gateway program."""
+        return self.ask(GET_GATEWAY_INFO, None, self._options.answer_within_s)
 
     def set_preview(self, wish: PreviewWish, settle_within_s: float) -> Exchange[PreviewChange]:
         """Tells the wish; then watches until it is fulfilled or known to have failed, or time is up."""

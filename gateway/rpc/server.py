@@ -1,9 +1,9 @@
 """The operator's server: every method of the contract, bound and started."""
 
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from typing import Final
 
 import grpc
 from google.protobuf.message import Message
@@ -12,8 +12,10 @@ from common.health import Health
 from common.listen import bind_tcp, bracketed
 from common.rpc import STOP_GRACE_S, Handler, new_server
 from gateway.rpc.servicer import RobotGateway
+from gateway.rpc.tally import Behavior
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     DESCRIPTOR,
+    GetGatewayInfoRequest,
     GetOverlaySnapshotRequest,
     GetSystemStatusRequest,
     SetPreviewModeRequest,
@@ -25,11 +27,16 @@ SERVICE: Final = DESCRIPTOR.services_by_name["RobotGateway"].full_name
 
 
 def method_handlers(gateway: RobotGateway) -> dict[str, Handler]:
-    """The contract's method names and who answers them. Total: a test compares with the schema."""
+    """The contract's method names and who answers them, counted. Total: a test compares with the schema."""
+    methods: dict[str, tuple[Behavior, type[Message]]] = {
+        "GetSystemStatus": (gateway.get_system_status, GetSystemStatusRequest),
+        "GetOverlaySnapshot": (gateway.get_overlay_snapshot, GetOverlaySnapshotRequest),
+        "SetPreviewMode": (gateway.set_preview_mode, SetPreviewModeRequest),
+        "GetGatewayInfo": (gateway.get_gateway_info, GetGatewayInfoRequest),
+    }
     return {
-        "GetSystemStatus": _unary(gateway.get_system_status, GetSystemStatusRequest),
-        "GetOverlaySnapshot": _unary(gateway.get_overlay_snapshot, GetOverlaySnapshotRequest),
-        "SetPreviewMode": _unary(gateway.set_preview_mode, SetPreviewModeRequest),
+        name: _unary(gateway.tally.counted(name, behavior), request)
+        for name, (behavior, request) in methods.items()
     }
 
 
@@ -65,6 +72,6 @@ async def serving(
         await server.stop(STOP_GRACE_S)
 
 
-def _unary(behavior: Callable[[Any, Any], Awaitable[bytes]], request: type[Message]) -> Handler:
+def _unary(behavior: Behavior, request: type[Message]) -> Handler:
     """A handler whose replies are bytes already."""
     return grpc.unary_unary_rpc_method_handler(behavior, request.FromString, None)

@@ -10,7 +10,8 @@ from gateway.status.faults.fault import Fault
 from gateway.status.freshness import Freshness, Sample, sample
 from gateway.status.health import Health, assess
 from gateway.status.preview import Measurement, PreviewView
-from gateway.status.sources import SourceView, state_of
+from gateway.status.runtime import UNKNOWN, Runtime
+from gateway.status.sources import SourceView, sentence, state_of
 from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Vision
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
@@ -57,6 +58,7 @@ class Snapshot:
 
     at_s: float
     identity: Identity
+    gateway: Runtime
     health: Health
     odometry: Sample[Odometry]
     vision: Sample[Vision]
@@ -81,6 +83,7 @@ def take(
     events: tuple[Event, ...],
     now_s: float,
     faults: tuple[Fault, ...] = (),
+    gateway: Runtime = UNKNOWN,
 ) -> Snapshot:
     """What is true at `now_s`, from the newest values alone."""
     odometry = sample(board.odometry, rules.stale_after_ms(SourceKind.ODOMETRY), now_s)
@@ -88,6 +91,7 @@ def take(
     return Snapshot(
         at_s=now_s,
         identity=identity,
+        gateway=gateway,
         health=assess(
             rules.if_required(SourceKind.ODOMETRY, odometry.freshness),
             rules.if_required(SourceKind.VISION, vision.freshness),
@@ -110,13 +114,13 @@ def take(
 def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
     for kind, rule in rules.sources.items():
         freshness = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
-        unusable = board.unusable.get(kind)
+        state, words = state_of(freshness, board.unusable.get(kind)), kind.value.replace("_", " ")
         yield SourceView(
             kind=kind,
             name=kind.value,
-            words=kind.value.replace("_", " "),
-            state=state_of(freshness, unusable),
+            words=words,
+            state=state,
             freshness=freshness,
             required=rule.required,
-            detail=unusable or "",
+            detail=sentence(state, words),
         )

@@ -1,7 +1,9 @@
-"""Every configured source as operators see it: what it tells, and whether and why it does not."""
+"""Every configured source as operators see it: whether it comes, and if not, why not."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from gateway.status.board import SourceKind
 from gateway.status.freshness import Freshness
@@ -30,9 +32,9 @@ class SourceView:
     """One configured source at one instant.
 
     Attributes:
-        name: short and stable, for programs: "odometry", "mux_input.keyboard".
+        name: short and stable, for programs: "odometry".
         words: the same for people.
-        detail: what is known beyond the state, for a person; empty when there is nothing more to say.
+        detail: the state in a sentence; empty while all is well.
     """
 
     kind: SourceKind
@@ -42,6 +44,23 @@ class SourceView:
     freshness: Freshness
     required: bool
     detail: str
+
+
+_SENTENCES: Final[Mapping[SourceState, str]] = {
+    SourceState.WAITING: "no {words} since the gateway started, and nobody on the robot offers it",
+    SourceState.SILENT: "the robot offers {words}, but nothing has arrived",
+    SourceState.RECEIVING: "",
+    SourceState.STALE: "{words} stopped coming",
+    SourceState.QOS_MISMATCH: "the robot offers {words} with delivery guarantees that exclude the gateway's",
+    SourceState.WRONG_TYPE: "the robot offers {words} in another form than the gateway is configured for",
+    SourceState.TYPE_MISSING: "{words} can't be read: its message type is not installed beside the gateway",
+}
+"""Total: every state in a sentence, free of the robot's own names."""
+
+
+def sentence(state: SourceState, words: str) -> str:
+    """The state of the source that operators call `words`; empty while all is well."""
+    return _SENTENCES[state].format(words=words)
 
 
 def state_of(freshness: Freshness, unusable: str | None) -> SourceState:

@@ -51,6 +51,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     Attributes:
         status: the answer to GetSystemStatus; also part of GetOverlaySnapshot.
         overlay: detections and events of the answer to GetOverlaySnapshot.
+        info: the answer to GetGatewayInfo.
         failures: (code, details) pairs; each call takes one and fails with it, until none is left.
         preview_becomes: states of the preview after an enable, one per later look at the status.
         hold: while cleared, calls wait (at most 20 s) before they are answered.
@@ -61,6 +62,9 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     def __init__(self) -> None:
         self.status = healthy_status()
         self.overlay = overlay_pb2.OverlaySnapshot()
+        self.info = robot_gateway_pb2.GetGatewayInfoResponse(
+            gateway_name="lab-1", gateway_version="1.2.3", configuration_json='{"name": "lab-1"}'
+        )
         self.failures: deque[tuple[grpc.StatusCode, str]] = deque()
         self.preview_becomes: deque[int] = deque()
         self.fault = "no encoder works. Type: robot-preview encoders"
@@ -79,6 +83,12 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self._begin("GetOverlaySnapshot", context)
         self.overlay.status.CopyFrom(self.status)
         return self.overlay
+
+    def GetGatewayInfo(  # noqa: N802
+        self, request: Any, context: Any
+    ) -> robot_gateway_pb2.GetGatewayInfoResponse:
+        self._begin("GetGatewayInfo", context)
+        return self.info
 
     def SetPreviewMode(  # noqa: N802
         self, request: robot_gateway_pb2.SetPreviewModeRequest, context: Any

@@ -8,6 +8,7 @@ from console.client.results import (
     HealthState,
     PreviewProfile,
     PreviewState,
+    SourceState,
     StreamContainer,
     StreamTransport,
     TeleopState,
@@ -15,6 +16,7 @@ from console.client.results import (
 )
 from omniseer.gateway.v1 import fault_pb2 as faults
 from omniseer.gateway.v1 import preview_pb2 as preview
+from omniseer.gateway.v1 import source_pb2 as sources
 from omniseer.gateway.v1 import states_pb2 as states
 
 _PREVIEW_STATES: Final[Mapping[int, PreviewState]] = {
@@ -53,6 +55,16 @@ _SEVERITIES: Final[Mapping[int, FaultSeverity]] = {
     faults.FAULT_SEVERITY_INFO: FaultSeverity.INFO,
     faults.FAULT_SEVERITY_WARNING: FaultSeverity.WARNING,
     faults.FAULT_SEVERITY_ERROR: FaultSeverity.ERROR,
+}
+_SOURCE_STATES: Final[Mapping[int, SourceState]] = {
+    sources.SOURCE_STATE_UNSPECIFIED: SourceState.UNKNOWN,
+    sources.SOURCE_STATE_WAITING: SourceState.WAITING,
+    sources.SOURCE_STATE_SILENT: SourceState.SILENT,
+    sources.SOURCE_STATE_RECEIVING: SourceState.RECEIVING,
+    sources.SOURCE_STATE_STALE: SourceState.STALE,
+    sources.SOURCE_STATE_QOS_MISMATCH: SourceState.QOS_MISMATCH,
+    sources.SOURCE_STATE_WRONG_TYPE: SourceState.WRONG_TYPE,
+    sources.SOURCE_STATE_TYPE_MISSING: SourceState.TYPE_MISSING,
 }
 # Both directions are needed: answers carry a profile, and so do requests.
 _PROFILE_NUMBERS: Final[Mapping[PreviewProfile, preview.PreviewProfile.ValueType]] = {
@@ -97,6 +109,11 @@ def stream_container(number: int) -> StreamContainer:
 def fault_severity(number: int) -> FaultSeverity:
     """How much a fault matters."""
     return _SEVERITIES.get(number, FaultSeverity.UNKNOWN)
+
+
+def source_state(number: int) -> SourceState:
+    """What is known of a source."""
+    return _SOURCE_STATES.get(number, SourceState.UNKNOWN)
 
 
 def preview_profile(number: int) -> PreviewProfile:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 from console.client.mapping.enums import profile_number
+from console.client.mapping.info import gateway_info
 from console.client.mapping.overlay import overlay_snapshot
 from console.client.mapping.preview import preview
 from console.client.mapping.status import system_status
-from console.client.results import OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from console.client.results import GatewayInfo, OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
 from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2, system_status_pb2
 
 _SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
@@ -59,6 +60,10 @@ def _encode_overlay_request(_: None) -> bytes:
     return robot_gateway_pb2.GetOverlaySnapshotRequest().SerializeToString()
 
 
+def _encode_info_request(_: None) -> bytes:
+    return robot_gateway_pb2.GetGatewayInfoRequest().SerializeToString()
+
+
 def _encode_preview_wish(wish: PreviewWish) -> bytes:
     request = robot_gateway_pb2.SetPreviewModeRequest(
         enabled=wish.enabled, profile=profile_number(wish.profile)
@@ -72,6 +77,10 @@ def _decode_status(data: bytes) -> SystemStatus:
 
 def _decode_overlay(data: bytes) -> OverlaySnapshot:
     return overlay_snapshot(overlay_pb2.OverlaySnapshot.FromString(data))
+
+
+def _decode_info(data: bytes) -> GatewayInfo:
+    return gateway_info(robot_gateway_pb2.GetGatewayInfoResponse.FromString(data))
 
 
 def _decode_preview_change(data: bytes) -> PreviewChange:
@@ -89,5 +98,8 @@ SET_PREVIEW_MODE: Final[Method[PreviewWish, PreviewChange]] = Method(
 GET_OVERLAY_SNAPSHOT: Final[Method[None, OverlaySnapshot]] = Method(
     "GetOverlaySnapshot", _encode_overlay_request, _decode_overlay, idempotent=True
 )
-METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT)
+GET_GATEWAY_INFO: Final[Method[None, GatewayInfo]] = Method(
+    "GetGatewayInfo", _encode_info_request, _decode_info, idempotent=True
+)
+METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT, GET_GATEWAY_INFO)
 """Every method of the contract (a test compares with the schema)."""

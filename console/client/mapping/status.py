@@ -2,9 +2,11 @@
 
 from console.client.mapping import enums
 from console.client.mapping.faults import fault
+from console.client.mapping.info import gateway_facts
 from console.client.mapping.known import number, number_when, when
 from console.client.mapping.platform import platform
 from console.client.mapping.preview import preview
+from console.client.mapping.sources import source
 from console.client.results import (
     EffectiveCommand,
     Health,
@@ -31,6 +33,8 @@ def system_status(message: wire.SystemStatus) -> SystemStatus:
         effective_command=_effective_command(message.effective_command),
         teleop=_teleop(message.teleop),
         faults=tuple(fault(each) for each in message.faults),
+        sources=tuple(source(each) for each in message.sources),
+        gateway=gateway_facts(message.gateway, told=message.HasField("gateway")),
     )
 
 

@@ -5,6 +5,7 @@ this client and said something this client has no word for.
 """
 
 from console.client.results.fault import Fault, FaultSeverity
+from console.client.results.info import GatewayFacts, GatewayInfo, MethodCounts
 from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
@@ -22,6 +23,7 @@ from console.client.results.preview import (
     VideoFormat,
 )
 from console.client.results.sample import Freshness, Sample
+from console.client.results.source import Source, SourceState
 from console.client.results.status import (
     EffectiveCommand,
     Health,
@@ -44,8 +46,11 @@ __all__ = [
     "Fault",
     "FaultSeverity",
     "Freshness",
+    "GatewayFacts",
+    "GatewayInfo",
     "Health",
     "HealthState",
+    "MethodCounts",
     "Network",
     "Odometry",
     "OperatorEvent",
@@ -59,6 +64,8 @@ __all__ = [
     "PreviewState",
     "PreviewStatus",
     "Sample",
+    "Source",
+    "SourceState",
     "StreamContainer",
     "StreamEndpoint",
     "StreamTransport",

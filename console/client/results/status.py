@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from console.client.results.fault import Fault
+from console.client.results.info import GatewayFacts
 from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
 from console.client.results.sample import Sample
+from console.client.results.source import Source
 
 
 class HealthState(Enum):
@@ -112,3 +114,6 @@ class SystemStatus:
     teleop: Teleop
     faults: tuple[Fault, ...]
     """What is wrong, the worst first; then what was wrong a moment ago, the newest first."""
+    sources: tuple[Source, ...]
+    """Everything the gateway is configured to read."""
+    gateway: GatewayFacts

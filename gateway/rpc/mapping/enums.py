@@ -7,7 +7,8 @@ from common.errors import InvalidRequestError
 from gateway.status.faults.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile
-from omniseer.gateway.v1 import fault_pb2, preview_pb2, states_pb2
+from gateway.status.sources import SourceState
+from omniseer.gateway.v1 import fault_pb2, preview_pb2, source_pb2, states_pb2
 
 PREVIEW_STATES: Final[Mapping[PreviewState, states_pb2.PreviewState.ValueType]] = {
     PreviewState.DISABLED: states_pb2.PREVIEW_DISABLED,
@@ -35,6 +36,15 @@ SEVERITIES: Final[Mapping[Severity, fault_pb2.FaultSeverity.ValueType]] = {
     Severity.INFO: fault_pb2.FAULT_SEVERITY_INFO,
     Severity.WARNING: fault_pb2.FAULT_SEVERITY_WARNING,
     Severity.ERROR: fault_pb2.FAULT_SEVERITY_ERROR,
+}
+SOURCE_STATES: Final[Mapping[SourceState, source_pb2.SourceState.ValueType]] = {
+    SourceState.WAITING: source_pb2.SOURCE_STATE_WAITING,
+    SourceState.SILENT: source_pb2.SOURCE_STATE_SILENT,
+    SourceState.RECEIVING: source_pb2.SOURCE_STATE_RECEIVING,
+    SourceState.STALE: source_pb2.SOURCE_STATE_STALE,
+    SourceState.QOS_MISMATCH: source_pb2.SOURCE_STATE_QOS_MISMATCH,
+    SourceState.WRONG_TYPE: source_pb2.SOURCE_STATE_WRONG_TYPE,
+    SourceState.TYPE_MISSING: source_pb2.SOURCE_STATE_TYPE_MISSING,
 }
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 

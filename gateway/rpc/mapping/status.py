@@ -5,8 +5,10 @@ import math
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import HEALTH_STATES
 from gateway.rpc.mapping.faults import fault_message
+from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
+from gateway.rpc.mapping.sources import source_status
 from gateway.status.events import Event
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
@@ -29,6 +31,8 @@ def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.Syste
         platform=platform_status(snapshot),
         insecure=snapshot.identity.insecure,
         faults=[fault_message(fault, snapshot.at_s) for fault in snapshot.faults],
+        sources=[source_status(source) for source in snapshot.sources],
+        gateway=gateway_facts(snapshot.gateway),
     )
 
 

@@ -10,47 +10,30 @@ from gateway.status.sources import SourceState, SourceView
 
 @dataclass(frozen=True, slots=True)
 class _Trouble:
-    """How a state of a source is told. `{name}` stands for the source, in operators' words."""
+    """What a state of a source is as a fault; the sentence is the source's own."""
 
     suffix: str
-    message: str
     remedy: str
 
 
-_TROUBLES: Final[Mapping[SourceState, _Trouble | None]] = {
+TROUBLES: Final[Mapping[SourceState, _Trouble | None]] = {
     SourceState.RECEIVING: None,
     SourceState.WAITING: _Trouble(
-        "missing",
-        "no {name} since the gateway started, and nobody on the robot offers it",
-        "Start the program that makes it; check that it runs in the gateway's ROS domain",
+        "missing", "Start the program that makes it; check that it runs in the gateway's ROS domain"
     ),
     SourceState.SILENT: _Trouble(
-        "silent",
-        "the robot offers {name}, but nothing has arrived",
-        "Look at the program that makes it: it is there and does not send",
+        "silent", "Look at the program that makes it: it is there and does not send"
     ),
-    SourceState.STALE: _Trouble(
-        "stale",
-        "{name} stopped coming",
-        "Look at the program that makes it",
-    ),
+    SourceState.STALE: _Trouble("stale", "Look at the program that makes it, and at the load of the robot"),
     SourceState.QOS_MISMATCH: _Trouble(
-        "qos_mismatch",
-        "the robot offers {name} in a way this gateway does not ask for",
-        "Change reliability or durability of the source in the gateway's configuration",
+        "qos_mismatch", "Change reliability or durability of this source in the gateway's configuration"
     ),
     SourceState.WRONG_TYPE: _Trouble(
-        "wrong_type",
-        "the robot offers {name} in another form than configured",
-        "Correct the type of the source in the gateway's configuration",
+        "wrong_type", "Correct the type of this source in the gateway's configuration"
     ),
-    SourceState.TYPE_MISSING: _Trouble(
-        "type_missing",
-        "{name} can't be read: its message type is not installed beside the gateway",
-        "Type on the robot: robot-gateway doctor",
-    ),
+    SourceState.TYPE_MISSING: _Trouble("type_missing", "Type on the robot: robot-gateway doctor"),
 }
-"""Total: every state of a source, and what is wrong in it."""
+"""Total: every state of a source, and what fault it is."""
 
 _NEED_TIME: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
 """States in which every source begins."""
@@ -64,13 +47,13 @@ def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator
         settled: whether the gateway has run long enough for every source to have come.
     """
     for source in sources:
-        trouble = _TROUBLES[source.state]
+        trouble = TROUBLES[source.state]
         if trouble and _counts(source, settled=settled):
             yield Condition(
                 f"{source.name}.{trouble.suffix}",
                 Severity.ERROR if source.required else Severity.WARNING,
                 source.words,
-                trouble.message.format(name=source.words),
+                source.detail,
                 trouble.remedy,
             )
 

@@ -38,8 +38,9 @@ async def test_a_gateway_without_sources_is_healthy_and_tells_its_computer(opera
 
 async def test_ages_grow_with_the_clock(tmp_path: Path) -> None:
     async with running_gateway(tmp_path / "p.sock", platform={"interval_ms": 60_000}) as operator:
-        first = await eventually(operator.status, lambda it: it.platform.compute.available, "a sample")
+        await eventually(operator.status, lambda it: it.platform.compute.available, "a sample")
         begin_s = time.monotonic()
+        first = await operator.status()
         later = await eventually(
             operator.status,
             lambda it: it.platform.compute.age_ms >= first.platform.compute.age_ms + 300,

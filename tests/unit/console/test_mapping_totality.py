@@ -12,6 +12,20 @@ from console.client.mapping.methods import METHODS, SET_PREVIEW_MODE, PreviewWis
 from console.client.results import PreviewProfile
 from omniseer.gateway.v1 import (
     fault_pb2,
+    gateway_info_pb2,
+    overlay_pb2,
+    platform_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    source_pb2,
+    states_pb2,
+    system_status_pb2,
+)
+
+FILES = (
+    source_pb2,
+    fault_pb2,
+    gateway_info_pb2,
     overlay_pb2,
     platform_pb2,
     preview_pb2,
@@ -19,13 +33,12 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
-
-FILES = (fault_pb2, overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2)
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
 DECODERS = {method.name: method.decode for method in METHODS}
 
 ENUM_MAPPINGS = {
     "PreviewState": enums.preview_state,
+    "SourceState": enums.source_state,
     "FaultSeverity": enums.fault_severity,
     "RobotHealthState": enums.health_state,
     "TeleopState": enums.teleop_state,

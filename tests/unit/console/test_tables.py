@@ -13,6 +13,11 @@ from console.client.results import SystemStatus
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
+from omniseer.gateway.v1.source_pb2 import (
+    SOURCE_STATE_RECEIVING,
+    SOURCE_STATE_STALE,
+    SOURCE_STATE_WAITING,
+)
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus as StatusMessage
 from tests.support.gateway_double import healthy_status
 
@@ -107,6 +112,16 @@ def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
     assert (disk.mark, disk.tone, disk.age) == ("error", Tone.BAD, "1 min 05 s")
     assert disk.text == "the disk is nearly full -> make room"
     assert (odometry.mark, odometry.text, odometry.age) == ("over", "odometry stopped coming", "500 ms")
+
+
+def test_a_source_has_a_line_only_when_nothing_else_tells_of_it() -> None:
+    message = healthy_status()
+    message.sources.add(name="odometry", state=SOURCE_STATE_RECEIVING, available=True)
+    message.sources.add(name="battery", state=SOURCE_STATE_WAITING, detail="no battery")
+    message.sources.add(name="vision", state=SOURCE_STATE_STALE, detail="vision stopped coming")
+    message.faults.add(id="vision.stale", message="vision stopped coming", active=True)
+    rows = [row for row in status_rows(decoded(message)) if row.label == "source"]
+    assert [(row.mark, row.text) for row in rows] == [("waiting", "no battery")]
 
 
 def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:

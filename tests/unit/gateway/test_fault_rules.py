@@ -9,13 +9,13 @@ from pydantic import ValidationError
 
 from gateway.fault_settings import FaultSettings, LowerLimit, UpperLimit
 from gateway.status.board import Board, SourceKind
-from gateway.status.faults import sources as source_rules
 from gateway.status.faults.fault import Condition, Severity
 from gateway.status.faults.limits import Limit
 from gateway.status.faults.rules import FaultRules, conditions
+from gateway.status.faults.sources import TROUBLES
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.sources import SourceState
+from gateway.status.sources import SourceState, sentence
 from gateway.status.values import Battery, Compute, Network, Odometry, Received
 from tests.support.fault_rules import LIMITS
 
@@ -64,7 +64,9 @@ def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:
 
 
 def test_every_state_of_a_source_has_its_verdict() -> None:
-    assert set(source_rules._TROUBLES) == set(SourceState)
+    assert set(TROUBLES) == set(SourceState)
+    for state in SourceState:
+        assert bool(sentence(state, "odometry")) == (TROUBLES[state] is not None)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,10 @@ from common.errors import InvalidRequestError
 from gateway.preview_link import wire
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping import enums
+from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.server import SERVICE, method_handlers
+from gateway.rpc.tally import Counts, Tally
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import Event
 from gateway.status.faults.fault import Condition, Fault, Severity
@@ -30,7 +32,9 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
+from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import SourceState
 from gateway.status.values import (
     Battery,
     Compute,
@@ -46,6 +50,7 @@ from omniseer.gateway.v1 import (
     overlay_pb2,
     preview_pb2,
     robot_gateway_pb2,
+    source_pb2,
     states_pb2,
     system_status_pb2,
 )
@@ -67,6 +72,7 @@ NOT_SERVED = {
         (PreviewState, enums.PREVIEW_STATES, states_pb2.PreviewState),
         (Profile, enums.PROFILES, preview_pb2.PreviewProfile),
         (Codec, enums.CODECS, preview_pb2.VideoCodec),
+        (SourceState, enums.SOURCE_STATES, source_pb2.SourceState),
         (Severity, enums.SEVERITIES, fault_pb2.FaultSeverity),
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
     ],
@@ -101,6 +107,8 @@ def test_every_method_of_the_contract_has_a_handler() -> None:
 
 
 class _AnyGateway:
+    tally = Tally()
+
     def __getattr__(self, name: str) -> object:
         return name
 
@@ -133,10 +141,13 @@ def everything() -> Snapshot:
     )
     return take(
         identity=Identity("lab", "1.2.3", insecure=True),
-        rules=Rules({kind: SourceRule(1000, required=False) for kind in SourceKind}, 3000),
+        rules=Rules(
+            {kind: SourceRule(1000, required=kind is SourceKind.BATTERY) for kind in SourceKind}, 3000
+        ),
         board=board,
         preview=preview,
         events=(Event(1, at_s, "something happened"),),
+        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2),
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
     )
@@ -177,6 +188,11 @@ def test_a_full_snapshot_sets_every_field_of_the_contract() -> None:
     assert {field.full_name for field in system_status_pb2.SystemStatus.DESCRIPTOR.fields} >= NOT_SERVED, (
         "the list of exceptions names fields that don't exist"
     )
+
+
+def test_the_info_sets_every_field_of_its_answer() -> None:
+    info = gateway_info(everything(), {"GetSystemStatus": Counts(3, 2, 1)}, 1_700_000_000_000, "{}")
+    assert not list(unset(info, robot_gateway_pb2.GetGatewayInfoResponse.DESCRIPTOR))
 
 
 def test_the_values_arrive_where_the_contract_has_them() -> None:

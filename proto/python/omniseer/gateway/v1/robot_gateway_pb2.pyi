@@ -3,8 +3,11 @@
 isort:skip_file
 """
 
+from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
+from google.protobuf.internal import containers as _containers
+from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 import builtins as _builtins
 import sys
@@ -50,6 +53,73 @@ class GetOverlaySnapshotRequest(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___GetOverlaySnapshotRequest: _TypeAlias = GetOverlaySnapshotRequest  # noqa: Y015
+
+@_typing.final
+class GetGatewayInfoRequest(_message.Message):
+    """Asks for what is known of the gateway program."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetGatewayInfoRequest: _TypeAlias = GetGatewayInfoRequest  # noqa: Y015
+
+@_typing.final
+class GetGatewayInfoResponse(_message.Message):
+    """What is known of the gateway program."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GATEWAY_NAME_FIELD_NUMBER: _builtins.int
+    GATEWAY_VERSION_FIELD_NUMBER: _builtins.int
+    GATEWAY_FIELD_NUMBER: _builtins.int
+    WALL_CLOCK_UNIX_MS_FIELD_NUMBER: _builtins.int
+    METHODS_FIELD_NUMBER: _builtins.int
+    CONFIGURATION_JSON_FIELD_NUMBER: _builtins.int
+    gateway_name: _builtins.str
+    """The configured name of this robot's gateway."""
+    gateway_version: _builtins.str
+    """The gateway's software version (MAJOR.MINOR.PATCH)."""
+    wall_clock_unix_ms: _builtins.int
+    """What the robot's own calendar clock shows, in ms since 1970-01-01 UTC, when this answer was
+    made. No age in this contract depends on it.
+    """
+    configuration_json: _builtins.str
+    """The configuration in force as a JSON object, defaults included. Without secrets, and without
+    what is the robot's own affair: where its values come from, devices, paths.
+    """
+    @_builtins.property
+    def gateway(self) -> _gateway_info_pb2.GatewayFacts:
+        """The facts that come with every status as well."""
+
+    @_builtins.property
+    def methods(self) -> _containers.RepeatedCompositeFieldContainer[_gateway_info_pb2.MethodCounts]:
+        """Calls of every method of this service, by name."""
+
+    def __init__(
+        self,
+        *,
+        gateway_name: _builtins.str = ...,
+        gateway_version: _builtins.str = ...,
+        gateway: _gateway_info_pb2.GatewayFacts | None = ...,
+        wall_clock_unix_ms: _builtins.int = ...,
+        methods: _abc.Iterable[_gateway_info_pb2.MethodCounts] | None = ...,
+        configuration_json: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["gateway", b"gateway"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["configuration_json", b"configuration_json", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "methods", b"methods", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetGatewayInfoResponse: _TypeAlias = GetGatewayInfoResponse  # noqa: Y015
 
 @_typing.final
 class SetPreviewModeRequest(_message.Message):

@@ -52,6 +52,11 @@ class RobotGatewayStub:
                 request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetOverlaySnapshotRequest.SerializeToString,
                 response_deserializer=omniseer_dot_gateway_dot_v1_dot_overlay__pb2.OverlaySnapshot.FromString,
                 _registered_method=True)
+        self.GetGatewayInfo = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/GetGatewayInfo',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.FromString,
+                _registered_method=True)
 
 
 class RobotGatewayServicer:
@@ -85,6 +90,13 @@ class RobotGatewayServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetGatewayInfo(self, request, context):
+        """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RobotGatewayServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -102,6 +114,11 @@ def add_RobotGatewayServicer_to_server(servicer, server):
                     servicer.GetOverlaySnapshot,
                     request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetOverlaySnapshotRequest.FromString,
                     response_serializer=omniseer_dot_gateway_dot_v1_dot_overlay__pb2.OverlaySnapshot.SerializeToString,
+            ),
+            'GetGatewayInfo': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetGatewayInfo,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -186,6 +203,33 @@ class RobotGateway:
             '/omniseer.gateway.v1.RobotGateway/GetOverlaySnapshot',
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetOverlaySnapshotRequest.SerializeToString,
             omniseer_dot_gateway_dot_v1_dot_overlay__pb2.OverlaySnapshot.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetGatewayInfo(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/GetGatewayInfo',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -49,6 +49,8 @@ class RobotGatewayStub:
     """
     GetOverlaySnapshot: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetOverlaySnapshotRequest, _overlay_pb2.OverlaySnapshot]
     """What an operator's screen draws over the picture, with the whole status, in one answer."""
+    GetGatewayInfo: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]
+    """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
 
 @_typing.type_check_only
 class RobotGatewayAsyncStub(RobotGatewayStub):
@@ -69,6 +71,8 @@ class RobotGatewayAsyncStub(RobotGatewayStub):
     """
     GetOverlaySnapshot: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetOverlaySnapshotRequest, _overlay_pb2.OverlaySnapshot]  # type: ignore[assignment]
     """What an operator's screen draws over the picture, with the whole status, in one answer."""
+    GetGatewayInfo: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]  # type: ignore[assignment]
+    """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
 
 class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
     """The one door between a robot and its operator."""
@@ -104,5 +108,13 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_overlay_pb2.OverlaySnapshot, _abc.Awaitable[_overlay_pb2.OverlaySnapshot]]:
         """What an operator's screen draws over the picture, with the whole status, in one answer."""
+
+    @_abc_1.abstractmethod
+    def GetGatewayInfo(
+        self,
+        request: _robot_gateway_pb2.GetGatewayInfoRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.GetGatewayInfoResponse, _abc.Awaitable[_robot_gateway_pb2.GetGatewayInfoResponse]]:
+        """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
 
 def add_RobotGatewayServicer_to_server(servicer: RobotGatewayServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -23,26 +23,28 @@ _sym_db = _symbol_database.Default()
 
 
 from omniseer.gateway.v1 import fault_pb2 as omniseer_dot_gateway_dot_v1_dot_fault__pb2
+from omniseer.gateway.v1 import gateway_info_pb2 as omniseer_dot_gateway_dot_v1_dot_gateway__info__pb2
 from omniseer.gateway.v1 import platform_pb2 as omniseer_dot_gateway_dot_v1_dot_platform__pb2
 from omniseer.gateway.v1 import preview_pb2 as omniseer_dot_gateway_dot_v1_dot_preview__pb2
+from omniseer.gateway.v1 import source_pb2 as omniseer_dot_gateway_dot_v1_dot_source__pb2
 from omniseer.gateway.v1 import states_pb2 as omniseer_dot_gateway_dot_v1_dot_states__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/system_status.proto\x12\x13omniseer.gateway.v1\x1a\x1fomniseer/gateway/v1/fault.proto\x1a\"omniseer/gateway/v1/platform.proto\x1a!omniseer/gateway/v1/preview.proto\x1a omniseer/gateway/v1/states.proto\"\xc1\x03\n\x0cSystemStatus\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\x12\x31\n\x06vision\x18\x04 \x01(\x0b\x32!.omniseer.gateway.v1.VisionStatus\x12\x30\n\x06health\x18\x05 \x01(\x0b\x32 .omniseer.gateway.v1.RobotHealth\x12\x31\n\x06teleop\x18\x06 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus\x12\x35\n\x08platform\x18\x07 \x01(\x0b\x32#.omniseer.gateway.v1.PlatformStatus\x12@\n\x11\x65\x66\x66\x65\x63tive_command\x18\x08 \x01(\x0b\x32%.omniseer.gateway.v1.EffectiveCommand\x12\x10\n\x08insecure\x18\x10 \x01(\x08\x12*\n\x06\x66\x61ults\x18\x11 \x03(\x0b\x32\x1a.omniseer.gateway.v1.Fault\"\xc1\x01\n\x0cVisionStatus\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x14\n\x0cproducer_fps\x18\x03 \x01(\x02\x12\x14\n\x0c\x63onsumer_fps\x18\x04 \x01(\x02\x12\x15\n\rlast_infer_ms\x18\x05 \x01(\x02\x12\x19\n\x11infer_error_count\x18\x06 \x01(\x04\x12!\n\x19\x63\x61pture_fatal_error_count\x18\x07 \x01(\x04\x12\x0e\n\x06\x61ge_ms\x18\x10 \x01(\x04\"\xa8\x02\n\x0bRobotHealth\x12\x34\n\x05state\x18\x01 \x01(\x0e\x32%.omniseer.gateway.v1.RobotHealthState\x12\r\n\x05ready\x18\x02 \x01(\x08\x12\x0f\n\x07summary\x18\x03 \x01(\t\x12\x16\n\x0eodom_available\x18\x04 \x01(\x08\x12\x12\n\nodom_stale\x18\x05 \x01(\x08\x12\x18\n\x10linear_speed_mps\x18\x06 \x01(\x02\x12\x1b\n\x13\x61ngular_speed_rad_s\x18\x07 \x01(\x02\x12\x13\n\x0bodom_age_ms\x18\x08 \x01(\x04\x12\x17\n\x0fmeasured_vx_mps\x18\t \x01(\x02\x12\x17\n\x0fmeasured_vy_mps\x18\n \x01(\x02\x12\x19\n\x11measured_wz_rad_s\x18\x0b \x01(\x02\"\xcf\x02\n\x0cTeleopStatus\x12/\n\x05state\x18\x01 \x01(\x0e\x32 .omniseer.gateway.v1.TeleopState\x12\x0f\n\x07\x65nabled\x18\x02 \x01(\x08\x12\x1b\n\x13last_command_age_ms\x18\x04 \x01(\x04\x12\x16\n\x0emax_linear_mps\x18\x05 \x01(\x02\x12\x19\n\x11max_angular_rad_s\x18\x06 \x01(\x02\x12\x12\n\nlast_error\x18\x07 \x01(\t\x12\x1b\n\x13last_command_vx_mps\x18\x08 \x01(\x02\x12\x1b\n\x13last_command_vy_mps\x18\t \x01(\x02\x12\x1d\n\x15last_command_wz_rad_s\x18\n \x01(\x02\x12\x1e\n\x16last_command_available\x18\x0b \x01(\x08\x12\x1a\n\x12last_command_stale\x18\x0c \x01(\x08J\x04\x08\x03\x10\x04\"\x8d\x01\n\x10\x45\x66\x66\x65\x63tiveCommand\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x03 \x01(\x04\x12\x0e\n\x06vx_mps\x18\x04 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x05 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x06 \x01(\x02\x12\x15\n\ractive_source\x18\x07 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/system_status.proto\x12\x13omniseer.gateway.v1\x1a\x1fomniseer/gateway/v1/fault.proto\x1a&omniseer/gateway/v1/gateway_info.proto\x1a\"omniseer/gateway/v1/platform.proto\x1a!omniseer/gateway/v1/preview.proto\x1a omniseer/gateway/v1/source.proto\x1a omniseer/gateway/v1/states.proto\"\xa9\x04\n\x0cSystemStatus\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\x12\x31\n\x06vision\x18\x04 \x01(\x0b\x32!.omniseer.gateway.v1.VisionStatus\x12\x30\n\x06health\x18\x05 \x01(\x0b\x32 .omniseer.gateway.v1.RobotHealth\x12\x31\n\x06teleop\x18\x06 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus\x12\x35\n\x08platform\x18\x07 \x01(\x0b\x32#.omniseer.gateway.v1.PlatformStatus\x12@\n\x11\x65\x66\x66\x65\x63tive_command\x18\x08 \x01(\x0b\x32%.omniseer.gateway.v1.EffectiveCommand\x12\x10\n\x08insecure\x18\x10 \x01(\x08\x12*\n\x06\x66\x61ults\x18\x11 \x03(\x0b\x32\x1a.omniseer.gateway.v1.Fault\x12\x32\n\x07sources\x18\x13 \x03(\x0b\x32!.omniseer.gateway.v1.SourceStatus\x12\x32\n\x07gateway\x18\x14 \x01(\x0b\x32!.omniseer.gateway.v1.GatewayFacts\"\xc1\x01\n\x0cVisionStatus\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x14\n\x0cproducer_fps\x18\x03 \x01(\x02\x12\x14\n\x0c\x63onsumer_fps\x18\x04 \x01(\x02\x12\x15\n\rlast_infer_ms\x18\x05 \x01(\x02\x12\x19\n\x11infer_error_count\x18\x06 \x01(\x04\x12!\n\x19\x63\x61pture_fatal_error_count\x18\x07 \x01(\x04\x12\x0e\n\x06\x61ge_ms\x18\x10 \x01(\x04\"\xa8\x02\n\x0bRobotHealth\x12\x34\n\x05state\x18\x01 \x01(\x0e\x32%.omniseer.gateway.v1.RobotHealthState\x12\r\n\x05ready\x18\x02 \x01(\x08\x12\x0f\n\x07summary\x18\x03 \x01(\t\x12\x16\n\x0eodom_available\x18\x04 \x01(\x08\x12\x12\n\nodom_stale\x18\x05 \x01(\x08\x12\x18\n\x10linear_speed_mps\x18\x06 \x01(\x02\x12\x1b\n\x13\x61ngular_speed_rad_s\x18\x07 \x01(\x02\x12\x13\n\x0bodom_age_ms\x18\x08 \x01(\x04\x12\x17\n\x0fmeasured_vx_mps\x18\t \x01(\x02\x12\x17\n\x0fmeasured_vy_mps\x18\n \x01(\x02\x12\x19\n\x11measured_wz_rad_s\x18\x0b \x01(\x02\"\xcf\x02\n\x0cTeleopStatus\x12/\n\x05state\x18\x01 \x01(\x0e\x32 .omniseer.gateway.v1.TeleopState\x12\x0f\n\x07\x65nabled\x18\x02 \x01(\x08\x12\x1b\n\x13last_command_age_ms\x18\x04 \x01(\x04\x12\x16\n\x0emax_linear_mps\x18\x05 \x01(\x02\x12\x19\n\x11max_angular_rad_s\x18\x06 \x01(\x02\x12\x12\n\nlast_error\x18\x07 \x01(\t\x12\x1b\n\x13last_command_vx_mps\x18\x08 \x01(\x02\x12\x1b\n\x13last_command_vy_mps\x18\t \x01(\x02\x12\x1d\n\x15last_command_wz_rad_s\x18\n \x01(\x02\x12\x1e\n\x16last_command_available\x18\x0b \x01(\x08\x12\x1a\n\x12last_command_stale\x18\x0c \x01(\x08J\x04\x08\x03\x10\x04\"\x8d\x01\n\x10\x45\x66\x66\x65\x63tiveCommand\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x03 \x01(\x04\x12\x0e\n\x06vx_mps\x18\x04 \x01(\x02\x12\x0e\n\x06vy_mps\x18\x05 \x01(\x02\x12\x10\n\x08wz_rad_s\x18\x06 \x01(\x02\x12\x15\n\ractive_source\x18\x07 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.system_status_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_SYSTEMSTATUS']._serialized_start=203
-  _globals['_SYSTEMSTATUS']._serialized_end=652
-  _globals['_VISIONSTATUS']._serialized_start=655
-  _globals['_VISIONSTATUS']._serialized_end=848
-  _globals['_ROBOTHEALTH']._serialized_start=851
-  _globals['_ROBOTHEALTH']._serialized_end=1147
-  _globals['_TELEOPSTATUS']._serialized_start=1150
-  _globals['_TELEOPSTATUS']._serialized_end=1485
-  _globals['_EFFECTIVECOMMAND']._serialized_start=1488
-  _globals['_EFFECTIVECOMMAND']._serialized_end=1629
+  _globals['_SYSTEMSTATUS']._serialized_start=277
+  _globals['_SYSTEMSTATUS']._serialized_end=830
+  _globals['_VISIONSTATUS']._serialized_start=833
+  _globals['_VISIONSTATUS']._serialized_end=1026
+  _globals['_ROBOTHEALTH']._serialized_start=1029
+  _globals['_ROBOTHEALTH']._serialized_end=1325
+  _globals['_TELEOPSTATUS']._serialized_start=1328
+  _globals['_TELEOPSTATUS']._serialized_end=1663
+  _globals['_EFFECTIVECOMMAND']._serialized_start=1666
+  _globals['_EFFECTIVECOMMAND']._serialized_end=1807
 # @@protoc_insertion_point(module_scope)

@@ -8,8 +8,10 @@ from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
+from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
+from omniseer.gateway.v1 import source_pb2 as _source_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 import builtins as _builtins
 import sys
@@ -41,6 +43,8 @@ class SystemStatus(_message.Message):
     EFFECTIVE_COMMAND_FIELD_NUMBER: _builtins.int
     INSECURE_FIELD_NUMBER: _builtins.int
     FAULTS_FIELD_NUMBER: _builtins.int
+    SOURCES_FIELD_NUMBER: _builtins.int
+    GATEWAY_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -80,6 +84,14 @@ class SystemStatus(_message.Message):
         the newest first (at most 8). Empty when all is well.
         """
 
+    @_builtins.property
+    def sources(self) -> _containers.RepeatedCompositeFieldContainer[_source_pb2.SourceStatus]:
+        """Every source that the gateway is configured to read, in the order of its configuration."""
+
+    @_builtins.property
+    def gateway(self) -> _gateway_info_pb2.GatewayFacts:
+        """The gateway program itself."""
+
     def __init__(
         self,
         *,
@@ -93,10 +105,12 @@ class SystemStatus(_message.Message):
         effective_command: Global___EffectiveCommand | None = ...,
         insecure: _builtins.bool = ...,
         faults: _abc.Iterable[_fault_pb2.Fault] | None = ...,
+        sources: _abc.Iterable[_source_pb2.SourceStatus] | None = ...,
+        gateway: _gateway_info_pb2.GatewayFacts | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

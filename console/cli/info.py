@@ -1,0 +1,63 @@
+"""robotctl info: the gateway program itself."""
+
+import json
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from console.cli.json_form import json_form
+from console.cli.words import UNKNOWN, age
+from console.client import GatewayInfo
+
+_MS_PER_S: Final = 1000
+
+
+def info_json(info: GatewayInfo) -> dict[str, Any]:
+    """As scripts read it: the configuration as an object, not as text."""
+    document: dict[str, Any] = json_form(info)
+    text = document.pop("configuration_json")
+    return document | {"configuration": json.loads(text) if text else None}
+
+
+def info_view(info: GatewayInfo, target: str) -> RenderableType:
+    """For people."""
+    return Group(
+        Text.assemble((info.gateway_name or "robot", "bold"), (f"  {target}", "dim")),
+        Text(),
+        _facts(info),
+        Text(),
+        _calls(info),
+        Text(),
+        Text("configuration", style="dim"),
+        Text(info.configuration_json or UNKNOWN),
+    )
+
+
+def _facts(info: GatewayInfo) -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    clock = datetime.fromtimestamp(info.wall_clock_unix_ms / _MS_PER_S, UTC)
+    for label, text in (
+        ("version", info.gateway_version or UNKNOWN),
+        ("revision", info.gateway.revision or UNKNOWN),
+        ("up", age(info.gateway.uptime_ms)),
+        ("boot", info.gateway.boot_id or UNKNOWN),
+        ("its clock", clock.isoformat(timespec="seconds")),
+    ):
+        table.add_row(label, Text(text))
+    return table
+
+
+def _calls(info: GatewayInfo) -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    for _ in range(3):
+        table.add_column(justify="right", no_wrap=True)
+    table.add_row("method", "served", "refused", "failed", style="dim")
+    for counts in info.methods:
+        table.add_row(Text(counts.method), str(counts.served), str(counts.refused), str(counts.failed))
+    return table

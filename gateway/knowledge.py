@@ -1,0 +1,81 @@
+"""Everything the gateway knows, in one place: what is written by the parts, and the snapshot made of it."""
+
+import time
+from collections.abc import Callable
+
+from common.version import project_revision, project_version
+from gateway.config import GatewaySettings
+from gateway.platform.boot import boot_id
+from gateway.rpc.tally import Tally
+from gateway.status.board import Board
+from gateway.status.events import EventLog
+from gateway.status.faults.book import FaultBook
+from gateway.status.faults.rules import FaultRules
+from gateway.status.observer import Observer
+from gateway.status.preview import PreviewView
+from gateway.status.runtime import Runtime
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+
+
+class Knowledge:
+    """Belongs to the asyncio loop; other threads write on the board only.
+
+    Args:
+        settings: what is expected.
+        preview: the preview of this instant.
+        tally: counts the calls.
+    """
+
+    def __init__(self, settings: GatewaySettings, preview: Callable[[], PreviewView], tally: Tally) -> None:
+        faults = settings.faults
+        self._identity = Identity(settings.name, project_version(), settings.security.insecure)
+        self._rules = _rules(settings)
+        self._preview = preview
+        self._tally = tally
+        self._revision, self._boot_id = project_revision(), boot_id()
+        self._started_s = time.monotonic()
+        self._book = FaultBook(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
+        self._observer = Observer(
+            self._book, FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000)
+        )
+        self.board, self.events = Board(), EventLog()
+
+    def snapshot(self) -> Snapshot:
+        """What is true now, from memory."""
+        now_s = time.monotonic()
+        return take(
+            identity=self._identity,
+            gateway=self._runtime(now_s),
+            rules=self._rules,
+            board=self.board,
+            preview=self._preview(),
+            events=self.events.newest(),
+            faults=self._book.faults,
+            now_s=now_s,
+        )
+
+    def observe(self, now: Snapshot) -> list[str]:
+        """Keeps the book of faults and notes what is news; returns the news."""
+        news = self._observer.observe(now)
+        for message in news:
+            self.events.add(message, now.at_s)
+        return news
+
+    def _runtime(self, now_s: float) -> Runtime:
+        return Runtime(
+            revision=self._revision,
+            boot_id=self._boot_id,
+            uptime_ms=int((now_s - self._started_s) * 1000),
+            client_count=self._tally.client_count(),
+            requests_served=self._tally.served,
+            requests_refused=self._tally.refused,
+        )
+
+
+def _rules(settings: GatewaySettings) -> Rules:
+    return Rules(
+        sources={
+            source.kind: SourceRule(source.stale_after_ms, source.required) for source in settings.sources
+        },
+        platform_stale_after_ms=settings.platform.stale_after_ms,
+    )

@@ -1,0 +1,38 @@
+"""The gateway program itself, as the contract tells it."""
+
+from collections.abc import Mapping
+
+from gateway.rpc.tally import Counts
+from gateway.status.runtime import Runtime
+from gateway.status.snapshot import Snapshot
+from omniseer.gateway.v1 import gateway_info_pb2 as pb
+from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse
+
+
+def gateway_facts(runtime: Runtime) -> pb.GatewayFacts:
+    """What comes with every status."""
+    return pb.GatewayFacts(
+        revision=runtime.revision,
+        boot_id=runtime.boot_id,
+        uptime_ms=runtime.uptime_ms,
+        client_count=runtime.client_count,
+        requests_served=runtime.requests_served,
+        requests_refused=runtime.requests_refused,
+    )
+
+
+def gateway_info(
+    snapshot: Snapshot, methods: Mapping[str, Counts], wall_clock_unix_ms: int, configuration_json: str
+) -> GetGatewayInfoResponse:
+    """Everything about the gateway program."""
+    return GetGatewayInfoResponse(
+        gateway_name=snapshot.identity.name,
+        gateway_version=snapshot.identity.version,
+        gateway=gateway_facts(snapshot.gateway),
+        wall_clock_unix_ms=wall_clock_unix_ms,
+        methods=[
+            pb.MethodCounts(method=method, served=counts.served, refused=counts.refused, failed=counts.failed)
+            for method, counts in sorted(methods.items())
+        ],
+        configuration_json=configuration_json,
+    )

@@ -1,0 +1,85 @@
+"""Counts what is asked, and who asks."""
+
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+from common.errors import DomainError
+from common.rpc import Context
+
+RECENT_S: Final = 10.0
+"""A connection that asked for something this recently counts as a client."""
+_MOST_REMEMBERED: Final = 1024
+"""Connections; of more than that, the quietest are forgotten."""
+
+Behavior: TypeAlias = Callable[[Any, Context], Awaitable[bytes]]
+
+
+@dataclass(slots=True)
+class Counts:
+    """What became of the calls of one method."""
+
+    served: int = 0
+    refused: int = 0
+    failed: int = 0
+
+
+class Tally:
+    """Belongs to one event loop.
+
+    Args:
+        clock: seconds, monotonic.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._asked_at_s: dict[str, float] = {}
+        """By connection, the one that asked last at the end."""
+        self.methods: dict[str, Counts] = {}
+
+    @property
+    def served(self) -> int:
+        """Calls answered, of all methods."""
+        return sum(counts.served for counts in self.methods.values())
+
+    @property
+    def refused(self) -> int:
+        """Calls refused, of all methods."""
+        return sum(counts.refused for counts in self.methods.values())
+
+    def client_count(self) -> int:
+        """How many connections asked for something lately."""
+        since_s = self._clock() - RECENT_S
+        count = 0
+        for asked_at_s in reversed(self._asked_at_s.values()):
+            if asked_at_s < since_s:
+                break
+            count += 1
+        return count
+
+    def counted(self, method: str, behavior: Behavior) -> Behavior:
+        """The same behavior, counted under the method's name."""
+        counts = self.methods.setdefault(method, Counts())
+
+        async def call(request: Any, context: Context) -> bytes:
+            self._note(context.peer())
+            try:
+                reply = await behavior(request, context)
+            except DomainError:
+                counts.refused += 1
+                raise
+            except Exception:
+                counts.failed += 1
+                raise
+            counts.served += 1
+            return reply
+
+        return call
+
+    def _note(self, peer: str) -> None:
+        asked = self._asked_at_s
+        asked.pop(peer, None)
+        asked[peer] = self._clock()
+        if len(asked) > _MOST_REMEMBERED:
+            del asked[next(iter(asked))]

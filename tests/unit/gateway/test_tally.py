@@ -1,0 +1,69 @@
+"""Calls and callers are counted, whatever becomes of a call."""
+
+from typing import Any
+
+import pytest
+
+from common.errors import InvalidRequestError
+from gateway.rpc.tally import RECENT_S, Counts, Tally
+
+
+class Call:
+    """A caller with a connection of its own."""
+
+    def __init__(self, peer: str) -> None:
+        self._peer = peer
+
+    def peer(self) -> str:
+        return self._peer
+
+
+class Clock:
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+async def ask(tally: Tally, peer: str = "ipv4:10.0.0.1:1", raises: type[Exception] | None = None) -> bytes:
+    async def behavior(_request: Any, _context: Any) -> bytes:
+        if raises:
+            raise raises
+        return b"answer"
+
+    context: Any = Call(peer)
+    return await tally.counted("Get", behavior)(None, context)
+
+
+async def test_answers_refusals_and_failures_are_told_apart() -> None:
+    tally = Tally(Clock())
+    assert await ask(tally) == b"answer"
+    with pytest.raises(InvalidRequestError):
+        await ask(tally, raises=InvalidRequestError)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            await ask(tally, raises=ZeroDivisionError)
+    assert tally.methods == {"Get": Counts(served=1, refused=1, failed=2)}
+    assert (tally.served, tally.refused) == (1, 1)
+
+
+async def test_a_connection_is_a_client_while_it_asks() -> None:
+    clock = Clock()
+    tally = Tally(clock)
+    assert tally.client_count() == 0
+    await ask(tally, "a")
+    await ask(tally, "b")
+    await ask(tally, "a")
+    assert tally.client_count() == 2
+    clock.now_s += RECENT_S / 2
+    await ask(tally, "a")
+    clock.now_s += RECENT_S * 0.6
+    assert tally.client_count() == 1
+
+
+async def test_a_stream_of_new_connections_fills_no_memory() -> None:
+    clock = Clock()
+    tally = Tally(clock)
+    for number in range(5000):
+        await ask(tally, str(number))
+    assert tally.client_count() == 1024
