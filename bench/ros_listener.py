@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nav_msgs.msg import Odometry
@@ -56,9 +57,7 @@ def call_back() -> int:
 
     for source in SOURCES:
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        node.create_subscription(
-            Odometry, source.topic, lambda message, source=source: on_message(message, source), qos
-        )
+        node.create_subscription(Odometry, source.topic, partial(on_message, source=source), qos)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=spin, args=(executor,))

@@ -40,7 +40,7 @@ _SERVER_OPTIONS: Final = (
     ("grpc.keepalive_timeout_ms", 5_000),
     ("grpc.keepalive_permit_without_calls", 1),
     # Clients may look more often themselves (ours every 2 s) without being sent away.
-    ("grpc.http2.min_recv_ping_interval_without_data_ms", 1_000),
+    ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
 )
 _MAX_CONCURRENT_CALLS: Final = 256
 """More at once are refused with RESOURCE_EXHAUSTED. (HTTP/2's own limit per connection resets streams, which

@@ -1,0 +1,106 @@
+"""What it costs when nobody watches: gateway and preview service, preview off, a robot publishing."""
+
+import json
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+from bench.ports import free_tcp_port, free_udp_port
+from bench.processes import CpuShare, cpu_share, resident_mib
+from bench.rows import Row
+from console.client import GatewayClient, Unreachable
+from tests.support.ros import free_domain, simulated_robot
+
+_log = logging.getLogger(__name__)
+
+UP_WITHIN_S = 30.0
+SETTLE_S = 5.0
+"""After the start: discovery, the trials of the encoders."""
+WINDOW_S = 15.0
+_BIN = Path(sys.executable).parent
+
+
+def run(names: list[str]) -> list[Row]:
+    with tempfile.TemporaryDirectory() as directory, _product(Path(directory)) as (gateway, preview):
+        time.sleep(SETTLE_S)
+        gateway_cpu, preview_cpu = _cpu_of_both(gateway.pid, preview.pid)
+        sizes = resident_mib(gateway.pid), resident_mib(preview.pid)
+    _log.warning(
+        "idle: gateway %.2f %% (of it Fast DDS %.2f %%) and %.0f MiB, preview %.2f %% and %.0f MiB",
+        gateway_cpu.whole,
+        gateway_cpu.middleware,
+        sizes[0],
+        preview_cpu.whole,
+        sizes[1],
+    )
+    rows = [
+        Row(
+            "idle.cpu",
+            "gateway and preview service together, preview off, 4 topics coming in",
+            "% of a core",
+            gateway_cpu.whole + preview_cpu.whole,
+            None,
+            8,
+        ),
+        Row("idle.rss_mib", "resident memory of both in the same state", "MiB", sum(sizes), None, 220),
+    ]
+    return [row for row in rows if not names or row.name in names]
+
+
+def _cpu_of_both(gateway: int, preview: int) -> tuple[CpuShare, CpuShare]:
+    """One window after the other: reading /proc for one must not count for the other."""
+    return cpu_share(gateway, WINDOW_S), cpu_share(preview, WINDOW_S)
+
+
+@contextmanager
+def _product(directory: Path) -> Iterator[tuple[subprocess.Popen[bytes], subprocess.Popen[bytes]]]:
+    """Both programs beside a simulated robot in a ROS domain of their own; every topic has been heard."""
+    tcp = free_tcp_port()
+    socket = str(directory / "preview.sock")
+    preview = {"socket": socket, "source": {"kind": "test"}, "srt": {"port": free_udp_port()}}
+    gateway = {"grpc": {"port": tcp}, "preview": {"socket": socket}}
+    with ExitStack() as running:
+        domain = running.enter_context(free_domain())
+        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        running.enter_context(patch.dict(os.environ, ros))
+        running.enter_context(simulated_robot(directory))
+        service = running.enter_context(_program("robot-preview", directory, preview))
+        door = running.enter_context(_program("robot-gateway", directory, gateway))
+        client = running.enter_context(GatewayClient(f"127.0.0.1:{tcp}"))
+        _wait_until_heard(client)
+        yield door, service
+
+
+@contextmanager
+def _program(name: str, directory: Path, settings: object) -> Iterator[subprocess.Popen[bytes]]:
+    file = directory / f"{name}.yaml"
+    file.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
+    with (directory / f"{name}.log").open("wb") as log:
+        process = subprocess.Popen([_BIN / name, "serve", "--config", file], stderr=log)
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+def _wait_until_heard(client: GatewayClient) -> None:
+    deadline_s = time.monotonic() + UP_WITHIN_S
+    while time.monotonic() < deadline_s:
+        try:
+            overlay = client.overlay()
+        except Unreachable:
+            continue
+        status = overlay.status
+        sources = (status.odometry, status.vision, overlay.detections, status.platform.power.lipo_battery)
+        if status.preview.service_reachable and all(source.available for source in sources):
+            return
+        time.sleep(0.1)
+    raise RuntimeError("not all topics of the simulated robot were heard")
