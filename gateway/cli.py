@@ -1,14 +1,17 @@
-"""`robot-gateway`: serve, or only check the configuration."""
+"""`robot-gateway`: serve, check the configuration, or find out what is wrong with this machine."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from common import logs
+from common.findings import exit_code, print_findings
 from common.program import run, run_to_exit
 from gateway.app import serve as serve_until
 from gateway.config import load_settings
+from gateway.doctor.examination import examine
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 
@@ -33,6 +36,20 @@ def check(config: Config = None) -> None:
     count = len(settings.sources)
     where = f"{settings.grpc.host}:{settings.grpc.port}"
     typer.echo(f"configuration good: '{settings.name}' serves at {where} and reads {count} sources")
+
+
+@app.command()
+def doctor(
+    config: Config = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs (docs/robotctl.md).")] = False,
+) -> None:
+    """Find out what keeps this machine from being a robot's gateway, and what to type.
+
+    Ends 0 when nothing is wrong, 1 when something is.
+    """
+    findings = list(examine(config))
+    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
+    raise typer.Exit(int(exit_code(findings)))
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from common.version import project_version
+from console.cli.doctor import doctor
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
 from console.cli.options import JsonOption, TargetOption, remember, session_of
@@ -19,6 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(preview_app, name="preview")
+app.command()(doctor)
 
 
 def _print_version(wanted: bool) -> None:

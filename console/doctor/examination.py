@@ -1,0 +1,77 @@
+"""The examination: from the outside in, and no further than the first thing that lets nothing through."""
+
+import time
+from collections.abc import Callable, Iterator
+
+from common.findings import Finding, Verdict, good, wrong
+from common.version import project_version
+from console.client import GatewayClient, GatewayError, GatewayInfo, PreviewState, SystemStatus, Unsupported
+from console.doctor import network, robot
+
+
+class Examination:
+    """One look at everything.
+
+    Args:
+        target: HOST:PORT.
+        wall_clock: seconds since 1970; this computer's calendar clock.
+
+    Attributes:
+        reached: whether the gateway answered; known when the findings are all there.
+    """
+
+    def __init__(self, target: str, wall_clock: Callable[[], float] = time.time) -> None:
+        self._target = target
+        self._wall_clock = wall_clock
+        self.reached = False
+
+    def findings(self) -> Iterator[Finding]:
+        """One after the other, as they are found."""
+        host, port = network.split(self._target)
+        name = network.name_finding(host)
+        yield name
+        if name.verdict is Verdict.WRONG:
+            return
+        tcp = network.tcp_finding(host, port)
+        yield tcp
+        if tcp.verdict is Verdict.WRONG:
+            return
+        with GatewayClient(self._target) as client:
+            try:
+                status = client.status()
+            except GatewayError as error:
+                yield wrong("grpc", error.what, "Something listens there, but no gateway", error.remedy)
+                return
+            self.reached = True
+            yield good("grpc", f"the gateway '{status.gateway_name}' answers")
+            yield from self._about_the_gateway(client)
+        yield from _about_the_robot(status)
+
+    def _about_the_gateway(self, client: GatewayClient) -> Iterator[Finding]:
+        begin_s, asked_at_s = time.monotonic(), self._wall_clock()
+        try:
+            info = client.info()
+        except Unsupported:
+            yield robot.old_gateway_finding()
+            return
+        half_s = (time.monotonic() - begin_s) / 2
+        yield robot.version_finding(info.gateway_version, project_version())
+        yield robot.clock_finding(_robot_unix_s(info), asked_at_s + half_s, half_s)
+        yield robot.calls_finding(info)
+
+
+def _robot_unix_s(info: GatewayInfo) -> float:
+    return info.wall_clock_unix_ms / 1000
+
+
+def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:
+    yield robot.health_finding(status)
+    yield from robot.fault_findings(status)
+    yield from robot.source_findings(status)
+    yield robot.encoder_finding(status)
+    endpoint = status.preview.endpoint
+    if status.preview.state is PreviewState.RUNNING and endpoint:
+        yield network.stream_finding(endpoint.host, endpoint.port)
+    access = robot.access_finding(status)
+    if access:
+        yield access

@@ -1,0 +1,81 @@
+"""The way to the robot, below gRPC: its name, its TCP port, the UDP port of its stream."""
+
+import socket
+import time
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Final
+
+from common.findings import Finding, good, wrong
+from console.doctor.srt_probe import answers_as_srt
+
+_WITHIN_S: Final = 2.0
+
+
+def split(target: str) -> tuple[str, int]:
+    """Host (without brackets) and port of HOST:PORT."""
+    host, _, port = target.rpartition(":")
+    return host.strip("[]"), int(port)
+
+
+def name_finding(host: str) -> Finding:
+    """Whether the robot's name leads to an address."""
+    # The resolver can't be told how long to try: it is left behind in a thread of its own.
+    pool = ThreadPoolExecutor(max_workers=1)
+    try:
+        found = pool.submit(socket.getaddrinfo, host, None, type=socket.SOCK_STREAM).result(_WITHIN_S)
+    except (OSError, UnicodeError, FutureTimeoutError) as error:
+        reason = f"no answer within {_WITHIN_S:g} s" if isinstance(error, FutureTimeoutError) else str(error)
+        return wrong(
+            "name",
+            f"'{host}' leads to no address: {reason}",
+            "Without an address nothing can be asked",
+            f"Use the robot's address instead (--target ADDRESS), or look the name up: getent hosts {host}",
+        )
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+    addresses = sorted({str(entry[4][0]) for entry in found})
+    return good("name", f"{host} is {', '.join(addresses)}")
+
+
+def tcp_finding(host: str, port: int) -> Finding:
+    """Whether something listens on the gateway's port."""
+    begin_s = time.monotonic()
+    try:
+        with socket.create_connection((host, port), timeout=_WITHIN_S):
+            took_ms = (time.monotonic() - begin_s) * 1000
+            return good("tcp", f"port {port} of {host} answers after {took_ms:.0f} ms")
+    except OSError as error:
+        return wrong("tcp", *_why_not(error, host, port))
+
+
+def _why_not(error: OSError, host: str, port: int) -> tuple[str, str, str]:
+    if isinstance(error, ConnectionRefusedError):
+        return (
+            f"nothing listens on port {port} of {host}",
+            "The robot is there, but its gateway does not run, or listens on another address or port",
+            "Type on the robot: systemctl status robot-gateway, or robot-gateway doctor",
+        )
+    if isinstance(error, TimeoutError):
+        return (
+            f"{host} does not answer on port {port} within {_WITHIN_S:g} s",
+            "The robot is off, on another network, or a firewall swallows the packets",
+            f"Type: ping {host}",
+        )
+    return (
+        f"no way to {host}: {error.strerror or error}",
+        "This computer and the robot are not on networks that know each other",
+        "Type: ip route",
+    )
+
+
+def stream_finding(host: str, port: int) -> Finding:
+    """Whether the running stream's UDP port answers as SRT does."""
+    if answers_as_srt(host, port):
+        return good("stream", f"the stream answers on UDP port {port} of {host}")
+    return wrong(
+        "stream",
+        f"UDP port {port} of {host} does not answer, though the preview is running",
+        "Status and commands work (TCP), but no picture will come: a firewall between lets no UDP through",
+        f"Open UDP port {port} on the way; on the robot: sudo ss -lunp 'sport = :{port}'",
+    )

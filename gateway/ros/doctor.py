@@ -1,0 +1,126 @@
+"""What ROS 2 on this machine can do for the gateway: middleware, domain, message types, who publishes."""
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.utilities import get_rmw_implementation_identifier
+
+from common.errors import UserError
+from common.findings import Finding, good, note, wrong
+from gateway.config import SourceSettings
+from gateway.ros.lifetime import ros_node
+from gateway.ros.readers import reader_for
+from gateway.ros.subscribing import TypeMissingError, message_class, qos_of
+
+DISCOVERY_S: Final = 3.0
+"""How long publishers are looked for; those of a running robot are usually found in a tenth of it."""
+_LOOK_EVERY_S: Final = 0.1
+
+
+def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
+    """Looks at the ROS 2 graph for a moment, without subscribing to anything."""
+    yield from _environment()
+    readable = []
+    for source in sources:
+        finding = _type_finding(source)
+        yield finding
+        if not finding.remedy:
+            readable.append(source)
+    try:
+        with ros_node("robot_gateway_doctor") as node:
+            yield good("ros", f"ROS 2 starts, with {get_rmw_implementation_identifier()}")
+            offers = _discover(node, readable)
+    except UserError as error:
+        yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)
+        return
+    for source, publishers in offers:
+        yield _offer_finding(source, publishers)
+
+
+def _environment() -> Iterator[Finding]:
+    domain = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    yield good("ros.domain", f"ROS_DOMAIN_ID is {domain}; the robot's programs must have the same")
+    reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "SUBNET"
+    if reach == "OFF":
+        yield wrong(
+            "ros.discovery",
+            "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF",
+            "No publisher is found by itself",
+            "Unset it, or set it to LOCALHOST or SUBNET",
+        )
+
+
+def _type_finding(source: SourceSettings) -> Finding:
+    check = f"type.{_name(source)}"
+    try:
+        reader_for(source)
+        message_class(source.type)
+    except TypeMissingError as error:
+        return wrong(
+            check,
+            str(error),
+            f"{_name(source)} can't be read",
+            f"Install the package beside the gateway: apt install ros-$ROS_DISTRO-{_package(source)}",
+        )
+    except UserError as error:
+        return wrong(check, error.what, f"{_name(source)} can't be read", error.remedy)
+    return good(check, f"{source.type} is installed")
+
+
+def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any]]]:
+    """Who offers each source, as soon as each has somebody, or when time is up."""
+    until_s = time.monotonic() + DISCOVERY_S
+    while True:
+        offers = [(source, list(node.get_publishers_info_by_topic(source.topic))) for source in sources]
+        if all(publishers for _, publishers in offers) or time.monotonic() >= until_s:
+            return offers
+        # Nothing tells of a new publisher unless somebody spins, and nobody does.
+        time.sleep(_LOOK_EVERY_S)
+
+
+def _offer_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
+    check = f"topic.{_name(source)}"
+    if not publishers:
+        tell = wrong if source.required else note
+        return tell(
+            check,
+            f"nobody publishes {source.topic}",
+            f"{_name(source)} can't come",
+            "Start the program that makes it, in the same domain; look with: ros2 topic list",
+        )
+    others = sorted({each.topic_type for each in publishers} - {source.type})
+    if others:
+        return wrong(
+            check,
+            f"{source.topic} is published as {', '.join(others)}, configured is {source.type}",
+            f"{_name(source)} can't come",
+            f"Set the type of this source to {others[0]}",
+        )
+    reasons = [_qos_trouble(source, publisher) for publisher in publishers]
+    if all(reasons):
+        return wrong(
+            check,
+            f"{source.topic} is published with another quality of service: {reasons[0]}",
+            "The middleware connects only what fits: nothing arrives",
+            "Set reliability to best_effort and durability to volatile for this source: they take all",
+        )
+    return good(check, f"{source.topic}: {len(publishers)} publishing")
+
+
+def _qos_trouble(source: SourceSettings, publisher: Any) -> str:
+    compatibility, reason = qos_check_compatible(publisher.qos_profile, qos_of(source))
+    if compatibility != QoSCompatibility.ERROR:
+        return ""
+    # "ERROR: Best effort publisher and reliable subscription;"
+    return str(reason).replace("ERROR: ", "").strip(" ;")
+
+
+def _name(source: SourceSettings) -> str:
+    return source.kind.value
+
+
+def _package(source: SourceSettings) -> str:
+    return source.type.partition("/")[0].replace("_", "-")

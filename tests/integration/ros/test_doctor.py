@@ -1,0 +1,59 @@
+"""The doctor looks at a real graph: what fits, what does not, and what to change."""
+
+import pytest
+from nav_msgs.msg import Odometry
+from rclpy.qos import ReliabilityPolicy
+from sensor_msgs.msg import BatteryState
+
+from common.findings import Finding, Verdict
+from gateway.config import DEFAULT_SOURCES, SourceSettings
+from gateway.ros import doctor
+from gateway.ros.doctor import ros_findings
+from gateway.status.board import SourceKind
+from tests.support.talker import Talker
+
+pytestmark = pytest.mark.ros
+ODOMETRY, VISION, DETECTIONS, BATTERY = DEFAULT_SOURCES[:4]
+
+
+def examined(*sources: SourceSettings) -> dict[str, Finding]:
+    return {finding.check: finding for finding in ros_findings(sources)}
+
+
+def test_what_is_published_as_configured_is_good(talker: Talker) -> None:
+    talker.publisher(ODOMETRY.topic, Odometry)
+    findings = examined(ODOMETRY)
+    assert {finding.verdict for finding in findings.values()} == {Verdict.GOOD}
+    assert set(findings) == {"ros.domain", "type.odometry", "ros", "topic.odometry"}
+
+
+def test_another_type_says_which_to_configure(talker: Talker) -> None:
+    talker.publisher(ODOMETRY.topic, BatteryState)
+    finding = examined(ODOMETRY)["topic.odometry"]
+    assert finding.verdict is Verdict.WRONG
+    assert finding.remedy == "Set the type of this source to sensor_msgs/msg/BatteryState"
+
+
+def test_guarantees_that_exclude_each_other(talker: Talker) -> None:
+    talker.publisher(BATTERY.topic, BatteryState, reliability=ReliabilityPolicy.BEST_EFFORT)
+    strict = BATTERY.model_copy(update={"reliability": "reliable"})
+    finding = examined(strict)["topic.battery"]
+    assert finding.verdict is Verdict.WRONG
+    assert finding.what.endswith(": Best effort publisher and reliable subscription")
+    assert examined(BATTERY)["topic.battery"].verdict is Verdict.GOOD
+
+
+def test_nobody_publishes(talker: Talker, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "DISCOVERY_S", 0.5)
+    findings = examined(ODOMETRY, BATTERY)
+    assert findings["topic.odometry"].verdict is Verdict.WRONG, "it is required"
+    assert findings["topic.battery"].verdict is Verdict.NOTE, "it is not"
+
+
+def test_a_type_that_is_not_installed_says_what_to_install(talker: Talker) -> None:
+    missing = SourceSettings(
+        kind=SourceKind.VISION, topic="/x", type="no_such_msgs/msg/Thing", stale_after_ms=1000
+    )
+    finding = examined(missing)["type.vision"]
+    assert finding.verdict is Verdict.WRONG
+    assert "topic.vision" not in examined(missing)

@@ -1,0 +1,187 @@
+"""What the doctor makes of what it hears; the robot is a real server whose answers the test writes."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import grpc
+import pytest
+
+from common.findings import Finding, Verdict
+from common.version import project_version
+from console.doctor import network, robot
+from console.doctor.examination import Examination
+from console.doctor.srt_probe import answers_as_srt, induction, is_answer
+from omniseer.gateway.v1 import states_pb2 as states
+from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
+from omniseer.gateway.v1.source_pb2 import SOURCE_STATE_QOS_MISMATCH, SOURCE_STATE_SILENT
+from tests.support.gateway_double import GatewayDouble, serving
+
+
+@pytest.fixture
+def double() -> GatewayDouble:
+    double = GatewayDouble()
+    double.info.gateway_version = project_version()
+    return double
+
+
+def examined(double: GatewayDouble, *, ahead_s: float = 0.0) -> dict[str, Finding]:
+    """All findings, by check; the robot's clock is ahead of ours by so much."""
+    double.info.wall_clock_unix_ms = int((time.time() + ahead_s) * 1000)
+    with serving(double) as port:
+        examination = Examination(f"127.0.0.1:{port}")
+        findings = list(examination.findings())
+        assert examination.reached
+    return {finding.check: finding for finding in findings}
+
+
+def test_a_robot_that_is_well(double: GatewayDouble) -> None:
+    findings = examined(double)
+    assert {each.verdict for each in findings.values()} == {Verdict.GOOD, Verdict.NOTE}
+    assert [check for check, each in findings.items() if each.verdict is Verdict.NOTE] == ["encoder"]
+    assert {"name", "tcp", "grpc", "version", "clock", "calls", "health", "encoder"} <= set(findings)
+
+
+@pytest.mark.parametrize(("ahead_s", "word"), [(90.0, "ahead of"), (-90.0, "behind")])
+def test_a_clock_that_is_wrong_says_which_way(double: GatewayDouble, ahead_s: float, word: str) -> None:
+    finding = examined(double, ahead_s=ahead_s)["clock"]
+    assert finding.verdict is Verdict.WRONG
+    assert word in finding.what
+    assert "timedatectl" in finding.remedy
+
+
+def test_a_slow_answer_does_not_accuse_a_clock() -> None:
+    assert robot.clock_finding(100.0, 103.0, uncertainty_s=2.5).verdict is Verdict.GOOD
+    assert robot.clock_finding(100.0, 103.0, uncertainty_s=1.5).verdict is Verdict.WRONG
+
+
+def test_another_version_is_worth_a_note(double: GatewayDouble) -> None:
+    double.info.gateway_version = "0.0.1"
+    finding = examined(double)["version"]
+    assert (finding.verdict, "0.0.1" in finding.what) == (Verdict.NOTE, True)
+
+
+def test_an_older_gateway_is_examined_all_the_same(double: GatewayDouble) -> None:
+    class Old(GatewayDouble):
+        def GetGatewayInfo(self, request: object, context: grpc.ServicerContext) -> None:  # type: ignore[override]  # noqa: N802
+            context.abort(grpc.StatusCode.UNIMPLEMENTED, "no such method")
+
+    findings = examined(Old())
+    assert findings["version"].verdict is Verdict.NOTE
+    assert "older" in findings["version"].what
+    assert findings["health"].verdict is Verdict.GOOD
+    assert "clock" not in findings
+
+
+def test_a_source_that_is_visible_and_silent_is_named_once(double: GatewayDouble) -> None:
+    double.status.sources.add(name="odometry", state=SOURCE_STATE_SILENT, detail="offered, nothing arrived")
+    double.status.sources.add(name="battery", state=SOURCE_STATE_QOS_MISMATCH, detail="other guarantees")
+    double.status.faults.add(
+        id="odometry.silent",
+        active=True,
+        severity=FAULT_SEVERITY_ERROR,
+        message="offered, nothing arrived",
+        remedy="look at it",
+    )
+    findings = examined(double)
+    assert findings["fault.odometry.silent"].verdict is Verdict.WRONG
+    assert findings["fault.odometry.silent"].remedy == "look at it"
+    assert "source.odometry" not in findings
+    assert "reliability" in findings["source.battery"].remedy
+
+
+def test_a_fault_that_is_over_is_not_told(double: GatewayDouble) -> None:
+    double.status.faults.add(id="odometry.stale", message="stopped coming", cleared_age_ms=10)
+    assert "fault.odometry.stale" not in examined(double)
+
+
+def test_a_gateway_that_failed_calls_is_wrong(double: GatewayDouble) -> None:
+    double.info.methods.add(method="GetSystemStatus", served=9, failed=2)
+    assert examined(double)["calls"].what.startswith("2 calls ended")
+
+
+def test_a_running_preview_behind_a_firewall(double: GatewayDouble) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        double.status.preview.state = states.PREVIEW_RUNNING
+        double.status.preview.encoder.name = "x264"
+        double.status.preview.endpoint.host = "127.0.0.1"
+        double.status.preview.endpoint.port = deaf.getsockname()[1]
+        findings = examined(double)
+    assert findings["encoder"].verdict is Verdict.GOOD
+    assert findings["stream"].verdict is Verdict.WRONG
+    assert "firewall" in findings["stream"].why
+
+
+def test_a_running_preview_that_answers(double: GatewayDouble) -> None:
+    with srt_listener() as port:
+        assert network.stream_finding("127.0.0.1", port).verdict is Verdict.GOOD
+
+
+def test_nothing_listens() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # bound, not listening: refused
+        examination = Examination(f"127.0.0.1:{taken.getsockname()[1]}")
+        name, tcp = examination.findings()
+    assert not examination.reached
+    assert (name.verdict, tcp.verdict) == (Verdict.GOOD, Verdict.WRONG)
+    assert "robot-gateway doctor" in tcp.remedy
+
+
+def test_a_name_that_leads_nowhere_ends_it() -> None:
+    (name,) = Examination("no-such-robot.invalid:50051").findings()
+    assert name.verdict is Verdict.WRONG
+    assert "getent" in name.remedy
+
+
+def test_something_else_listens_there() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        examination = Examination(f"127.0.0.1:{server.getsockname()[1]}")
+        findings = list(examination.findings())
+    assert [finding.check for finding in findings] == ["name", "tcp", "grpc"]
+    assert findings[-1].verdict is Verdict.WRONG
+    assert not examination.reached
+
+
+def test_an_address_with_brackets_is_split() -> None:
+    assert network.split("[fe80::1]:50051") == ("fe80::1", 50051)
+
+
+def test_packets_that_are_no_answer() -> None:
+    assert not is_answer(b"")
+    assert not is_answer(induction())
+    assert not is_answer(bytes(64))
+
+
+def test_a_closed_port_is_known_at_once() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
+        gone.bind(("127.0.0.1", 0))
+        port = gone.getsockname()[1]
+    assert not answers_as_srt("127.0.0.1", port)
+
+
+@contextmanager
+def srt_listener() -> Iterator[int]:
+    """Answers the first packet of a handshake as libsrt does, and loses the first one it gets."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(5)
+
+        def serve() -> None:
+            listener.recv(2048)
+            asked, caller = listener.recvfrom(2048)
+            answer = bytearray(asked)
+            answer[12:16] = asked[40:44]  # to the caller's id
+            answer[16:20] = (5).to_bytes(4, "big")
+            answer[22:24] = (0x4A17).to_bytes(2, "big")
+            answer[44:48] = b"cook"
+            listener.sendto(answer, caller)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            yield listener.getsockname()[1]
+        finally:
+            thread.join()

@@ -1,0 +1,79 @@
+"""What the doctor on the robot makes of devices, doors and configuration."""
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from common.findings import Finding, Verdict
+from gateway.doctor.devices import device_findings
+from gateway.doctor.doors import operator_door, preview_door
+from gateway.doctor.examination import examine
+
+
+def test_a_configuration_that_is_wrong_ends_it(tmp_path: Path) -> None:
+    config = tmp_path / "gateway.yaml"
+    config.write_text("grpc: {prot: 1}\n", encoding="utf-8")
+    (finding,) = examine(config)
+    assert (finding.check, finding.verdict) == ("configuration", Verdict.WRONG)
+    assert "grpc.prot" in finding.what
+
+
+def test_a_gateway_without_sources_needs_no_ros(tmp_path: Path) -> None:
+    config = tmp_path / "gateway.yaml"
+    config.write_text("sources: []\n", encoding="utf-8")
+    findings: dict[str, Finding] = {finding.check: finding for finding in examine(config)}
+    assert findings["configuration"].verdict is Verdict.GOOD
+    assert findings["ros"].what == "no sources are configured; ROS is not used"
+
+
+def test_a_machine_without_devices_is_worth_a_note(tmp_path: Path) -> None:
+    (finding,) = device_findings(tmp_path)
+    assert finding.verdict is Verdict.NOTE
+
+
+def test_devices_of_every_family_are_looked_at(tmp_path: Path) -> None:
+    for name in ("video11", "dri/renderD128", "mpp_service", "rga", "dma_heap/system", "nvidia0", "null"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    findings = {finding.check: finding for finding in device_findings(tmp_path)}
+    assert set(findings) == {
+        f"device.{name}" for name in ("video11", "renderD128", "mpp_service", "rga", "system", "nvidia0")
+    }
+    assert {finding.verdict for finding in findings.values()} == {Verdict.GOOD}
+
+
+def test_a_device_of_another_group_says_which(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Root may everything: the kernel's answer is put in its place.
+    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    device = tmp_path / "video11"
+    device.touch(mode=0o660)
+    (finding,) = device_findings(tmp_path)
+    assert finding.verdict is Verdict.WRONG
+    assert f"usermod -aG {device.group()} $USER" in finding.remedy
+
+
+def test_the_operators_door() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert operator_door("127.0.0.1", port).verdict is Verdict.GOOD
+        assert operator_door("0.0.0.0", port).verdict is Verdict.GOOD
+    assert operator_door("127.0.0.1", port).verdict is Verdict.NOTE
+    assert operator_door("127.0.0.1", 0).verdict is Verdict.NOTE
+
+
+def test_the_previews_door(tmp_path: Path) -> None:
+    path = tmp_path / "preview.sock"
+    assert "robot-preview serve" in preview_door(path).remedy
+    assert f"directory {tmp_path / 'gone'}" in preview_door(tmp_path / "gone/preview.sock").remedy
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
+        server.listen()
+        assert preview_door(path).verdict is Verdict.GOOD
+    left_over = preview_door(path)
+    assert (left_over.verdict, "left over" in left_over.what) == (Verdict.WRONG, True)
+    path.unlink()
+    path.write_text("no socket", encoding="utf-8")
+    assert preview_door(path).verdict is Verdict.WRONG
