@@ -114,7 +114,7 @@ def _qos_trouble(source: SourceSettings, publisher: Any) -> str:
     compatibility, reason = qos_check_compatible(publisher.qos_profile, qos_of(source))
     if compatibility != QoSCompatibility.ERROR:
         return ""
-    # "ERROR: Best effort publisher and reliable subscription;"
+    # The middleware marks it as an error in its own way, and ends it with a semicolon.
     return str(reason).replace("ERROR: ", "").strip(" ;")
 
 
