@@ -14,6 +14,10 @@ _CPU_CHIPS: Final = frozenset({"coretemp", "k10temp", "zenpower", "cpu_thermal"}
 """Hardware monitors of processors that have no thermal zone."""
 _CPU_COOLERS: Final = ("cpufreq", "thermal-cpufreq", "processor")
 """Cooling devices that cool by clocking down; a fan is none of them."""
+_PI_THROTTLED: Final = "devices/platform/soc/soc:firmware/get_throttled"
+"""Where a Raspberry Pi's firmware tells, in hexadecimal; it slows down without asking the kernel."""
+_PI_SLOWED_BY_HEAT: Final = 0b1110
+"""Its bits for "clock capped", "throttled" and "soft temperature limit" at this moment."""
 _PLAUSIBLE_C: Final = range(-40, 151)
 
 
@@ -33,6 +37,11 @@ def read(disk_path: Path, sys: Path = Path("/sys")) -> Compute:
         ram_total_bytes=memory.total,
         disk_used_percent=_disk_used_percent(disk_path),
     )
+
+
+def begin() -> None:
+    """Notes where the processor's counters stand: the first call of `read` tells the load since then."""
+    psutil.cpu_percent(interval=None)
 
 
 def temperature_c(sys: Path) -> float | None:
@@ -59,8 +68,18 @@ def throttled(sys: Path) -> bool | None:
         for cooler in sys.glob("class/thermal/cooling_device*")
         if (text(cooler / "type") or "").lower().startswith(_CPU_COOLERS)
     ]
-    known = [state for state in states if state is not None]
+    known = [state > 0 for state in states if state is not None]
+    firmware = _firmware_throttles(sys)
+    if firmware is not None:
+        known.append(firmware)
     return any(known) if known else None
+
+
+def _firmware_throttles(sys: Path) -> bool | None:
+    try:
+        return bool(int(text(sys / _PI_THROTTLED) or "", 16) & _PI_SLOWED_BY_HEAT)
+    except ValueError:
+        return None
 
 
 def _disk_used_percent(path: Path) -> float | None:

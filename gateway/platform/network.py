@@ -13,6 +13,12 @@ _QUALITY_SCALE: Final = 70
 """What Linux drivers count their link quality up to."""
 _LEAST_FIELDS: Final = 4
 """Columns of /proc/net/wireless up to the signal."""
+_PLAUSIBLE_DBM: Final = range(-120, 0)
+"""An interface that has lost its network tells -256."""
+_DEFAULT_ROUTE_6: Final = ("0" * 32, "00")
+"""Destination and prefix length."""
+_UNREACHABLE_6: Final = 0x0200
+"""Route flag: reject; the kernel keeps one such default route by itself."""
 
 
 def read(interface: str | None, proc: Path = Path("/proc")) -> Network:
@@ -35,10 +41,26 @@ def read(interface: str | None, proc: Path = Path("/proc")) -> Network:
 
 
 def default_interface(proc: Path) -> str | None:
-    """The interface of the default route with the smallest metric; None when no route leads out."""
-    routes = [line.split() for line in _lines(proc / "net/route")[1:]]
-    out = [(int(route[6]), route[0]) for route in routes if len(route) > 6 and route[1] == _DEFAULT_ROUTE]
+    """The interface of the default route with the smallest metric, IPv4 first; None when none leads out."""
+    out = _default_routes_4(proc) or _default_routes_6(proc)
     return min(out)[1] if out else None
+
+
+def _default_routes_4(proc: Path) -> list[tuple[int, str]]:
+    """Metric and interface of each."""
+    routes = [line.split() for line in _lines(proc / "net/route")[1:]]
+    return [(int(route[6]), route[0]) for route in routes if len(route) > 6 and route[1] == _DEFAULT_ROUTE]
+
+
+def _default_routes_6(proc: Path) -> list[tuple[int, str]]:
+    routes = [line.split() for line in _lines(proc / "net/ipv6_route")]
+    return [
+        (int(route[5], 16), route[9])
+        for route in routes
+        if len(route) > 9
+        and (route[0], route[1]) == _DEFAULT_ROUTE_6
+        and not int(route[8], 16) & _UNREACHABLE_6
+    ]
 
 
 def wireless(name: str, proc: Path) -> tuple[int | None, int | None]:
@@ -49,7 +71,7 @@ def wireless(name: str, proc: Path) -> tuple[int | None, int | None]:
             quality, signal = (float(field) for field in fields[2:4])
             return (
                 min(100, round(100 * quality / _QUALITY_SCALE)) if quality >= 0 else None,
-                int(signal) if signal < 0 else None,
+                int(signal) if int(signal) in _PLAUSIBLE_DBM else None,
             )
     return None, None
 

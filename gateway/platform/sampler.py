@@ -20,6 +20,8 @@ from gateway.status.values import Received
 _log = logging.getLogger(__name__)
 
 _STOP_WITHIN_S: Final = 1.0
+_FIRST_AFTER_S: Final = 0.1
+"""The load of the processor needs two looks at its counters, and some time between them."""
 
 
 class PlatformSampler:
@@ -63,7 +65,10 @@ class PlatformSampler:
     def _run(self) -> None:
         interval_s = self._settings.interval_ms / 1000
         failing = False
-        while True:
+        compute.begin()
+        pause_s = min(_FIRST_AFTER_S, interval_s)
+        while not self._stop.wait(pause_s):
+            pause_s = interval_s
             try:
                 self.sample()
                 failing = False
@@ -72,5 +77,3 @@ class PlatformSampler:
                 if not failing:
                     _log.warning("the computer's own state can't be read: %s", error)
                 failing = True
-            if self._stop.wait(interval_s):
-                return

@@ -66,6 +66,14 @@ def test_a_processor_that_is_clocked_down_is_throttled(tmp_path: Path, state: st
     assert compute.throttled(machine) is expected
 
 
+@pytest.mark.parametrize(("bits", "expected"), [("0", False), ("50000", False), ("e0008", True), ("4", True)])
+def test_a_raspberry_pis_firmware_tells_what_is_now_not_what_was(
+    tmp_path: Path, bits: str, expected: bool
+) -> None:
+    pi = tree(tmp_path, {"devices/platform/soc/soc:firmware/get_throttled": bits})
+    assert compute.throttled(pi) is expected
+
+
 def test_a_machine_that_does_not_tell_is_not_said_to_be_cool(tmp_path: Path) -> None:
     fan = {"class/thermal/cooling_device0/type": "pwm-fan", "class/thermal/cooling_device0/cur_state": "4"}
     assert compute.throttled(tree(tmp_path, fan)) is None
@@ -92,6 +100,23 @@ WIRELESS = """Inter-| sta-|   Quality        |   Discarded packets              
 def test_the_way_out_is_the_default_route_with_the_smallest_metric(tmp_path: Path) -> None:
     assert network.default_interface(tree(tmp_path, {"net/route": ROUTES})) == "eth0"
     assert network.default_interface(tmp_path / "nothing") is None
+
+
+ROUTES_6 = f"""{"0" * 32} 00 {"0" * 32} 00 {"0" * 32} ffffffff 00000001 00000000 00200200 lo
+{"0" * 32} 00 {"0" * 32} 00 fe80{"0" * 27}1 00000400 00000001 00000000 00000003 wlan0
+{"0" * 32} 00 {"0" * 32} 00 fe80{"0" * 27}1 00000064 00000001 00000000 00000003 eth1
+fe80{"0" * 28} 40 {"0" * 32} 00 {"0" * 32} 00000001 00000001 00000000 00000001 eth0"""
+
+
+def test_a_network_without_ipv4_has_a_way_out_as_well(tmp_path: Path) -> None:
+    proc = tree(tmp_path, {"net/route": ROUTES.splitlines()[0], "net/ipv6_route": ROUTES_6})
+    assert network.default_interface(proc) == "eth1"
+    assert network.default_interface(tree(tmp_path, {"net/route": ROUTES})) == "eth0", "IPv4 goes first"
+
+
+def test_an_interface_that_lost_its_network_has_no_signal(tmp_path: Path) -> None:
+    lost = WIRELESS.replace("49.  -61.", " 0.  -256.")
+    assert network.wireless("wlan0", tree(tmp_path, {"net/wireless": lost})) == (0, None)
 
 
 def test_a_wireless_interface_tells_signal_and_quality(tmp_path: Path) -> None:
