@@ -16,8 +16,8 @@ _CPU_COOLERS: Final = ("cpufreq", "thermal-cpufreq", "processor")
 """Cooling devices that cool by clocking down; a fan is none of them."""
 _PI_THROTTLED: Final = "devices/platform/soc/soc:firmware/get_throttled"
 """Where a Raspberry Pi's firmware tells, in hexadecimal; it slows down without asking the kernel."""
-_PI_SLOWED_BY_HEAT: Final = 0b1110
-"""Its bits for "clock capped", "throttled" and "soft temperature limit" at this moment."""
+_PI_SLOWED_BY_HEAT: Final = 0b1100
+"""Its bits for "throttled" and "soft temperature limit" at this moment."""
 _PLAUSIBLE_C: Final = range(-40, 151)
 
 
