@@ -36,20 +36,21 @@ class Joining:
         self._request = request_key_frame
         self._last_request_at = float("-inf")
         self._timer: asyncio.TimerHandle | None = None
+        self._pad = parts.parser_pad
+        self._gate_id: int | None = None
+        """Of the probe that holds pictures back; None while there is none, which is nearly always: a probe
+        in Python costs time with every picture."""
         self._may_hold = 0
         """How many more pictures the gate may hold back."""
-        handler = parts.sink.connect("caller-added", self._on_caller)
-        probe = parts.parser_pad.add_probe(Gst.PadProbeType.BUFFER, self._gate)
-        self._detach: tuple[Callable[[], None], ...] = (
-            partial(parts.sink.disconnect, handler),
-            partial(parts.parser_pad.remove_probe, probe),
-        )
+        self._disconnect = partial(parts.sink.disconnect, parts.sink.connect("caller-added", self._on_caller))
 
     def detach(self) -> None:
-        """Lets go of the pipeline."""
-        for release in self._detach:
-            release()
-        self._detach = ()
+        """Lets go of the pipeline, whose listener has stopped: nobody joins any more."""
+        self._disconnect()
+        gate_id, self._gate_id = self._gate_id, None
+        if gate_id is not None:
+            self._pad.remove_probe(gate_id)
+        del self._pad
         if self._timer:
             self._timer.cancel()
 
@@ -57,15 +58,15 @@ class Joining:
         """On SRT's thread, under its lock: closes the gate and hands over."""
         if time.monotonic() - self._last_request_at >= _KEY_FRAMES_APART_S:
             self._may_hold = _HELD_AT_MOST
+            if self._gate_id is None:
+                self._gate_id = self._pad.add_probe(Gst.PadProbeType.BUFFER, self._gate)
         self._crossing.hand_over(self._joined)
 
     def _gate(self, _pad: Any, info: Any) -> Any:
-        """On the encoder's thread, once per picture."""
-        if self._may_hold == 0:
-            return Gst.PadProbeReturn.OK
-        if not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT):
-            self._may_hold = 0
-            return Gst.PadProbeReturn.OK
+        """On the encoder's thread, for the pictures until the key frame."""
+        if self._may_hold == 0 or not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT):
+            self._gate_id = None
+            return Gst.PadProbeReturn.REMOVE
         self._may_hold -= 1
         return Gst.PadProbeReturn.DROP
 

@@ -46,7 +46,7 @@ from preview.values import Measurement, Profile, Target
 
 _log = logging.getLogger(__name__)
 
-_LOOK_EVERY_S: Final = 0.1
+_LOOK_EVERY_S: Final = 0.2
 MEASURE_EVERY_S: Final = 0.5
 _INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
