@@ -37,11 +37,25 @@ from gateway.status.preview import (
 )
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.values import Battery, Compute, Network, Odometry, Received, Vision
+from gateway.status.values import (
+    Battery,
+    CommandSource,
+    Compute,
+    DiagnosticItem,
+    DiagnosticLevel,
+    Diagnostics,
+    Mode,
+    Network,
+    Odometry,
+    Received,
+    Velocity,
+    Vision,
+)
 
 EMPTY_METHOD = "/bench.Reference/Empty"
 _TOO_HOT = Condition("platform.temperature", Severity.WARNING, "computer", "it is too hot", "let it cool")
 FAULTS = (Fault(_TOO_HOT, onset_s=0.0, seen_s=1.0, cleared_s=None, times_raised=1),) * 5
+_ALL_WELL = Diagnostics((DiagnosticItem("lidar", DiagnosticLevel.OK, ""),) * 20)
 _NEWS_EVERY_S = 0.05
 """The gateway reads its sources 20 times a second."""
 
@@ -60,7 +74,7 @@ async def _serve() -> None:
     def snapshot() -> Snapshot:
         return take(
             identity=Identity("bench", "0.0.0", insecure=False),
-            rules=Rules({kind: SourceRule(1000, required=True) for kind in SourceKind}, 3000),
+            rules=_RULES,
             board=board,
             preview=link.view,
             events=events.newest(),
@@ -103,6 +117,10 @@ async def _bring_news(board: Board, reconciler: Reconciler) -> None:
     while True:
         now = time.monotonic()
         board.odometry = Received(Odometry(vx_mps=0.51, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board.mode = Received(Mode("exploring"), now)
+        board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
+        board.mux_inputs[CommandSource.KEYBOARD] = board.effective_command
+        board.diagnostics = Received(_ALL_WELL, now)
         board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
         board.battery = Received(
             Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now
@@ -116,6 +134,8 @@ async def _bring_news(board: Board, reconciler: Reconciler) -> None:
         await asyncio.sleep(_NEWS_EVERY_S)
 
 
+_RULE = SourceRule(1000, required=True)
+_RULES = Rules(dict.fromkeys(SourceKind, _RULE), 3000, dict.fromkeys(CommandSource, _RULE))
 _RUNNING = Actual(
     instance_id="bench",
     applied_revision=1,

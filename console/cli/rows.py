@@ -97,6 +97,7 @@ def status_rows(status: SystemStatus) -> list[Row]:
         _sampled("computer battery", power.onboard_battery, _battery(power.onboard_battery)),
         _sampled("computer", status.platform.compute, _compute(status.platform.compute)),
         _sampled("network", status.platform.network, _network(status.platform.network)),
+        _sampled("mode", status.mission, status.mission.mode or ""),
         _sampled("command", status.effective_command, _command(status.effective_command)),
     )
     rows += [row for row in optional if row.text]

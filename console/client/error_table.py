@@ -54,6 +54,7 @@ _PLAIN_WORDS: Final = (
     ("no route to host", "no route to this host"),
     ("network is unreachable", "no network leads there"),
     ("fd shutdown", "no answer"),
+    ("handshaker shutdown", "no answer"),
     ("timeout occurred", "no answer"),
     ("timed out", "no answer"),
     ("socket closed", "the connection was closed"),

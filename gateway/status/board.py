@@ -7,7 +7,19 @@ there is no lock, no queue and nobody waits. An older value is simply gone.
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Received, Vision
+from gateway.status.values import (
+    Battery,
+    CommandSource,
+    Compute,
+    Detections,
+    Diagnostics,
+    Mode,
+    Network,
+    Odometry,
+    Received,
+    Velocity,
+    Vision,
+)
 
 
 class SourceKind(Enum):
@@ -17,6 +29,27 @@ class SourceKind(Enum):
     VISION = "vision"
     DETECTIONS = "detections"
     BATTERY = "battery"
+    DIAGNOSTICS = "diagnostics"
+    MODE = "mode"
+    EFFECTIVE_COMMAND = "effective_command"
+    """What the robot's command mux lets through."""
+    MUX_INPUT = "mux_input"
+    """What one of those who may command asks for; several, told apart by their CommandSource."""
+
+
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """Who offers a source on the robot's message bus at this moment.
+
+    Attributes:
+        offered_by: how many publishers there are, of whatever type.
+        qos_mismatch: whether each of them excludes us by its quality of service.
+        wrong_type: whether each of them publishes another type than configured.
+    """
+
+    offered_by: int
+    qos_mismatch: bool = False
+    wrong_type: bool = False
 
 
 @dataclass(slots=True)
@@ -28,9 +61,16 @@ class Board:
     detections: Received[Detections] | None = None
     battery: Received[Battery] | None = None
     """The traction battery, as the robot's message bus tells it."""
+    diagnostics: Received[Diagnostics] | None = None
+    mode: Received[Mode] | None = None
+    effective_command: Received[Velocity] | None = None
+    mux_inputs: dict[CommandSource, Received[Velocity]] = field(default_factory=dict)
+    """One slot per input; the keys are set before anybody writes."""
     compute: Received[Compute] | None = None
     network: Received[Network] | None = None
     onboard_battery: Received[Battery] | None = None
     """The computer's own battery, as its operating system tells it."""
+    presence: dict[str, Presence] = field(default_factory=dict)
+    """Who offers each source, by its name ("odometry", "mux_input.keyboard")."""
     unusable: dict[SourceKind, str] = field(default_factory=dict)
     """Sources that can't deliver (message type not installed), with the reason for a person."""

@@ -19,7 +19,7 @@ class Observer:
         self._book = book
         self._rules = rules
         self._started_s: float | None = None
-        self._preview = ""
+        self._preview = self._mode = ""
 
     def observe(self, snapshot: Snapshot) -> list[str]:
         """The events that this snapshot brings, a sentence each."""
@@ -34,6 +34,10 @@ class Observer:
         if preview != self._preview and not first:
             news.append(preview)
         self._preview = preview
+        mode = snapshot.mode.value.name if snapshot.mode.value else ""
+        if mode != self._mode and not first:
+            news.append(f"robot mode: {mode}")
+        self._mode = mode
         return news
 
 

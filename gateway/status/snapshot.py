@@ -1,18 +1,29 @@
 """One instant of everything: the newest values, their freshness and the verdict that follows."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from gateway.status.board import Board, SourceKind
+from gateway.status.command import Command, effective_command
 from gateway.status.events import Event
 from gateway.status.faults.fault import Fault
 from gateway.status.freshness import Freshness, Sample, sample
 from gateway.status.health import Health, assess
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.runtime import UNKNOWN, Runtime
-from gateway.status.sources import SourceView, sentence, state_of
-from gateway.status.values import Battery, Compute, Detections, Network, Odometry, Vision
+from gateway.status.sources import SourceView, detail, state_of, words_for
+from gateway.status.values import (
+    Battery,
+    CommandSource,
+    Compute,
+    Detections,
+    Diagnostics,
+    Mode,
+    Network,
+    Odometry,
+    Vision,
+)
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
 
@@ -39,7 +50,9 @@ class Rules:
     """What is expected of everything. A kind that is not in `sources` is not configured."""
 
     sources: Mapping[SourceKind, SourceRule]
+    """All but the mux inputs."""
     platform_stale_after_ms: int
+    mux_inputs: Mapping[CommandSource, SourceRule] = field(default_factory=dict)
 
     def stale_after_ms(self, kind: SourceKind) -> int:
         """The limit of a source; 0 for one that is not configured, and so never has a value."""
@@ -64,6 +77,9 @@ class Snapshot:
     vision: Sample[Vision]
     detections: Sample[Detections]
     battery: Sample[Battery]
+    diagnostics: Sample[Diagnostics]
+    mode: Sample[Mode]
+    command: Sample[Command]
     compute: Sample[Compute]
     network: Sample[Network]
     onboard_battery: Sample[Battery]
@@ -100,6 +116,14 @@ def take(
         vision=vision,
         detections=sample(board.detections, rules.stale_after_ms(SourceKind.DETECTIONS), now_s),
         battery=sample(board.battery, rules.stale_after_ms(SourceKind.BATTERY), now_s),
+        diagnostics=sample(board.diagnostics, rules.stale_after_ms(SourceKind.DIAGNOSTICS), now_s),
+        mode=sample(board.mode, rules.stale_after_ms(SourceKind.MODE), now_s),
+        command=effective_command(
+            board.effective_command,
+            board.mux_inputs,
+            rules.stale_after_ms(SourceKind.EFFECTIVE_COMMAND),
+            now_s,
+        ),
         compute=sample(board.compute, rules.platform_stale_after_ms, now_s),
         network=sample(board.network, rules.platform_stale_after_ms, now_s),
         onboard_battery=sample(board.onboard_battery, rules.platform_stale_after_ms, now_s),
@@ -113,14 +137,16 @@ def take(
 
 def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
     for kind, rule in rules.sources.items():
-        freshness = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
-        state, words = state_of(freshness, board.unusable.get(kind)), kind.value.replace("_", " ")
-        yield SourceView(
-            kind=kind,
-            name=kind.value,
-            words=words,
-            state=state,
-            freshness=freshness,
-            required=rule.required,
-            detail=sentence(state, words),
-        )
+        if kind is not SourceKind.MUX_INPUT:
+            seen = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
+            yield _source(kind, kind.value, rule, seen, board)
+    for giver, rule in rules.mux_inputs.items():
+        seen = sample(board.mux_inputs.get(giver), rule.stale_after_ms, now_s).freshness
+        yield _source(SourceKind.MUX_INPUT, f"{SourceKind.MUX_INPUT.value}.{giver.value}", rule, seen, board)
+
+
+def _source(kind: SourceKind, name: str, rule: SourceRule, seen: Freshness, board: Board) -> SourceView:
+    presence = board.presence.get(name)
+    state = state_of(seen, presence, unusable=kind in board.unusable)
+    words = words_for(name)
+    return SourceView(kind, name, words, state, seen, rule.required, detail(state, words, presence))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final
 
-from gateway.status.board import SourceKind
+from gateway.status.board import Presence, SourceKind
 from gateway.status.freshness import Freshness
 
 
@@ -58,15 +58,32 @@ _SENTENCES: Final[Mapping[SourceState, str]] = {
 """Total: every state in a sentence, free of the robot's own names."""
 
 
-def sentence(state: SourceState, words: str) -> str:
-    """The state of the source that operators call `words`; empty while all is well."""
+def words_for(name: str) -> str:
+    """A source's name for people: "odometry", "commands of keyboard"."""
+    kind, _, giver = name.partition(".")
+    return f"commands of {giver}" if giver else kind.replace("_", " ")
+
+
+def detail(state: SourceState, words: str, presence: Presence | None) -> str:
+    """The state of the source that operators call `words`, in a sentence; empty while all is well."""
+    if state is SourceState.RECEIVING and presence and presence.offered_by > 1:
+        return f"{presence.offered_by} programs offer {words}: what is shown may be of any of them"
+    if state is SourceState.STALE and presence and presence.offered_by == 0:
+        return f"{words} stopped coming: nobody on the robot offers it any more"
     return _SENTENCES[state].format(words=words)
 
 
-def state_of(freshness: Freshness, unusable: str | None) -> SourceState:
-    """The state that follows."""
-    if unusable is not None:
+def state_of(freshness: Freshness, presence: Presence | None, *, unusable: bool) -> SourceState:
+    """The state that follows. Without `presence` nobody has looked who offers it."""
+    if unusable:
         return SourceState.TYPE_MISSING
-    if freshness.available:
-        return SourceState.STALE if freshness.stale else SourceState.RECEIVING
-    return SourceState.WAITING
+    if freshness.fresh:
+        return SourceState.RECEIVING
+    if presence and presence.offered_by:
+        if presence.wrong_type:
+            return SourceState.WRONG_TYPE
+        if presence.qos_mismatch:
+            return SourceState.QOS_MISMATCH
+        if not freshness.available:
+            return SourceState.SILENT
+    return SourceState.STALE if freshness.available else SourceState.WAITING

@@ -4,6 +4,7 @@ A value that is not known is None. Numbers are finite: readers drop NaN and infi
 """
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Generic, TypeVar
 
 
@@ -59,6 +60,56 @@ class Battery:
     voltage_v: float | None
     charge_percent: float | None
     charging: bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """A velocity command, in the robot's own frame: x forward, y left, z up."""
+
+    vx_mps: float
+    vy_mps: float
+    wz_rad_s: float
+
+
+class CommandSource(Enum):
+    """Who may command the robot: the inputs of its command mux."""
+
+    KEYBOARD = "keyboard"
+    AUTONOMY = "autonomy"
+    NAVIGATION = "navigation"
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """What the robot is about, in its own words: "idle", "exploring", "returning"."""
+
+    name: str
+
+
+class DiagnosticLevel(Enum):
+    """What a component of the robot says of itself."""
+
+    OK = "ok"
+    WARNING = "warning"
+    ERROR = "error"
+    STALE = "stale"
+    """Whoever watches the component has heard nothing from it for too long."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticItem:
+    """The newest word of one component."""
+
+    component: str
+    level: DiagnosticLevel
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostics:
+    """The newest word of every component that ever spoke, whichever message it came in."""
+
+    items: tuple[DiagnosticItem, ...]
 
 
 ValueT_co = TypeVar("ValueT_co", covariant=True)

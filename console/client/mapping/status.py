@@ -10,6 +10,7 @@ from console.client.mapping.sources import source
 from console.client.results import (
     EffectiveCommand,
     Health,
+    Mission,
     Odometry,
     SystemStatus,
     Teleop,
@@ -33,6 +34,7 @@ def system_status(message: wire.SystemStatus) -> SystemStatus:
         effective_command=_effective_command(message.effective_command),
         teleop=_teleop(message.teleop),
         faults=tuple(fault(each) for each in message.faults),
+        mission=_mission(message.mission),
         sources=tuple(source(each) for each in message.sources),
         gateway=gateway_facts(message.gateway, told=message.HasField("gateway")),
     )
@@ -86,6 +88,13 @@ def _teleop(message: wire.TeleopStatus) -> Teleop:
             vy_mps=number_when(here, message.last_command_vy_mps),
             wz_rad_s=number_when(here, message.last_command_wz_rad_s),
         ),
+    )
+
+
+def _mission(message: wire.MissionStatus) -> Mission:
+    here = message.available
+    return Mission(
+        available=here, stale=message.stale, age_ms=when(here, message.age_ms), mode=when(here, message.mode)
     )
 
 

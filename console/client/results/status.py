@@ -98,6 +98,14 @@ class EffectiveCommand(Sample):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mission(Sample):
+    """What the robot is about. One that tells its mode only when it changes still has it when stale."""
+
+    mode: str | None
+    """In the robot's own words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SystemStatus:
     """Everything a gateway knows about its robot, at one instant."""
 
@@ -114,6 +122,7 @@ class SystemStatus:
     teleop: Teleop
     faults: tuple[Fault, ...]
     """What is wrong, the worst first; then what was wrong a moment ago, the newest first."""
+    mission: Mission
     sources: tuple[Source, ...]
     """Everything the gateway is configured to read."""
     gateway: GatewayFacts

@@ -1,6 +1,7 @@
 """The whole status, and the overlay, as the contract tells them."""
 
 import math
+from typing import Final
 
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import HEALTH_STATES
@@ -9,18 +10,21 @@ from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.sources import source_status
+from gateway.status.command import Command
 from gateway.status.events import Event
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
-from gateway.status.values import Detection, Detections, Odometry, Vision
+from gateway.status.values import Detection, Detections, Mode, Odometry, Vision
 from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
+
+# Who gave a command that can't be attributed.
+_NOBODY: Final = "unknown"
 
 
 def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.SystemStatus:
     """Everything but detections and events.
 
-    `teleop` and `effective_command` stay unset: this gateway has no such values, and unset reads as
-    "not available" by their own fields.
+    `teleop` stays unset: this gateway has no such values, and unset reads as "not available".
     """
     return system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
@@ -29,6 +33,8 @@ def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.Syste
         vision=_vision(snapshot.vision),
         health=_health(snapshot),
         platform=platform_status(snapshot),
+        effective_command=_command(snapshot.command),
+        mission=_mission(snapshot.mode),
         insecure=snapshot.identity.insecure,
         faults=[fault_message(fault, snapshot.at_s) for fault in snapshot.faults],
         sources=[source_status(source) for source in snapshot.sources],
@@ -76,6 +82,32 @@ def _health(snapshot: Snapshot) -> system_status_pb2.RobotHealth:
         measured_vx_mps=motion.vx_mps,
         measured_vy_mps=motion.vy_mps,
         measured_wz_rad_s=motion.wz_rad_s,
+    )
+
+
+def _command(sample: Sample[Command]) -> system_status_pb2.EffectiveCommand:
+    command = sample.value
+    if command is None:
+        return system_status_pb2.EffectiveCommand()
+    return system_status_pb2.EffectiveCommand(
+        available=True,
+        stale=sample.freshness.stale,
+        age_ms=sample.freshness.age_ms,
+        vx_mps=command.velocity.vx_mps,
+        vy_mps=command.velocity.vy_mps,
+        wz_rad_s=command.velocity.wz_rad_s,
+        active_source=command.source.value if command.source else _NOBODY,
+    )
+
+
+def _mission(sample: Sample[Mode]) -> system_status_pb2.MissionStatus:
+    if sample.value is None:
+        return system_status_pb2.MissionStatus()
+    return system_status_pb2.MissionStatus(
+        available=True,
+        stale=sample.freshness.stale,
+        age_ms=sample.freshness.age_ms,
+        mode=sample.value.name,
     )
 
 

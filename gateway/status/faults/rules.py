@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.fault import Condition
 from gateway.status.faults.limits import PlatformLimits
 from gateway.status.faults.platform import platform_faults
@@ -37,5 +38,6 @@ def conditions(
     """
     settled = up_s >= rules.startup_grace_s
     yield from source_faults(snapshot.sources, settled=settled)
+    yield from diagnostics_faults(snapshot.diagnostics)
     yield from preview_faults(snapshot.preview, active, settled=settled)
     yield from platform_faults(snapshot, rules.platform, active)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from gateway.status.board import SourceKind
 from gateway.status.faults.fault import Condition, Severity
 from gateway.status.sources import SourceState, SourceView
 
@@ -37,6 +38,8 @@ TROUBLES: Final[Mapping[SourceState, _Trouble | None]] = {
 
 _NEED_TIME: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
 """States in which every source begins."""
+_MAY_BE_QUIET: Final = frozenset({SourceKind.MODE, SourceKind.EFFECTIVE_COMMAND, SourceKind.MUX_INPUT})
+"""Sources that speak only when there is something to say."""
 
 
 def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator[Condition]:
@@ -64,4 +67,6 @@ def _counts(source: SourceView, *, settled: bool) -> bool:
     if source.state is SourceState.WAITING:
         # Not every robot has everything that the configuration knows.
         return source.required
+    if source.state in {SourceState.SILENT, SourceState.STALE}:
+        return source.required or source.kind not in _MAY_BE_QUIET
     return True

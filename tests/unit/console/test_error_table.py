@@ -63,6 +63,7 @@ def test_a_robot_that_answers_no_ends_a_program_with_1(code: grpc.StatusCode) ->
     ("details", "plain"),
     [
         ("last error: UNKNOWN: ipv4:127.0.0.1:1: Connection refused", "nothing listens there"),
+        ("ipv4:127.0.0.1:1: tcp handshaker shutdown", "no answer"),
         ("errors resolving x: Domain name not found", "the name does not resolve"),
         ("connection attempt timed out before receiving SETTINGS frame", "does not answer as a gateway"),
         ("words nobody has seen yet", "words nobody has seen yet"),

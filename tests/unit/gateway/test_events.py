@@ -4,7 +4,7 @@ from gateway.status.board import Board, SourceKind
 from gateway.status.events import KEPT, EventLog
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.values import Odometry, Received
+from gateway.status.values import Mode, Odometry, Received
 from tests.support.fault_rules import new_observer
 
 OFF = PreviewView(
@@ -78,6 +78,16 @@ def test_a_fallback_to_another_encoder_is_news() -> None:
     assert observer.observe(snapshot(Board(), fallen)) == [
         "warning: x264 encodes on the robot's own processor instead of mpp-h265: no output for 2 s"
     ]
+
+
+def test_another_mode_is_news() -> None:
+    observer, board = new_observer(startup_grace_s=60), Board()
+    board.mode = Received(Mode("idle"), at_s=99.0)
+    observer.observe(snapshot(board))
+    assert observer.observe(snapshot(board)) == []
+    board.mode = Received(Mode("exploring"), at_s=100.0)
+    assert observer.observe(snapshot(board)) == ["robot mode: exploring"]
+    assert observer.observe(snapshot(board, now_s=5000.0))[1:] == []
 
 
 def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> None:

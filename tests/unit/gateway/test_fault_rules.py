@@ -8,15 +8,25 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from gateway.fault_settings import FaultSettings, LowerLimit, UpperLimit
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board, Presence, SourceKind
 from gateway.status.faults.fault import Condition, Severity
 from gateway.status.faults.limits import Limit
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import TROUBLES
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.sources import SourceState, sentence
-from gateway.status.values import Battery, Compute, Network, Odometry, Received
+from gateway.status.sources import SourceState, detail
+from gateway.status.values import (
+    Battery,
+    Compute,
+    DiagnosticItem,
+    DiagnosticLevel,
+    Diagnostics,
+    Mode,
+    Network,
+    Odometry,
+    Received,
+)
 from tests.support.fault_rules import LIMITS
 
 NOW_S = 500.0
@@ -66,7 +76,7 @@ def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:
 def test_every_state_of_a_source_has_its_verdict() -> None:
     assert set(TROUBLES) == set(SourceState)
     for state in SourceState:
-        assert bool(sentence(state, "odometry")) == (TROUBLES[state] is not None)
+        assert bool(detail(state, "odometry", None)) == (TROUBLES[state] is not None)
 
 
 @pytest.mark.parametrize(
@@ -87,6 +97,73 @@ def test_a_source_that_does_not_come(
     of.odometry = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
+
+
+@pytest.mark.parametrize(
+    ("presence", "at_s", "expected"),
+    [
+        (Presence(1), None, "odometry.silent"),
+        (Presence(2, qos_mismatch=True), None, "odometry.qos_mismatch"),
+        (Presence(1, wrong_type=True), None, "odometry.wrong_type"),
+        (Presence(0), None, "odometry.missing"),
+        (Presence(1), NOW_S - 2, "odometry.stale"),
+        (Presence(1, qos_mismatch=True), NOW_S - 2, "odometry.qos_mismatch"),
+        (Presence(0), NOW_S - 2, "odometry.stale"),
+        (Presence(1, wrong_type=True), NOW_S, None),
+    ],
+)
+def test_why_a_source_does_not_come(presence: Presence, at_s: float | None, expected: str | None) -> None:
+    of = board()
+    of.odometry = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of.presence["odometry"] = presence
+    assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
+
+
+def test_two_publishers_of_one_source_are_said_so() -> None:
+    of = board()
+    of.odometry, of.presence["odometry"] = Received(Odometry(0, 0, 0), NOW_S), Presence(2)
+    (source,) = snapshot(of, odometry=True).sources
+    assert (source.state, source.detail[:24]) == (SourceState.RECEIVING, "2 programs offer odometr")
+
+
+def test_a_mode_that_does_not_change_is_no_fault() -> None:
+    of = board()
+    of.mode = Received(Mode("idle"), NOW_S - 100)
+    assert found(snapshot(of, mode=False)) == {}
+    assert set(found(snapshot(of, mode=True))) == {"mode.stale"}
+
+
+def reported(*items: DiagnosticItem) -> dict[str, Condition]:
+    of = board()
+    of.diagnostics = Received(Diagnostics(items), NOW_S)
+    return found(snapshot(of, diagnostics=False))
+
+
+def test_components_in_trouble_are_faults_and_others_are_not() -> None:
+    faults = reported(
+        DiagnosticItem("/drive/left_motor: Current", DiagnosticLevel.ERROR, "over\x00current"),
+        DiagnosticItem("lidar", DiagnosticLevel.STALE, ""),
+        DiagnosticItem("imu", DiagnosticLevel.WARNING, "drifts"),
+        DiagnosticItem("gps", DiagnosticLevel.OK, ""),
+    )
+    assert {fault_id: fault.severity for fault_id, fault in faults.items()} == {
+        "diagnostics.drive_left_motor_current": Severity.ERROR,
+        "diagnostics.lidar": Severity.WARNING,
+    }
+    motor = faults["diagnostics.drive_left_motor_current"]
+    assert motor.message == "drive left_motor: Current: over current"
+    assert faults["diagnostics.lidar"].message == "lidar: nothing is heard of it"
+
+
+def test_names_that_are_no_names_and_texts_without_end() -> None:
+    faults = reported(
+        DiagnosticItem("\udcff\udcfe", DiagnosticLevel.ERROR, "x" * 10_000),
+        DiagnosticItem("", DiagnosticLevel.STALE, ""),
+    )
+    (fault,) = faults.values()
+    assert (fault.fault_id, fault.severity) == ("diagnostics.unnamed", Severity.ERROR)
+    assert len(fault.message) < 300
+    fault.message.encode("utf-8")
 
 
 def test_a_type_that_is_not_installed_is_told_at_once_and_names_no_type() -> None:

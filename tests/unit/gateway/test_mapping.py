@@ -40,9 +40,11 @@ from gateway.status.values import (
     Compute,
     Detection,
     Detections,
+    Mode,
     Network,
     Odometry,
     Received,
+    Velocity,
     Vision,
 )
 from omniseer.gateway.v1 import (
@@ -60,9 +62,8 @@ NOW_S = 1000.0
 CALLER = Caller(robot_host="10.1.2.3", may_watch=True)
 FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "look at it")
 NOT_SERVED = {
-    # Declared by the locked contract, implemented with teleoperation and command attribution.
+    # Declared by the locked contract, implemented with teleoperation.
     "omniseer.gateway.v1.SystemStatus.teleop",
-    "omniseer.gateway.v1.SystemStatus.effective_command",
 }
 
 
@@ -135,6 +136,8 @@ def everything() -> Snapshot:
             Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s
         ),
         battery=Received(Battery(True, 15.0, 80.0, True), at_s),
+        mode=Received(Mode("exploring"), at_s),
+        effective_command=Received(Velocity(0.25, -0.5, 0.75), at_s),
         compute=Received(Compute(40.0, 60.0, True, 1, 2, 50.0), at_s),
         network=Received(Network("wlan0", True, -60, 70), at_s),
         onboard_battery=Received(Battery(True, 12.0, 70.0, True), at_s),
@@ -201,6 +204,10 @@ def test_the_values_arrive_where_the_contract_has_them() -> None:
     assert status.health.angular_speed_rad_s == pytest.approx(0.5)
     assert status.health.measured_wz_rad_s == pytest.approx(-0.5)
     assert (status.health.odom_age_ms, status.health.odom_stale) == (10_000, True)
+    command = status.effective_command
+    assert (command.vx_mps, command.vy_mps, command.wz_rad_s) == (0.25, -0.5, 0.75)
+    assert command.active_source == "unknown", "a stale command is nobody's"
+    assert status.mission.mode == "exploring"
     assert status.platform.power.lipo_battery.voltage == 15.0
     assert status.platform.power.onboard_battery.voltage == 12.0
     assert status.preview.measured.last_frame_age_ms == 12 + 10_000
@@ -246,6 +253,8 @@ def test_an_empty_snapshot_claims_nothing() -> None:
             status.platform.power.lipo_battery,
             status.platform.power.onboard_battery,
             status.preview.measured,
+            status.effective_command,
+            status.mission,
         )
     )
     assert status.preview.profile == preview_pb2.PREVIEW_PROFILE_UNSPECIFIED

@@ -43,6 +43,7 @@ class SystemStatus(_message.Message):
     EFFECTIVE_COMMAND_FIELD_NUMBER: _builtins.int
     INSECURE_FIELD_NUMBER: _builtins.int
     FAULTS_FIELD_NUMBER: _builtins.int
+    MISSION_FIELD_NUMBER: _builtins.int
     SOURCES_FIELD_NUMBER: _builtins.int
     GATEWAY_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
@@ -85,6 +86,10 @@ class SystemStatus(_message.Message):
         """
 
     @_builtins.property
+    def mission(self) -> Global___MissionStatus:
+        """What the robot is about."""
+
+    @_builtins.property
     def sources(self) -> _containers.RepeatedCompositeFieldContainer[_source_pb2.SourceStatus]:
         """Every source that the gateway is configured to read, in the order of its configuration."""
 
@@ -105,12 +110,13 @@ class SystemStatus(_message.Message):
         effective_command: Global___EffectiveCommand | None = ...,
         insecure: _builtins.bool = ...,
         faults: _abc.Iterable[_fault_pb2.Fault] | None = ...,
+        mission: Global___MissionStatus | None = ...,
         sources: _abc.Iterable[_source_pb2.SourceStatus] | None = ...,
         gateway: _gateway_info_pb2.GatewayFacts | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "platform", b"platform", "preview", b"preview", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -289,6 +295,42 @@ class TeleopStatus(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___TeleopStatus: _TypeAlias = TeleopStatus  # noqa: Y015
+
+@_typing.final
+class MissionStatus(_message.Message):
+    """What the robot is about."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    AVAILABLE_FIELD_NUMBER: _builtins.int
+    STALE_FIELD_NUMBER: _builtins.int
+    AGE_MS_FIELD_NUMBER: _builtins.int
+    MODE_FIELD_NUMBER: _builtins.int
+    available: _builtins.bool
+    """Whether the robot has told it."""
+    stale: _builtins.bool
+    """Whether it was told longer ago than the configured limit. A robot that tells its mode only when
+    it changes still has it.
+    """
+    age_ms: _builtins.int
+    """How long ago it was told last, in ms. 0 when it was not."""
+    mode: _builtins.str
+    """The mode in the robot's own words, "exploring" for example. Empty when not available."""
+    def __init__(
+        self,
+        *,
+        available: _builtins.bool = ...,
+        stale: _builtins.bool = ...,
+        age_ms: _builtins.int = ...,
+        mode: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["age_ms", b"age_ms", "available", b"available", "mode", b"mode", "stale", b"stale"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___MissionStatus: _TypeAlias = MissionStatus  # noqa: Y015
 
 @_typing.final
 class EffectiveCommand(_message.Message):
