@@ -15,8 +15,15 @@ def watch_line(status: SystemStatus) -> str:
             _part("motion", odometry, motion),
             _part("vision", vision, quantity(vision.consumer_fps, "fps")),
             _preview(status.preview),
+            *_faults(status),
         ]
     )
+
+
+def _faults(status: SystemStatus) -> list[str]:
+    """The ids of what is wrong; nothing while all is well."""
+    active = [fault.id for fault in status.faults if fault.active]
+    return [f"{plural(len(active), 'fault')} ({', '.join(active)})"] if active else []
 
 
 def _part(label: str, sample: Sample, text: str) -> str:

@@ -111,6 +111,7 @@ def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
     _, disk, odometry = status_rows(decoded(message))[:3]
     assert (disk.mark, disk.tone, disk.age) == ("error", Tone.BAD, "1 min 05 s")
     assert disk.text == "the disk is nearly full -> make room"
+    assert watch_line(decoded(message)).endswith("  1 fault (platform.disk)")
     assert (odometry.mark, odometry.text, odometry.age) == ("over", "odometry stopped coming", "500 ms")
 
 
