@@ -119,7 +119,7 @@ async def _bring_news(board: Board, reconciler: Reconciler) -> None:
         board.odometry = Received(Odometry(vx_mps=0.51, vy_mps=-0.02, wz_rad_s=0.1), now)
         board.mode = Received(Mode("exploring"), now)
         board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
-        board.mux_inputs[CommandSource.KEYBOARD] = board.effective_command
+        board.mux_inputs = {CommandSource.KEYBOARD: board.effective_command}
         board.diagnostics = Received(_ALL_WELL, now)
         board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
         board.battery = Received(
