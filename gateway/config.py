@@ -3,21 +3,24 @@
 import ipaddress
 from collections import Counter
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, load
 from common.errors import ExitCode, UserError
 from gateway.fault_settings import FaultSettings
 from gateway.status.board import SourceKind
+from gateway.status.values import CommandSource
 
 
 class SourceSettings(Section):
     """One ROS 2 topic the gateway reads."""
 
     kind: SourceKind
+    label: CommandSource | None = None
+    """Who commands through this input of the mux (mux_input only, and needed there)."""
     topic: str = Field(min_length=1)
     type: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")
     reliability: Literal["best_effort", "reliable"] = "best_effort"
@@ -31,6 +34,18 @@ class SourceSettings(Section):
     """Height of the same picture."""
     max_items: int = Field(default=100, ge=1, le=1000)
     """How many detections of one picture are kept; all are counted."""
+
+    @property
+    def name(self) -> str:
+        """Short and stable, for programs: "odometry", "mux_input.keyboard"."""
+        return f"{self.kind.value}.{self.label.value}" if self.label else self.kind.value
+
+    @model_validator(mode="after")
+    def _label_the_mux_inputs_alone(self) -> Self:
+        if (self.kind is SourceKind.MUX_INPUT) != (self.label is not None):
+            labels = ", ".join(source.value for source in CommandSource)
+            raise ValueError(f"a source of kind 'mux_input', and no other, has a label: {labels}")
+        return self
 
 
 DEFAULT_SOURCES = (
@@ -60,7 +75,41 @@ DEFAULT_SOURCES = (
         type="sensor_msgs/msg/BatteryState",
         stale_after_ms=5000,
     ),
+    SourceSettings(
+        kind=SourceKind.DIAGNOSTICS,
+        topic="/diagnostics",
+        type="diagnostic_msgs/msg/DiagnosticArray",
+        stale_after_ms=5000,
+    ),
+    SourceSettings(
+        kind=SourceKind.MUX_INPUT,
+        label=CommandSource.KEYBOARD,
+        topic="/cmd_vel_keyboard",
+        type="geometry_msgs/msg/TwistStamped",
+        stale_after_ms=500,
+    ),
+    SourceSettings(
+        kind=SourceKind.MUX_INPUT,
+        label=CommandSource.AUTONOMY,
+        topic="/cmd_vel_autonomy",
+        type="geometry_msgs/msg/TwistStamped",
+        stale_after_ms=500,
+    ),
+    SourceSettings(
+        kind=SourceKind.MUX_INPUT,
+        label=CommandSource.NAVIGATION,
+        topic="/cmd_vel_nav",
+        type="geometry_msgs/msg/TwistStamped",
+        stale_after_ms=500,
+    ),
+    SourceSettings(
+        kind=SourceKind.EFFECTIVE_COMMAND,
+        topic="/mecanum_drive_controller/reference",
+        type="geometry_msgs/msg/TwistStamped",
+        stale_after_ms=500,
+    ),
 )
+"""Of the first robot. It tells no mode; a robot that does has one more source, of kind "mode"."""
 
 
 class GrpcSettings(Section):
@@ -150,10 +199,10 @@ def _check_exposure(settings: GatewaySettings) -> None:
 
 
 def _check_sources(settings: GatewaySettings) -> None:
-    kind, count = next(iter(Counter(source.kind for source in settings.sources).most_common(1)), (None, 0))
-    if kind and count > 1:
+    name, count = next(iter(Counter(source.name for source in settings.sources).most_common(1)), ("", 0))
+    if count > 1:
         raise UserError(
-            f"sources lists {count} of kind '{kind.value}'",
-            "Keep one topic for each kind",
+            f"sources lists '{name}' {count} times",
+            "Keep one topic for each kind, and one for each label of mux_input",
             exit_code=ExitCode.USAGE,
         )

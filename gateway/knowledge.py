@@ -73,9 +73,9 @@ class Knowledge:
 
 
 def _rules(settings: GatewaySettings) -> Rules:
+    rules = {source: SourceRule(source.stale_after_ms, source.required) for source in settings.sources}
     return Rules(
-        sources={
-            source.kind: SourceRule(source.stale_after_ms, source.required) for source in settings.sources
-        },
+        sources={source.kind: rule for source, rule in rules.items() if source.label is None},
+        mux_inputs={source.label: rule for source, rule in rules.items() if source.label},
         platform_stale_after_ms=settings.platform.stale_after_ms,
     )

@@ -54,7 +54,7 @@ def _environment() -> Iterator[Finding]:
 
 
 def _type_finding(source: SourceSettings) -> Finding:
-    check = f"type.{_name(source)}"
+    check = f"type.{source.name}"
     try:
         reader_for(source)
         message_class(source.type)
@@ -62,11 +62,11 @@ def _type_finding(source: SourceSettings) -> Finding:
         return wrong(
             check,
             str(error),
-            f"{_name(source)} can't be read",
+            f"{source.name} can't be read",
             f"Install the package beside the gateway: apt install ros-$ROS_DISTRO-{_package(source)}",
         )
     except UserError as error:
-        return wrong(check, error.what, f"{_name(source)} can't be read", error.remedy)
+        return wrong(check, error.what, f"{source.name} can't be read", error.remedy)
     return good(check, f"{source.type} is installed")
 
 
@@ -82,13 +82,13 @@ def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[Source
 
 
 def _offer_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
-    check = f"topic.{_name(source)}"
+    check = f"topic.{source.name}"
     if not publishers:
         tell = wrong if source.required else note
         return tell(
             check,
             f"nobody publishes {source.topic}",
-            f"{_name(source)} can't come",
+            f"{source.name} can't come",
             "Start the program that makes it, in the same domain; look with: ros2 topic list",
         )
     others = sorted({each.topic_type for each in publishers} - {source.type})
@@ -96,7 +96,7 @@ def _offer_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
         return wrong(
             check,
             f"{source.topic} is published as {', '.join(others)}, configured is {source.type}",
-            f"{_name(source)} can't come",
+            f"{source.name} can't come",
             f"Set the type of this source to {others[0]}",
         )
     reasons = [_qos_trouble(source, publisher) for publisher in publishers]
@@ -116,10 +116,6 @@ def _qos_trouble(source: SourceSettings, publisher: Any) -> str:
         return ""
     # The middleware marks it as an error in its own way, and ends it with a semicolon.
     return str(reason).replace("ERROR: ", "").strip(" ;")
-
-
-def _name(source: SourceSettings) -> str:
-    return source.kind.value
 
 
 def _package(source: SourceSettings) -> str:

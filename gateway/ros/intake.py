@@ -13,17 +13,17 @@ from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
 from gateway.ros.subscribing import TypeMissingError, subscribe
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Intake:
-    """What is running: the sampler and its sources, for whoever watches over them."""
+    """What is running: the sampler and its sources by name, for whoever watches over them."""
 
     sampler: Sampler
-    sources: Mapping[SourceKind, Source]
+    sources: Mapping[str, Source]
 
 
 @contextmanager
@@ -45,13 +45,13 @@ def intake(
             yield Intake(sampler, sources)
 
 
-def _open(node: Any, settings: Sequence[SourceSettings], board: Board) -> Iterator[tuple[SourceKind, Source]]:
+def _open(node: Any, settings: Sequence[SourceSettings], board: Board) -> Iterator[tuple[str, Source]]:
     for source in settings:
         try:
             subscription = subscribe(node, source)
         except TypeMissingError as error:
-            board.unusable[source.kind] = str(error)
-            log.warning("source '%s' is not read: %s", source.kind.value, error)
+            board.unusable[source.name] = str(error)
+            log.warning("source '%s' is not read: %s", source.name, error)
         else:
-            yield source.kind, Source(source, subscription, board, created_at_s=time.monotonic())
-            log.info("source '%s' reads %s (%s)", source.kind.value, source.topic, source.type)
+            yield source.name, Source(source, subscription, board, created_at_s=time.monotonic())
+            log.info("source '%s' reads %s (%s)", source.name, source.topic, source.type)

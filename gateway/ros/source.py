@@ -8,6 +8,7 @@ from typing import Any
 from rclpy.serialization import deserialize_message
 
 from gateway.config import SourceSettings
+from gateway.ros.placing import place
 from gateway.ros.readers import reader_for
 from gateway.ros.reception import Instant, received_at
 from gateway.status.board import Board
@@ -94,8 +95,7 @@ class Source:
         if value is None:
             self._without_value += 1
             return
-        # The one crossing between the threads: a single reference assignment.
-        setattr(self._board, self._settings.kind.value, Received(value, at_s))
+        place(self._board, self._settings, Received(value, at_s))
         self._values += 1
 
     def _complain(self, error: Exception, now_s: float) -> None:

@@ -4,6 +4,7 @@ A slot is written by one reference assignment and read by one reference read, wh
 there is no lock, no queue and nobody waits. An older value is simply gone.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -43,12 +44,12 @@ class Presence:
 
     Attributes:
         offered_by: how many publishers there are, of whatever type.
-        qos_mismatch: whether each of them excludes us by its quality of service.
+        qos_mismatch: how each of them excludes us by its quality of service, in words; else empty.
         wrong_type: whether each of them publishes another type than configured.
     """
 
     offered_by: int
-    qos_mismatch: bool = False
+    qos_mismatch: str = ""
     wrong_type: bool = False
 
 
@@ -64,13 +65,13 @@ class Board:
     diagnostics: Received[Diagnostics] | None = None
     mode: Received[Mode] | None = None
     effective_command: Received[Velocity] | None = None
-    mux_inputs: dict[CommandSource, Received[Velocity]] = field(default_factory=dict)
-    """One slot per input; the keys are set before anybody writes."""
+    mux_inputs: Mapping[CommandSource, Received[Velocity]] = field(default_factory=dict)
+    """The newest command of each input that has spoken; replaced as a whole, never changed."""
     compute: Received[Compute] | None = None
     network: Received[Network] | None = None
     onboard_battery: Received[Battery] | None = None
     """The computer's own battery, as its operating system tells it."""
     presence: dict[str, Presence] = field(default_factory=dict)
     """Who offers each source, by its name ("odometry", "mux_input.keyboard")."""
-    unusable: dict[SourceKind, str] = field(default_factory=dict)
-    """Sources that can't deliver (message type not installed), with the reason for a person."""
+    unusable: dict[str, str] = field(default_factory=dict)
+    """Sources by name that can't deliver (message type not installed), with the reason for the log."""

@@ -147,6 +147,6 @@ def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
 
 def _source(kind: SourceKind, name: str, rule: SourceRule, seen: Freshness, board: Board) -> SourceView:
     presence = board.presence.get(name)
-    state = state_of(seen, presence, unusable=kind in board.unusable)
+    state = state_of(seen, presence, unusable=name in board.unusable)
     words = words_for(name)
     return SourceView(kind, name, words, state, seen, rule.required, detail(state, words, presence))

@@ -70,6 +70,8 @@ def detail(state: SourceState, words: str, presence: Presence | None) -> str:
         return f"{presence.offered_by} programs offer {words}: what is shown may be of any of them"
     if state is SourceState.STALE and presence and presence.offered_by == 0:
         return f"{words} stopped coming: nobody on the robot offers it any more"
+    if state is SourceState.QOS_MISMATCH and presence:
+        return f"{_SENTENCES[state].format(words=words)}: {presence.qos_mismatch}"
     return _SENTENCES[state].format(words=words)
 
 

@@ -107,7 +107,7 @@ class DiagnosticItem:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostics:
-    """The newest word of every component that ever spoke, whichever message it came in."""
+    """The newest word of every component that spoke, whichever message it came in; who spoke last is last."""
 
     items: tuple[DiagnosticItem, ...]
 

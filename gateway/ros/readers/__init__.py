@@ -8,7 +8,27 @@ a type of your own, write one function in a module of this package and name the 
         return planar(message.forward, 0.0, message.turn)
 """
 
-from gateway.ros.readers import battery, detection2d, odometry, vision_perf, yolo
+from gateway.ros.readers import (
+    battery,
+    commands,
+    detection2d,
+    diagnostics,
+    mode,
+    odometry,
+    vision_perf,
+    yolo,
+)
 from gateway.ros.readers.registry import Reader, reader_for
 
-__all__ = ["Reader", "battery", "detection2d", "odometry", "reader_for", "vision_perf", "yolo"]
+__all__ = [
+    "Reader",
+    "battery",
+    "commands",
+    "detection2d",
+    "diagnostics",
+    "mode",
+    "odometry",
+    "reader_for",
+    "vision_perf",
+    "yolo",
+]

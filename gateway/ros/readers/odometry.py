@@ -3,7 +3,7 @@
 from typing import Any
 
 from gateway.config import SourceSettings
-from gateway.ros.readers.plain import finite
+from gateway.ros.readers.plain import all_finite
 from gateway.ros.readers.registry import reads
 from gateway.status.board import SourceKind
 from gateway.status.values import Odometry
@@ -18,7 +18,5 @@ def from_odometry(message: Any, source: SourceSettings) -> Odometry | None:
 
 def planar(vx_mps: Any, vy_mps: Any, wz_rad_s: Any) -> Odometry | None:
     """A value out of three speeds, for readers of other types, too. None when one of them is not finite."""
-    vx, vy, wz = finite(vx_mps), finite(vy_mps), finite(wz_rad_s)
-    if vx is None or vy is None or wz is None:
-        return None
-    return Odometry(vx_mps=vx, vy_mps=vy, wz_rad_s=wz)
+    speeds = all_finite(vx_mps, vy_mps, wz_rad_s)
+    return Odometry(*speeds) if speeds else None

@@ -24,6 +24,22 @@ def between(low: float, number: float, high: float) -> float:
     return min(max(number, low), high)
 
 
-def name(text: Any) -> str:
-    """A name for people, at most 120 characters. What was not UTF-8 on the wire shows as U+FFFD."""
-    return str(text)[:_NAME_LENGTH].encode("utf-8", "replace").decode("utf-8")
+def all_finite(*numbers: Any) -> tuple[float, ...] | None:
+    """All of the numbers, or None when one of them is not finite."""
+    values = tuple(value for number in numbers if (value := finite(number)) is not None)
+    return values if len(values) == len(numbers) else None
+
+
+def name(text: Any, length: int = _NAME_LENGTH) -> str:
+    """One printable line for people, at most `length` characters.
+
+    What was not UTF-8 on the wire, and what would move a terminal's cursor, shows as U+FFFD.
+    """
+    short = str(text)[:length]
+    return short if short.isprintable() else "".join(map(_printable, short))
+
+
+def _printable(letter: str) -> str:
+    if letter.isprintable():
+        return letter
+    return " " if letter.isspace() else "\N{REPLACEMENT CHARACTER}"

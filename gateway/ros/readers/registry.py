@@ -1,24 +1,25 @@
 """Which function reads which message type."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from common.errors import ExitCode, UserError
 from gateway.config import SourceSettings
 from gateway.status.board import SourceKind
-from gateway.status.values import Battery, Detections, Odometry, Vision
+from gateway.status.values import Battery, Detections, Diagnostics, Mode, Odometry, Velocity, Vision
 
-Value = Odometry | Vision | Detections | Battery
+Value = Odometry | Vision | Detections | Battery | Diagnostics | Mode | Velocity
 Reader = Callable[[Any, SourceSettings], Value | None]
 """Turns a message into a value; None when the message holds nothing that can be used."""
+_ReaderT = TypeVar("_ReaderT", bound=Reader)
 
 _readers: dict[tuple[str, SourceKind], Reader] = {}
 
 
-def reads(message_type: str, kind: SourceKind) -> Callable[[Reader], Reader]:
+def reads(message_type: str, kind: SourceKind) -> Callable[[_ReaderT], _ReaderT]:
     """Registers the decorated function for a message type ("nav_msgs/msg/Odometry") and what it tells."""
 
-    def register(reader: Reader) -> Reader:
+    def register(reader: _ReaderT) -> _ReaderT:
         if (message_type, kind) in _readers:
             raise ValueError(f"two readers for {message_type} as {kind.value}")
         _readers[message_type, kind] = reader
@@ -37,7 +38,7 @@ def reader_for(source: SourceSettings) -> Reader:
     if reader is None:
         known = sorted(name for name, kind in _readers if kind is source.kind)
         raise UserError(
-            f"source '{source.kind.value}' ({source.topic}) has type {source.type}, which no reader knows",
+            f"source '{source.name}' ({source.topic}) has type {source.type}, which no reader knows",
             f"Use one of {', '.join(known)}, or add a reader (gateway/ros/readers)",
             exit_code=ExitCode.USAGE,
         )

@@ -89,7 +89,7 @@ def test_a_gateway_that_starts_after_the_robot_hears_it(ros_domain: int, tmp_pat
 def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_path: Path) -> None:
     board = Board()
     with intake([ODOMETRY], board) as running, simulated_robot(tmp_path, "--odometry-hz", "1000"):
-        source = running.sources[SourceKind.ODOMETRY]
+        source = running.sources["odometry"]
         wait_until(lambda: board.odometry, "odometry")
         before, started_s = source.counts.values, time.monotonic()
         wait_until(lambda: source.counts.values >= before + 20, "20 values")

@@ -89,7 +89,7 @@ def test_the_other_type_of_detections(talker: Talker) -> None:
 def test_speeds_that_are_no_numbers_leave_the_last_good_value(talker: Talker) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board) as running:
-        odometry = running.sources[SourceKind.ODOMETRY]
+        odometry = running.sources["odometry"]
         talker.say(running, "/odometry/filtered", driving(0.5))
         good = wait_until(lambda: board.odometry, "the good value")
         for number, bad in enumerate((math.nan, math.inf, -math.inf), start=1):
@@ -124,7 +124,7 @@ def test_a_message_that_is_not_one_harms_nobody(talker: Talker) -> None:
     """Bytes that break off in the middle: the source counts a failure and reads on."""
     board = Board()
     with intake(DEFAULT_SOURCES, board) as running:
-        vision = running.sources[SourceKind.VISION]
+        vision = running.sources["vision"]
         publisher = talker.meet(running, "/vision/perf", VisionPerfSummary)
         publisher.publish(serialize_message(VisionPerfSummary())[:30])
         wait_until(lambda: vision.counts.failures == 1, "the failure to be counted")
@@ -147,10 +147,10 @@ def test_a_type_that_is_not_installed_leaves_the_others_alone(talker: Talker) ->
             registry._readers, ("no_such_msgs/msg/Thing", SourceKind.VISION), lambda message, source: None
         )
         with intake(sources, board) as running:
-            assert SourceKind.VISION not in running.sources
+            assert "vision" not in running.sources
             talker.say(running, "/odometry/filtered", driving(0.5))
             wait_until(lambda: board.odometry, "odometry")
-    assert "install the ROS package no_such_msgs" in board.unusable[SourceKind.VISION]
+    assert "install the ROS package no_such_msgs" in board.unusable["vision"]
 
 
 def test_a_topic_of_another_type_than_configured_does_no_harm(talker: Talker) -> None:

@@ -15,8 +15,18 @@ def load(tmp_path: Path, text: str) -> GatewaySettings:
 def test_the_defaults_are_the_contracts() -> None:
     settings = load_settings(None)
     assert (settings.grpc.host, settings.grpc.port) == ("127.0.0.1", 50051)
-    limits = {source.kind.value: source.stale_after_ms for source in settings.sources}
-    assert limits == {"odometry": 1000, "vision": 2000, "detections": 500, "battery": 5000}
+    limits = {source.name: source.stale_after_ms for source in settings.sources}
+    assert limits == {
+        "odometry": 1000,
+        "vision": 2000,
+        "detections": 500,
+        "battery": 5000,
+        "diagnostics": 5000,
+        "mux_input.keyboard": 500,
+        "mux_input.autonomy": 500,
+        "mux_input.navigation": 500,
+        "effective_command": 500,
+    }
     assert settings.platform.stale_after_ms == 3000
     assert {source.kind.value for source in DEFAULT_SOURCES if source.required} == {"odometry", "vision"}
 
@@ -37,7 +47,20 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         (
             "sources: [{kind: odometry, topic: /a, type: n/msg/O, stale_after_ms: 1},"
             " {kind: odometry, topic: /b, type: n/msg/O, stale_after_ms: 1}]",
-            "2 of kind 'odometry'",
+            "sources lists 'odometry' 2 times",
+        ),
+        (
+            "sources: [{kind: mux_input, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1},"
+            " {kind: mux_input, label: keyboard, topic: /b, type: n/msg/O, stale_after_ms: 1}]",
+            "sources lists 'mux_input.keyboard' 2 times",
+        ),
+        (
+            "sources: [{kind: mux_input, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
+            "has a label: keyboard, autonomy, navigation",
+        ),
+        (
+            "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
+            "and no other, has a label",
         ),
         ("- a list", "holds a list at its top"),
         ("a: [", "is not YAML"),

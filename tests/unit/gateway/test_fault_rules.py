@@ -103,11 +103,11 @@ def test_a_source_that_does_not_come(
     ("presence", "at_s", "expected"),
     [
         (Presence(1), None, "odometry.silent"),
-        (Presence(2, qos_mismatch=True), None, "odometry.qos_mismatch"),
+        (Presence(2, qos_mismatch="x"), None, "odometry.qos_mismatch"),
         (Presence(1, wrong_type=True), None, "odometry.wrong_type"),
         (Presence(0), None, "odometry.missing"),
         (Presence(1), NOW_S - 2, "odometry.stale"),
-        (Presence(1, qos_mismatch=True), NOW_S - 2, "odometry.qos_mismatch"),
+        (Presence(1, qos_mismatch="x"), NOW_S - 2, "odometry.qos_mismatch"),
         (Presence(0), NOW_S - 2, "odometry.stale"),
         (Presence(1, wrong_type=True), NOW_S, None),
     ],
@@ -168,7 +168,7 @@ def test_names_that_are_no_names_and_texts_without_end() -> None:
 
 def test_a_type_that_is_not_installed_is_told_at_once_and_names_no_type() -> None:
     of = board()
-    of.unusable[SourceKind.DETECTIONS] = "message type yolo_msgs/msg/DetectionArray is not installed"
+    of.unusable["detections"] = "message type yolo_msgs/msg/DetectionArray is not installed"
     faults = found(snapshot(of, detections=False), up_s=0.0)
     assert set(faults) == {"detections.type_missing"}
     assert "yolo" not in str(faults)
