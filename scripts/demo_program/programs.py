@@ -44,12 +44,13 @@ class Programs:
 
     def __enter__(self) -> Self:
         directory = self._ground.directory
-        with ExitStack() as stops:
-            self._stops = stops
+        try:
             self._start("simrobot", "run", "--control", str(self._ground.control_socket))
             self._start("robot-preview", "serve", "--config", str(directory / "preview.yaml"))
             self._start("robot-gateway", "serve", "--config", str(directory / "gateway.yaml"))
-            self._stops = stops.pop_all()
+        except BaseException:
+            self._stop_after_trouble()
+            raise
         return self
 
     def __exit__(
@@ -60,10 +61,8 @@ class Programs:
     ) -> None:
         if error is None:
             self.stop()
-            return
-        # Why the block ended counts more than how a program took its end.
-        with suppress(ProgramTroubleError):
-            self.stop()
+        else:
+            self._stop_after_trouble()
 
     def stop(self) -> None:
         """Ends all, the last one first. Calling it again does nothing.
@@ -106,6 +105,11 @@ class Programs:
                 raise UserError(f"not within {within_s:g} s: {seen}")
             time.sleep(_POLL_S)
         return answer
+
+    def _stop_after_trouble(self) -> None:
+        # Why the demo ends counts more than how a program takes its end.
+        with suppress(ProgramTroubleError):
+            self.stop()
 
     def _start(self, name: str, *arguments: str) -> None:
         # Should this process be killed outright, the kernel ends the programs for it.

@@ -78,9 +78,14 @@ class Place:
                     found[next((name for name in PROGRAMS if name in names), words[0])] = int(entry.name)
         return found
 
-    def wait_until_up(self) -> dict[str, int]:
+    def wait_until_up(self, demo: "subprocess.Popen[str]") -> dict[str, int]:
         """Waits for the line that only a healthy system prints."""
-        wait_until(lambda: "health ok" in self.out.read_text(), f"up\n{self.said()}", UP_WITHIN_S)
+
+        def up() -> bool:
+            assert demo.poll() is None, self.said()
+            return "health ok" in self.out.read_text()
+
+        wait_until(up, "the system is up and healthy", UP_WITHIN_S)
         programs = self.programs()
         assert set(programs) == set(PROGRAMS)
         return programs
@@ -157,7 +162,7 @@ def test_a_step_that_fails_says_why_and_shows_the_logs(place: Place) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_everything(place: Place, number: signal.Signals) -> None:
     with interactive(place) as demo:
-        place.wait_until_up()
+        place.wait_until_up(demo)
         hints = place.out.read_text()
         for hint in ("robotctl --target 127.0.0.1:", "preview on", "ffplay", "gst-launch-1.0 srtsrc"):
             assert hint in hints
@@ -180,7 +185,7 @@ def test_a_signal_during_the_start_ends_everything(place: Place) -> None:
 @pytest.mark.parametrize("victim", PROGRAMS)
 def test_a_program_that_dies_ends_the_demo_with_its_name(place: Place, victim: str) -> None:
     with interactive(place) as demo:
-        programs = place.wait_until_up()
+        programs = place.wait_until_up(demo)
         os.kill(programs[victim], signal.SIGKILL)
         assert demo.wait(GONE_WITHIN_S) == 1, place.said()
     assert f"error: {victim} was ended by SIGKILL" in place.err.read_text()
@@ -191,7 +196,7 @@ def test_a_program_that_dies_ends_the_demo_with_its_name(place: Place, victim: s
 
 def test_a_demo_that_is_killed_outright_takes_its_programs_along(place: Place) -> None:
     with interactive(place) as demo:
-        place.wait_until_up()
+        place.wait_until_up(demo)
         demo.kill()
         demo.wait()
         place.wait_until_gone()
