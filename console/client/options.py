@@ -53,6 +53,8 @@ class ClientOptions:
             ("grpc.dns_ares_query_timeout", connect_ms),
             ("grpc.keepalive_time_ms", round(self.keepalive_every_s * _MS_PER_S)),
             ("grpc.keepalive_timeout_ms", round(self.keepalive_within_s * _MS_PER_S)),
+            # Without this one gRPC 1.85 waits 60 s for any ping's answer, keepalive or not.
+            ("grpc.http2.ping_timeout_ms", round(self.keepalive_within_s * _MS_PER_S)),
             # Between calls, too: the next call then finds a new connection instead of a dead one.
             ("grpc.keepalive_permit_without_calls", 1),
             ("grpc.http2.max_pings_without_data", 0),

@@ -151,7 +151,7 @@ def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
         options=[
             ("grpc.so_reuseport", 0),
             ("grpc.keepalive_permit_without_calls", 1),
-            ("grpc.http2.min_recv_ping_interval_without_data_ms", 1_000),
+            ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
         ],
     )
     robot_gateway_pb2_grpc.add_RobotGatewayServicer_to_server(double, server)
