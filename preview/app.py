@@ -9,6 +9,7 @@ from typing import Final
 from common import listen, rpc
 from common.health import Health
 from preview.config import PreviewSettings
+from preview.crash_report import CrashReport
 from preview.encoder_note import EncoderNote
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.probe import Prober
@@ -31,7 +32,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     """
     note = EncoderNote(settings.runtime_dir)
     selection = Selection(allowed(settings), settings.encoders.forgive_after_s)
-    note.tell(selection)
+    note.tell(selection, crash=CrashReport(settings.runtime_dir).begin())
     prober = new_prober(settings)
     manager = Manager(settings, prober, selection, note, on_hung=lambda name, why: _end_hung(note, name, why))
     server = rpc.new_server()

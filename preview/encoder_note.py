@@ -2,7 +2,7 @@
 
 A driver can take this process with it: by a crash, or by a hang that only the end of the process resolves.
 The next process would find that the encoder proves itself in its trial, use it, and die again; the note makes
-it pass that encoder over for a while.
+it pass that encoder over for a while. A process that was killed from outside says nothing about its encoder.
 
 One small file in the runtime directory (a tmpfs, so a reboot forgets it), written when an encoder begins and
 removed when it has stopped well.
@@ -19,6 +19,8 @@ from preview.selection import Selection
 _log = logging.getLogger(__name__)
 
 _NAME: Final = "encoder-in-use.json"
+_IN_USE: Final = ""
+"""No verdict yet: only a crash makes one of it."""
 
 
 class EncoderNote:
@@ -33,7 +35,7 @@ class EncoderNote:
 
     def begin(self, encoder: str) -> None:
         """An encoder is about to be used."""
-        self.leave(encoder, "the process ended while it was in use")
+        self.leave(encoder, _IN_USE)
 
     def leave(self, encoder: str, why: str) -> None:
         """Writes the note; without a writable directory the next process must find out by itself."""
@@ -50,8 +52,13 @@ class EncoderNote:
         except OSError as error:
             _log.warning("the note %s can't be removed: %s", self._path, error)
 
-    def tell(self, selection: Selection) -> None:
-        """Has the encoder that the last process left a note about passed over."""
+    def tell(self, selection: Selection, crash: str) -> None:
+        """Has the encoder that the last process left a note about passed over, if that one was to blame.
+
+        Args:
+            selection: what passes it over.
+            crash: what the last process died of; empty when it did not crash.
+        """
         try:
             note = json.loads(self._path.read_text(encoding="utf-8"))
             name, why = str(note["encoder"]), str(note["why"])
@@ -61,6 +68,10 @@ class EncoderNote:
             _log.warning("the note %s can't be used: %s", self._path, error)
             return
         self.end()
+        if why == _IN_USE and not crash:
+            _log.info("the last process was ended from outside while encoder %s was in use", name)
+            return
+        why = why or f"the process crashed while it was in use ({crash})"
         sentence = f"encoder {name} is passed over: {why}"
         _log.warning("%s", sentence)
         selection.pass_over(name, sentence, time.monotonic())

@@ -132,9 +132,22 @@ def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: P
             watcher.wait_for_pictures(1)
         dark_s = watcher.arrivals_s[0] - died_at
         assert state.encoder.name == "va-h265"
-        assert "the process ended while it was in use" in state.encoder.fallback_reason
+        assert "crashed while it was in use (Segmentation fault)" in state.encoder.fallback_reason
         assert dark_s < DARK_AT_MOST_S * SLOW_MACHINE
         print(f"crash: {dark_s:.2f} s without a picture")
+
+
+def test_an_encoder_is_not_blamed_for_a_process_that_was_killed(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, ORDER, {"mpph265enc": "ok", "vah265enc": "ok"}) as preview:
+        preview.wish()
+        preview.running()
+        preview.process.kill()
+        preview.process.wait(20)
+        preview.start_again()
+        preview.wish()
+        state = preview.running()
+        assert state.encoder.name == "mpp-h265"
+        assert not state.encoder.fallback_reason
 
 
 def test_when_every_encoder_has_failed_they_are_tried_again(tmp_path: Path) -> None:
