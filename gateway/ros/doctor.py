@@ -5,15 +5,15 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.config import SourceSettings
 from gateway.ros.lifetime import ros_node
+from gateway.ros.presence import presence_of
 from gateway.ros.readers import reader_for
-from gateway.ros.subscribing import TypeMissingError, message_class, qos_of
+from gateway.ros.subscribing import TypeMissingError, message_class
 
 DISCOVERY_S: Final = 3.0
 """How long publishers are looked for; those of a running robot are usually found in a tenth of it."""
@@ -91,31 +91,23 @@ def _offer_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
             f"{source.name} can't come",
             "Start the program that makes it, in the same domain; look with: ros2 topic list",
         )
-    others = sorted({each.topic_type for each in publishers} - {source.type})
-    if others:
+    presence = presence_of(source, publishers)
+    if presence.wrong_type:
+        types = sorted({each.topic_type for each in publishers})
         return wrong(
             check,
-            f"{source.topic} is published as {', '.join(others)}, configured is {source.type}",
+            f"{source.topic} is published as {', '.join(types)}, configured is {source.type}",
             f"{source.name} can't come",
-            f"Set the type of this source to {others[0]}",
+            f"Set the type of this source to {types[0]}",
         )
-    reasons = [_qos_trouble(source, publisher) for publisher in publishers]
-    if all(reasons):
+    if presence.qos_mismatch:
         return wrong(
             check,
-            f"{source.topic} is published with another quality of service: {reasons[0]}",
+            f"{source.topic} is published with another quality of service: {presence.qos_mismatch}",
             "The middleware connects only what fits: nothing arrives",
             "Set reliability to best_effort and durability to volatile for this source: they take all",
         )
     return good(check, f"{source.topic}: {len(publishers)} publishing")
-
-
-def _qos_trouble(source: SourceSettings, publisher: Any) -> str:
-    compatibility, reason = qos_check_compatible(publisher.qos_profile, qos_of(source))
-    if compatibility != QoSCompatibility.ERROR:
-        return ""
-    # The middleware marks it as an error in its own way, and ends it with a semicolon.
-    return str(reason).replace("ERROR: ", "").strip(" ;")
 
 
 def _package(source: SourceSettings) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from gateway.config import SourceSettings
 from gateway.ros.lifetime import ros_node
+from gateway.ros.presence import PresenceWatch
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
@@ -41,7 +42,8 @@ def intake(
         reader_for(source)  # a mistake in the configuration shows before anything starts
     with ros_node("robot_gateway") as node:
         sources = dict(_open(node, settings, board))
-        with Sampler(tuple(sources.values()), rate_hz) as sampler:
+        presence = PresenceWatch(node, [source for source in settings if source.name in sources], board)
+        with Sampler((*sources.values(), presence), rate_hz) as sampler:
             yield Intake(sampler, sources)
 
 

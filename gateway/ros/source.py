@@ -5,12 +5,11 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.serialization import deserialize_message
-
 from gateway.config import SourceSettings
+from gateway.ros.decoding import Decoder
 from gateway.ros.placing import place
-from gateway.ros.readers import reader_for
 from gateway.ros.reception import Instant, received_at
+from gateway.ros.subscribing import depth_of
 from gateway.status.board import Board
 from gateway.status.values import Received
 
@@ -49,7 +48,8 @@ class Source:
     ) -> None:
         self._settings = settings
         self._subscription = subscription
-        self._read = reader_for(settings)
+        self._decoder = Decoder(settings, subscription.msg_type)
+        self._depth = depth_of(settings)
         self._board = board
         self._emptied_at_s = created_at_s
         self._rests_until_s = created_at_s
@@ -72,26 +72,35 @@ class Source:
         return int(self._subscription.get_publisher_count())
 
     def take(self) -> None:
-        """Puts the newest message's value on the board, if there is a new one. Never raises."""
+        """Puts the value of the newest message on the board, if there is a new one. Never raises."""
         now = Instant(time.monotonic(), time.time_ns())
         if now.monotonic_s < self._rests_until_s:
             return
         cpu_before_s = time.thread_time()
-        try:
-            taken = self._subscription.handle.take_message(self._subscription.msg_type, True)
-            if taken is not None:
-                raw, info = taken
-                self._hand_over(raw, received_at(info["received_timestamp"], now, self._emptied_at_s))
-        except Exception as error:  # noqa: BLE001 - whatever one message or reader does wrong, sampling goes on
-            self._failures += 1
-            self._complain(error, now.monotonic_s)
+        # As many as the queue holds, and no more: with it, all is taken that was there at `now`.
+        for _ in range(self._depth):
+            if not self._take_one(now):
+                break
         self._emptied_at_s = now.monotonic_s
         # What it cost, not how long it took: a busy machine is no reason to look less often.
         spent_s = time.thread_time() - cpu_before_s
         self._rests_until_s = time.monotonic() + spent_s * (1 / _MAX_SHARE - 1)
 
+    def _take_one(self, now: Instant) -> bool:
+        """Whether there was a message."""
+        try:
+            taken = self._subscription.handle.take_message(self._subscription.msg_type, True)
+            if taken is None:
+                return False
+            raw, info = taken
+            self._hand_over(raw, received_at(info["received_timestamp"], now, self._emptied_at_s))
+        except Exception as error:  # noqa: BLE001 - whatever one message or reader does wrong, sampling goes on
+            self._failures += 1
+            self._complain(error, now.monotonic_s)
+        return True
+
     def _hand_over(self, raw: bytes, at_s: float) -> None:
-        value = self._read(deserialize_message(raw, self._subscription.msg_type), self._settings)
+        value = self._decoder.decode(raw)
         if value is None:
             self._without_value += 1
             return

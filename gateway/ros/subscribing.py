@@ -7,10 +7,13 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gateway.config import SourceSettings
+from gateway.status.board import SourceKind
 
 # Only the newest message is ever wanted: DDS drops older ones before Python sees them, so a topic that gets
 # faster costs next to nothing, and one read per pass empties the queue.
 _DEPTH: Final = 1
+# Diagnostics are the exception: many programs publish on that one topic, each of its own components.
+_DIAGNOSTICS_DEPTH: Final = 64
 
 
 class TypeMissingError(Exception):
@@ -58,10 +61,15 @@ def qos_of(source: SourceSettings) -> Any:
     """The quality of service that the settings ask for."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=_DEPTH,
+        depth=depth_of(source),
         reliability=ReliabilityPolicy[source.reliability.upper()],
         durability=DurabilityPolicy[source.durability.upper()],
     )
+
+
+def depth_of(source: SourceSettings) -> int:
+    """How many messages may wait for the next look; when there are more, the oldest are dropped."""
+    return _DIAGNOSTICS_DEPTH if source.kind is SourceKind.DIAGNOSTICS else _DEPTH
 
 
 def _never_called(message: Any) -> None:

@@ -18,7 +18,7 @@ from gateway.ros.readers import (
     vision_perf,
     yolo,
 )
-from gateway.ros.readers.registry import Reader, reader_for
+from gateway.ros.readers.registry import Reader, is_header_and_list, reader_for
 
 __all__ = [
     "Reader",
@@ -26,6 +26,7 @@ __all__ = [
     "commands",
     "detection2d",
     "diagnostics",
+    "is_header_and_list",
     "mode",
     "odometry",
     "reader_for",

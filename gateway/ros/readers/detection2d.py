@@ -13,7 +13,7 @@ _INT32_MAX = 2**31 - 1
 _INT32_DIGITS = 10
 
 
-@reads("vision_msgs/msg/Detection2DArray", SourceKind.DETECTIONS)
+@reads("vision_msgs/msg/Detection2DArray", SourceKind.DETECTIONS, header_and_list=True)
 def from_detection2d_array(message: Any, source: SourceSettings) -> Detections:
     """All objects of one picture."""
     return detections(message.detections, source, _one)

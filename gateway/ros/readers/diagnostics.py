@@ -14,7 +14,7 @@ _LEVELS: Final = (DiagnosticLevel.OK, DiagnosticLevel.WARNING, DiagnosticLevel.E
 _MESSAGE_LENGTH: Final = 300
 
 
-@reads("diagnostic_msgs/msg/DiagnosticArray", SourceKind.DIAGNOSTICS)
+@reads("diagnostic_msgs/msg/DiagnosticArray", SourceKind.DIAGNOSTICS, header_and_list=True)
 def from_diagnostic_array(message: Any, source: SourceSettings) -> Diagnostics:
     """The components that this message names; the key-value pairs are left to the robot's own tools."""
     return Diagnostics(tuple(_item(status) for status in message.status[:COMPONENTS_KEPT]))

@@ -14,15 +14,27 @@ Reader = Callable[[Any, SourceSettings], Value | None]
 _ReaderT = TypeVar("_ReaderT", bound=Reader)
 
 _readers: dict[tuple[str, SourceKind], Reader] = {}
+_headers_and_lists: set[str] = set()
 
 
-def reads(message_type: str, kind: SourceKind) -> Callable[[_ReaderT], _ReaderT]:
-    """Registers the decorated function for a message type ("nav_msgs/msg/Odometry") and what it tells."""
+def reads(
+    message_type: str, kind: SourceKind, *, header_and_list: bool = False
+) -> Callable[[_ReaderT], _ReaderT]:
+    """Registers the decorated function for a message type ("nav_msgs/msg/Odometry") and what it tells.
+
+    Args:
+        message_type: package/msg/Name.
+        kind: what it tells.
+        header_and_list: whether the message is a std_msgs/Header, one list and nothing else; such lists are
+            cut to what is wanted before they are decoded.
+    """
 
     def register(reader: _ReaderT) -> _ReaderT:
         if (message_type, kind) in _readers:
             raise ValueError(f"two readers for {message_type} as {kind.value}")
         _readers[message_type, kind] = reader
+        if header_and_list:
+            _headers_and_lists.add(message_type)
         return reader
 
     return register
@@ -43,3 +55,8 @@ def reader_for(source: SourceSettings) -> Reader:
             exit_code=ExitCode.USAGE,
         )
     return reader
+
+
+def is_header_and_list(source: SourceSettings) -> bool:
+    """Whether the source's messages are a header, one list and nothing else."""
+    return source.type in _headers_and_lists

@@ -9,7 +9,7 @@ from gateway.status.board import SourceKind
 from gateway.status.values import Detection, Detections
 
 
-@reads("yolo_msgs/msg/DetectionArray", SourceKind.DETECTIONS)
+@reads("yolo_msgs/msg/DetectionArray", SourceKind.DETECTIONS, header_and_list=True)
 def from_detection_array(message: Any, source: SourceSettings) -> Detections:
     """All objects of one picture."""
     return detections(message.detections, source, _one)

@@ -39,7 +39,7 @@ def test_guarantees_that_exclude_each_other(talker: Talker) -> None:
     strict = BATTERY.model_copy(update={"reliability": "reliable"})
     finding = examined(strict)["topic.battery"]
     assert finding.verdict is Verdict.WRONG
-    assert finding.what.endswith(": Best effort publisher and reliable subscription")
+    assert finding.what.endswith(": reliable is asked for, best effort is offered")
     assert examined(BATTERY)["topic.battery"].verdict is Verdict.GOOD
 
 

@@ -13,7 +13,18 @@ from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.readers import reader_for
 from gateway.ros.readers.registry import reads
 from gateway.status.board import SourceKind
-from gateway.status.values import Battery, Detection, Detections, Odometry, Vision
+from gateway.status.values import (
+    Battery,
+    CommandSource,
+    Detection,
+    Detections,
+    DiagnosticItem,
+    DiagnosticLevel,
+    Mode,
+    Odometry,
+    Velocity,
+    Vision,
+)
 
 
 def source(kind: SourceKind, message_type: str, **more: Any) -> SourceSettings:
@@ -25,6 +36,10 @@ VISION = source(SourceKind.VISION, "omniseer_msgs/msg/VisionPerfSummary")
 YOLO = source(SourceKind.DETECTIONS, "yolo_msgs/msg/DetectionArray", max_items=3)
 VISION_MSGS = source(SourceKind.DETECTIONS, "vision_msgs/msg/Detection2DArray")
 BATTERY = source(SourceKind.BATTERY, "sensor_msgs/msg/BatteryState")
+DIAGNOSTICS = source(SourceKind.DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray")
+MODE = source(SourceKind.MODE, "std_msgs/msg/String")
+COMMAND = source(SourceKind.EFFECTIVE_COMMAND, "geometry_msgs/msg/TwistStamped")
+INPUT = source(SourceKind.MUX_INPUT, "geometry_msgs/msg/Twist", label=CommandSource.KEYBOARD)
 
 
 def read(settings: SourceSettings, message: Any) -> Any:
@@ -161,6 +176,59 @@ def test_a_voltage_that_is_not_known_is_none() -> None:
 def test_no_odometry_value_is_ever_anything_but_finite(speeds: list[float]) -> None:
     found = read(ODOMETRY, odometry(*speeds))
     assert found is None or all(map(math.isfinite, (found.vx_mps, found.vy_mps, found.wz_rad_s)))
+
+
+def twist(vx: float, vy: float, wz: float) -> Thing:
+    return Thing(linear=Thing(x=vx, y=vy, z=9), angular=Thing(x=9, y=9, z=wz))
+
+
+def test_a_command_is_read_with_and_without_a_stamp() -> None:
+    assert read(COMMAND, Thing(twist=twist(0.5, -0.1, 0.25))) == Velocity(0.5, -0.1, 0.25)
+    assert read(INPUT, twist(0.5, -0.1, 0.25)) == Velocity(0.5, -0.1, 0.25)
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_command_that_is_no_number_is_none(place: int) -> None:
+    speeds = [0.5, 0.1, 0.2]
+    speeds[place] = math.nan
+    assert read(INPUT, twist(*speeds)) is None
+
+
+@pytest.mark.parametrize(
+    ("level", "read_as"),
+    [
+        (b"\x00", DiagnosticLevel.OK),
+        (b"\x01", DiagnosticLevel.WARNING),
+        (b"\x02", DiagnosticLevel.ERROR),
+        (b"\x03", DiagnosticLevel.STALE),
+        (b"\x04", DiagnosticLevel.ERROR),
+        (b"\xff", DiagnosticLevel.ERROR),
+    ],
+)
+def test_diagnostics_tell_a_level_for_each_component(level: bytes, read_as: DiagnosticLevel) -> None:
+    found = read(DIAGNOSTICS, Thing(status=[Thing(name="drive", level=level, message="m")]))
+    assert found.items == (DiagnosticItem("drive", read_as, "m"),)
+
+
+def test_diagnostics_are_bounded() -> None:
+    status = Thing(name="n" * 1000, level=b"\x00", message="m" * 1000)
+    found = read(DIAGNOSTICS, Thing(status=[status] * 1000))
+    assert len(found.items) == 256
+    assert (len(found.items[0].component), len(found.items[0].message)) == (120, 300)
+
+
+@pytest.mark.parametrize(
+    ("text", "mode"),
+    [
+        ("exploring", Mode("exploring")),
+        (" idle\n", Mode("idle")),
+        ("", None),
+        (" \n", None),
+        ("a\x1b[2Jb\nc", Mode("a\ufffd[2Jb c")),
+    ],
+)
+def test_a_mode_is_one_printable_line(text: str, mode: Mode | None) -> None:
+    assert read(MODE, Thing(data=text)) == mode
 
 
 def test_every_default_source_has_a_reader() -> None:
