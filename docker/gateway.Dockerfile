@@ -83,6 +83,7 @@ CMD ["robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]
 # Last, because they change with every commit and nothing above does.
 ARG VERSION=0.0.0
 ARG REVISION=unknown
+ENV ROBOT_GATEWAY_REVISION=${REVISION}
 LABEL org.opencontainers.image.title="robot-gateway" \
       org.opencontainers.image.description="One typed door between a ROS 2 robot and its operator" \
       org.opencontainers.image.licenses="Apache-2.0" \
