@@ -47,6 +47,8 @@ class Joining:
     def detach(self) -> None:
         """Lets go of the pipeline, whose listener has stopped: nobody joins any more."""
         self._disconnect()
+        # It holds the listener, which must be gone for its port to be free.
+        del self._disconnect
         gate_id, self._gate_id = self._gate_id, None
         if gate_id is not None:
             self._pad.remove_probe(gate_id)
