@@ -1,4 +1,4 @@
-"""Every test here needs the images, and counts as one that needs Docker."""
+"""The whole system in containers, for the tests here that need it; those count as tests that need Docker."""
 
 from collections.abc import Iterator
 from pathlib import Path
