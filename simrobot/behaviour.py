@@ -16,6 +16,50 @@ class Topic(Enum):
     DETECTIONS = "detections"
     BATTERY = "battery"
     DIAGNOSTICS = "diagnostics"
+    MODE = "mode"
+    KEYBOARD_COMMANDS = "keyboard_commands"
+    AUTONOMY_COMMANDS = "autonomy_commands"
+    NAVIGATION_COMMANDS = "navigation_commands"
+    EFFECTIVE_COMMAND = "effective_command"
+
+
+COMMANDS = (
+    Topic.KEYBOARD_COMMANDS,
+    Topic.AUTONOMY_COMMANDS,
+    Topic.NAVIGATION_COMMANDS,
+    Topic.EFFECTIVE_COMMAND,
+)
+"""The inputs of the command mux, and what it lets through."""
+
+
+class Commander(Enum):
+    """Who drives."""
+
+    KEYBOARD = "keyboard"
+    AUTONOMY = "autonomy"
+    NAVIGATION = "navigation"
+    UNSEEN = "unseen"
+    """The mux emits commands that none of its inputs gave: a joystick wired to it, for example."""
+    NOBODY = "nobody"
+    """No input speaks, and the mux emits nothing."""
+
+
+class Component(Enum):
+    """What reports in the diagnostics."""
+
+    DRIVE = "drive"
+    BATTERY = "battery"
+    VISION = "vision"
+    LIDAR = "lidar"
+
+
+class Level(Enum):
+    """What a component reports of itself."""
+
+    OK = "ok"
+    WARNING = "warning"
+    ERROR = "error"
+    STALE = "stale"
 
 
 class Behaviour(BaseModel):
@@ -39,6 +83,12 @@ class Behaviour(BaseModel):
     """Charge at the moment this is set; it drains from there."""
     battery_drain_percent_per_s: float = 0.01
     """How fast the charge falls; negative while charging."""
+    commander: Commander = Commander.AUTONOMY
+    """Whose commands the mux lets through."""
+    mode: str = Field(default="exploring", max_length=1000)
+    """What the robot is about; told when it changes."""
+    components: dict[Component, Level] = Field(default_factory=dict)
+    """Levels that components report whatever their true state is."""
 
     def changed(self, wish: dict[str, Any]) -> "Behaviour":
         """This behaviour with some fields replaced, from JSON values.

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from common import program
+from common.ros_environment import check_domain, check_middleware
 from simrobot import control as control_socket
-from simrobot.behaviour import Behaviour, Topic
-from simrobot.rates import DEFAULT_RATES_HZ
+from simrobot.behaviour import COMMANDS, Behaviour, Topic
+from simrobot.rates import COMMANDS_HZ, DEFAULT_RATES_HZ
 
 app = typer.Typer(help=__doc__, add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 
@@ -20,17 +21,22 @@ ControlPath = Annotated[
 ]
 
 
-def _rate(topic: Topic) -> Any:
-    return typer.Option(min=0.0, max=2000.0, help=f"How often {topic.value} is published; 0: not at all.")
+def _rate(what: str) -> Any:
+    return typer.Option(min=0.0, max=2000.0, help=f"How often {what} published; 0: not at all.")
 
 
 @app.command()
 def run(  # noqa: PLR0917 - typer makes the command line from the signature
-    odometry_hz: Annotated[float, _rate(Topic.ODOMETRY)] = DEFAULT_RATES_HZ[Topic.ODOMETRY],
-    vision_hz: Annotated[float, _rate(Topic.VISION)] = DEFAULT_RATES_HZ[Topic.VISION],
-    detections_hz: Annotated[float, _rate(Topic.DETECTIONS)] = DEFAULT_RATES_HZ[Topic.DETECTIONS],
-    battery_hz: Annotated[float, _rate(Topic.BATTERY)] = DEFAULT_RATES_HZ[Topic.BATTERY],
-    diagnostics_hz: Annotated[float, _rate(Topic.DIAGNOSTICS)] = DEFAULT_RATES_HZ[Topic.DIAGNOSTICS],
+    odometry_hz: Annotated[float, _rate("odometry is")] = DEFAULT_RATES_HZ[Topic.ODOMETRY],
+    vision_hz: Annotated[float, _rate("vision is")] = DEFAULT_RATES_HZ[Topic.VISION],
+    detections_hz: Annotated[float, _rate("detections are")] = DEFAULT_RATES_HZ[Topic.DETECTIONS],
+    battery_hz: Annotated[float, _rate("battery is")] = DEFAULT_RATES_HZ[Topic.BATTERY],
+    diagnostics_hz: Annotated[float, _rate("diagnostics are")] = DEFAULT_RATES_HZ[Topic.DIAGNOSTICS],
+    commands_hz: Annotated[float, _rate("commands, of the driving mux input and the mux, are")] = COMMANDS_HZ,
+    mode_hz: Annotated[
+        float,
+        typer.Option(min=0.0, max=100.0, help="How often it is looked for a new mode; 0: none is told."),
+    ] = DEFAULT_RATES_HZ[Topic.MODE],
     behaviour: Annotated[
         list[str] | None,
         typer.Argument(
@@ -39,17 +45,21 @@ def run(  # noqa: PLR0917 - typer makes the command line from the signature
     ] = None,
     control: ControlPath = None,
 ) -> None:
-    """Publishes odometry, vision, detections, battery and diagnostics until SIGINT or SIGTERM."""
+    """Publishes what a robot does, all the topics of the first one, until SIGINT or SIGTERM."""
     rates_hz = {
         Topic.ODOMETRY: odometry_hz,
         Topic.VISION: vision_hz,
         Topic.DETECTIONS: detections_hz,
         Topic.BATTERY: battery_hz,
         Topic.DIAGNOSTICS: diagnostics_hz,
+        Topic.MODE: mode_hz,
+        **dict.fromkeys(COMMANDS, commands_hz),
     }
 
     def work() -> None:
         start = Behaviour().changed(_fields(behaviour or []))
+        check_domain()
+        check_middleware()
         # Late, so that --help and a wrong option need no ROS 2.
         from simrobot.app import run_robot  # noqa: PLC0415
 
@@ -76,7 +86,8 @@ def change(
     """Changes a running robot and prints how it now behaves, as JSON.
 
     Fields: silent, not_a_number (topics, separated by commas), speed_mps, turn_rad_s, infer_errors_per_s,
-    detection_count, battery_percent, battery_drain_percent_per_s.
+    detection_count, battery_percent, battery_drain_percent_per_s, commander (keyboard, autonomy, navigation,
+    unseen, nobody), mode, components (drive:error,lidar:stale).
     """
 
     def work() -> None:
@@ -102,9 +113,17 @@ def _fields(words: list[str]) -> dict[str, Any]:
         name, equals, value = word.partition("=")
         if not equals:
             raise typer.BadParameter(f"'{word}' is not FIELD=VALUE")
-        is_set = name in {"silent", "not_a_number"}
-        fields[name] = [item for item in value.split(",") if item] if is_set else value
+        fields[name] = _json_value(name, value)
     return fields
+
+
+def _json_value(name: str, text: str) -> Any:
+    items = [item for item in text.split(",") if item]
+    if name in {"silent", "not_a_number"}:
+        return items
+    if name == "components":
+        return {component: level for component, _, level in (item.partition(":") for item in items)}
+    return text
 
 
 def main() -> None:

@@ -2,18 +2,22 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from common.errors import UserError
-from simrobot.behaviour import Topic
+from simrobot.behaviour import Commander, Component, Level, Topic
 from simrobot.motion import Box, pack_voltage
 from simrobot.robot import Robot
 
 try:
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+    from geometry_msgs.msg import TwistStamped
     from nav_msgs.msg import Odometry
     from omniseer_msgs.msg import VisionPerfSummary
     from sensor_msgs.msg import BatteryState
+    from std_msgs.msg import String
     from yolo_msgs.msg import Detection, DetectionArray
 except ImportError as error:
     raise UserError(
@@ -22,9 +26,29 @@ except ImportError as error:
 
 _PICTURES_PER_S = 30.0
 _LOW_PERCENT = 15.0
+_NAMES = {
+    Component.DRIVE: "drive: motor controller",
+    Component.BATTERY: "power: battery",
+    Component.VISION: "vision: inference",
+    Component.LIDAR: "lidar: driver",
+}
+_LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARNING: DiagnosticStatus.WARN,
+    Level.ERROR: DiagnosticStatus.ERROR,
+    Level.STALE: DiagnosticStatus.STALE,
+}
+_SAYINGS = {
+    Level.OK: "running",
+    Level.WARNING: "not as it should be",
+    Level.ERROR: "failed",
+    Level.STALE: "no data received",
+}
 
 Build = Callable[[Robot, float, Any], Any]
-"""Makes the message of this moment: the robot, the monotonic time in seconds, the ROS stamp."""
+"""Makes the message of this moment: the robot, the monotonic time in seconds, the ROS stamp.
+
+None when there is nothing to tell."""
 
 
 def odometry(robot: Robot, now_s: float, stamp: Any) -> Any:
@@ -104,45 +128,88 @@ def battery(robot: Robot, now_s: float, stamp: Any) -> Any:
 
 
 def diagnostics(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """diagnostic_msgs/DiagnosticArray: drive, battery and vision, each with its level."""
-    percent = robot.battery_percent(now_s)
-    failing = robot.behaviour.infer_errors_per_s > 0
-    message = DiagnosticArray(
-        status=[
-            _status("drive: motor controller", DiagnosticStatus.OK, "running"),
-            _status("power: battery", *_battery_level(percent), percent=f"{percent:.1f}"),
-            _status(
-                "vision: inference",
-                DiagnosticStatus.ERROR if failing else DiagnosticStatus.OK,
-                "inference fails" if failing else "running",
-            ),
-        ]
-    )
+    """diagnostic_msgs/DiagnosticArray: every component with its level."""
+    message = DiagnosticArray(status=[_status(robot, each, now_s) for each in Component])
     message.header.stamp = stamp
     return message
 
 
-def _battery_level(percent: float) -> tuple[bytes, str]:
-    if percent < _LOW_PERCENT:
-        return DiagnosticStatus.ERROR, f"battery low: {percent:.0f} %"
-    return DiagnosticStatus.OK, "charged"
-
-
-def _status(name: str, level: bytes, text: str, **values: str) -> Any:
+def _status(robot: Robot, component: Component, now_s: float) -> Any:
+    level, text = _true_state(robot, component, now_s)
+    if component in robot.behaviour.components:
+        level = robot.behaviour.components[component]
+        text = _SAYINGS[level]
     return DiagnosticStatus(
-        name=name,
-        level=level,
+        name=_NAMES[component],
+        level=_LEVELS[level],
         message=text,
         hardware_id="simulated",
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        values=[KeyValue(key="charge", value=f"{robot.battery_percent(now_s):.1f} %")],
     )
 
 
-WHAT_IS_PUBLISHED: dict[Topic, tuple[str, Any, Build]] = {
-    Topic.ODOMETRY: ("/odometry/filtered", Odometry, odometry),
-    Topic.VISION: ("/vision/perf", VisionPerfSummary, vision),
-    Topic.DETECTIONS: ("/yolo/detections", DetectionArray, detections),
-    Topic.BATTERY: ("/battery", BatteryState, battery),
-    Topic.DIAGNOSTICS: ("/diagnostics", DiagnosticArray, diagnostics),
+def _true_state(robot: Robot, component: Component, now_s: float) -> tuple[Level, str]:
+    percent = robot.battery_percent(now_s)
+    if component is Component.BATTERY and percent < _LOW_PERCENT:
+        return Level.ERROR, f"battery low: {percent:.0f} %"
+    if component is Component.VISION and robot.behaviour.infer_errors_per_s > 0:
+        return Level.ERROR, "inference fails"
+    return Level.OK, _SAYINGS[Level.OK]
+
+
+def mode(robot: Robot, now_s: float, stamp: Any) -> Any:
+    """std_msgs/String, when the mode is another than the one told last."""
+    return String(data=robot.behaviour.mode) if robot.news_of_mode() else None
+
+
+def command_of(commander: Commander, robot: Robot, now_s: float, stamp: Any) -> Any:
+    """geometry_msgs/TwistStamped: what one of the mux's inputs asks for, while it is the one that drives."""
+    return _command(robot, stamp) if robot.behaviour.commander is commander else None
+
+
+def effective_command(robot: Robot, now_s: float, stamp: Any) -> Any:
+    """geometry_msgs/TwistStamped: what the mux lets through."""
+    return None if robot.behaviour.commander is Commander.NOBODY else _command(robot, stamp)
+
+
+def _command(robot: Robot, stamp: Any) -> Any:
+    lost = math.nan if Topic.EFFECTIVE_COMMAND in robot.behaviour.not_a_number else 0.0
+    message = TwistStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = "base_link"
+    message.twist.linear.x = robot.behaviour.speed_mps + lost
+    message.twist.angular.z = robot.behaviour.turn_rad_s + lost
+    return message
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """What is published where. `latched`: whoever comes later hears the last message, too."""
+
+    topic: str
+    message_type: Any
+    build: Build
+    latched: bool = False
+
+
+PUBLICATIONS: dict[Topic, Publication] = {
+    Topic.ODOMETRY: Publication("/odometry/filtered", Odometry, odometry),
+    Topic.VISION: Publication("/vision/perf", VisionPerfSummary, vision),
+    Topic.DETECTIONS: Publication("/yolo/detections", DetectionArray, detections),
+    Topic.BATTERY: Publication("/battery", BatteryState, battery),
+    Topic.DIAGNOSTICS: Publication("/diagnostics", DiagnosticArray, diagnostics),
+    Topic.MODE: Publication("/mission/mode", String, mode, latched=True),
+    Topic.KEYBOARD_COMMANDS: Publication(
+        "/cmd_vel_keyboard", TwistStamped, partial(command_of, Commander.KEYBOARD)
+    ),
+    Topic.AUTONOMY_COMMANDS: Publication(
+        "/cmd_vel_autonomy", TwistStamped, partial(command_of, Commander.AUTONOMY)
+    ),
+    Topic.NAVIGATION_COMMANDS: Publication(
+        "/cmd_vel_nav", TwistStamped, partial(command_of, Commander.NAVIGATION)
+    ),
+    Topic.EFFECTIVE_COMMAND: Publication(
+        "/mecanum_drive_controller/reference", TwistStamped, effective_command
+    ),
 }
-"""Topic name, message type and how to make one. The gateway's default sources read these."""
+"""The gateway's default sources read these, all but the mode."""

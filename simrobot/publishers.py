@@ -8,17 +8,18 @@ from typing import Any
 
 from common.errors import UserError
 from simrobot.behaviour import Topic
-from simrobot.messages import WHAT_IS_PUBLISHED
+from simrobot.messages import PUBLICATIONS
 from simrobot.robot import Robot
 
 try:
     from rclpy.context import Context
     from rclpy.node import Node
-    from rclpy.qos import QoSProfile
+    from rclpy.qos import DurabilityPolicy, QoSProfile
 except ImportError as error:
     raise UserError(f"ROS 2 can't be used from Python ({error})", "Type: scripts/setup") from error
 
 _DEPTH = 10
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @contextmanager
@@ -47,13 +48,15 @@ def publishing(robot: Robot, topics: frozenset[Topic]) -> Iterator[Mapping[Topic
 
 
 def _publisher(node: Any, robot: Robot, topic: Topic) -> Callable[[], None]:
-    name, message_type, _ = WHAT_IS_PUBLISHED[topic]
-    publisher = node.create_publisher(message_type, name, QoSProfile(depth=_DEPTH))
+    what = PUBLICATIONS[topic]
+    qos = _LATCHED if what.latched else QoSProfile(depth=_DEPTH)
+    publisher = node.create_publisher(what.message_type, what.topic, qos)
     return partial(_publish, node.get_clock(), publisher, robot, topic)
 
 
 def _publish(clock: Any, publisher: Any, robot: Robot, topic: Topic) -> None:
     if topic in robot.behaviour.silent:
         return
-    _, _, build = WHAT_IS_PUBLISHED[topic]
-    publisher.publish(build(robot, time.monotonic(), clock.now().to_msg()))
+    message = PUBLICATIONS[topic].build(robot, time.monotonic(), clock.now().to_msg())
+    if message is not None:
+        publisher.publish(message)

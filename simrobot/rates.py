@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 
-from simrobot.behaviour import Topic
+from simrobot.behaviour import COMMANDS, Topic
+
+COMMANDS_HZ = 20.0
 
 DEFAULT_RATES_HZ: Mapping[Topic, float] = {
     Topic.ODOMETRY: 50.0,
@@ -10,4 +12,7 @@ DEFAULT_RATES_HZ: Mapping[Topic, float] = {
     Topic.DETECTIONS: 15.0,
     Topic.BATTERY: 1.0,
     Topic.DIAGNOSTICS: 1.0,
+    Topic.MODE: 5.0,
+    **dict.fromkeys(COMMANDS, COMMANDS_HZ),
 }
+"""Mode and commands are only published when there is something to tell: this often it is looked."""

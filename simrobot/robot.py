@@ -29,6 +29,7 @@ class Robot:
         self._started_s = self._moved_s = now_s
         self._charge_set_s = now_s
         self._infer_errors = 0.0
+        self._mode_told: str | None = None
 
     def change(self, wish: dict[str, Any], now_s: float) -> Behaviour:
         """Behaves differently from now on: `wish` names the fields that change.
@@ -64,3 +65,8 @@ class Robot:
         return VisionCounts(
             produced=int((now_s - self._started_s) * pictures_per_s), infer_errors=int(self._infer_errors)
         )
+
+    def news_of_mode(self) -> bool:
+        """Whether the mode is another than at the last question."""
+        told, self._mode_told = self._mode_told, self.behaviour.mode
+        return told != self.behaviour.mode

@@ -5,12 +5,12 @@ ROS_AUTOMATIC_DISCOVERY_RANGE), as everywhere in ROS 2. Nothing of the process i
 signal handlers, no log files, none of the services an ordinary node offers.
 """
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from common.errors import ExitCode, UserError
+from common.errors import UserError
+from common.ros_environment import check_domain
 
 try:
     from rclpy.context import Context
@@ -22,9 +22,6 @@ except ImportError as error:
         "Type: scripts/setup, or source the setup.bash of a ROS 2 installation first",
     ) from error
 
-# Beyond it, the ports that DDS computes from the domain do not exist, and Fast DDS ends the process.
-_LAST_DOMAIN = 232
-
 
 @contextmanager
 def ros_node(name: str) -> Iterator[Any]:
@@ -33,7 +30,7 @@ def ros_node(name: str) -> Iterator[Any]:
     Raises:
         UserError: the environment names an impossible domain, or the middleware can't start.
     """
-    _check_domain()
+    check_domain()
     context = Context()
     try:
         context.init(args=[], initialize_logging=False)
@@ -57,13 +54,3 @@ def ros_node(name: str) -> Iterator[Any]:
     finally:
         context.shutdown()
         context.destroy()
-
-
-def _check_domain() -> None:
-    domain = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not (domain.isascii() and domain.isdigit() and int(domain) <= _LAST_DOMAIN):
-        raise UserError(
-            f"ROS_DOMAIN_ID is '{domain}'",
-            f"Set it to a number from 0 to {_LAST_DOMAIN}",
-            exit_code=ExitCode.USAGE,
-        )

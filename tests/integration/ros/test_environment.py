@@ -6,11 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from sensor_msgs.msg import BatteryState
 
 from common.errors import UserError
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
+from tests.support.ros import free_domain, simulated_robot
+from tests.support.talker import talking
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.ros
 
@@ -31,6 +35,9 @@ import rclpy
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
+from tests.support.ros import free_domain, simulated_robot
+from tests.support.talker import talking
+from tests.support.waiting import wait_until
 before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 with intake(DEFAULT_SOURCES, Board()):
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
@@ -47,3 +54,67 @@ print("untouched")
         check=False,
     )
     assert done.stdout == "untouched\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "from gateway.cli import main; main()",
+        "from simrobot.cli import main; main()",
+    ],
+)
+@pytest.mark.parametrize("middleware", ["rmw_that_is_not_there", "../etc"])
+def test_a_middleware_that_is_not_installed_is_refused_in_one_line(
+    ros_domain: int, tmp_path: Path, command: str, middleware: str
+) -> None:
+    """Left to itself, rclpy would end the process with a status of its own, in the middle of an import."""
+    done = subprocess.run(
+        [sys.executable, "-c", command, "serve" if "gateway" in command else "run"],
+        env=os.environ
+        | {
+            "PYTHONPATH": str(Path(__file__).parents[3]),
+            "RMW_IMPLEMENTATION": middleware,
+            "GATEWAY__GRPC__PORT": "0",
+            "GATEWAY__PREVIEW__SOCKET": str(tmp_path / "preview.sock"),
+        },
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    lines = [line for line in done.stderr.splitlines() if "INFO" not in line]
+    assert len(lines) == 1
+    assert f"RMW_IMPLEMENTATION is '{middleware}'" in lines[0]
+    assert "Unset it" in lines[0]
+
+
+def test_the_middleware_can_be_named(
+    ros_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one that is installed, in this process and in the robot's."""
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
+    board = Board()
+    with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path):
+        wait_until(lambda: board.odometry, "odometry")
+
+
+def test_robots_of_other_domains_are_not_heard(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    with free_domain() as other, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(other))
+        with simulated_robot(tmp_path):
+            patch.setenv("ROS_DOMAIN_ID", str(ros_domain))
+            with intake(DEFAULT_SOURCES, board), talking() as talker:
+                talker.publisher("/battery", BatteryState)
+                wait_until(
+                    lambda: (
+                        (seen := board.presence.get("battery"))
+                        and seen.offered_by == 1
+                        and talker.publisher("/battery", BatteryState).publish(BatteryState()) is None
+                        and board.battery
+                    ),
+                    "the talker of this domain alone",
+                )
+                assert board.odometry is None
+                assert board.presence["odometry"].offered_by == 0

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
-from gateway.config import DEFAULT_SOURCES
+from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.intake import intake
-from gateway.status.board import Board
+from gateway.status.board import Board, SourceKind
+from gateway.status.values import CommandSource, DiagnosticLevel
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
 
@@ -35,9 +36,11 @@ def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: 
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path, "battery_percent=40", "speed_mps=0.75"):
         wait_until(
-            lambda: board.odometry and board.vision and board.detections and board.battery, "all sources"
+            lambda: board.odometry and board.vision and board.detections and board.battery, "all sensors"
         )
+        wait_until(lambda: board.diagnostics and board.effective_command and board.mux_inputs, "the rest")
     assert not board.unusable
+    assert set(board.mux_inputs) == {CommandSource.AUTONOMY}, "the others are there, and do not speak"
     assert board.odometry
     assert board.odometry.value.vx_mps == 0.75
     assert board.battery
@@ -72,6 +75,40 @@ def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> No
         wait_until(lambda: board.detections and not board.detections.value.items, "no box to draw")
 
 
+def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+    board = Board()
+    latched = {"reliability": "reliable", "durability": "transient_local"}
+    mode = SourceSettings(
+        kind=SourceKind.MODE,
+        topic="/mission/mode",
+        type="std_msgs/msg/String",
+        stale_after_ms=1000,
+        **latched,
+    )
+
+    def levels() -> dict[str, DiagnosticLevel]:
+        items = board.diagnostics.value.items if board.diagnostics else ()
+        return {item.component.partition(":")[0]: item.level for item in items}
+
+    with simulated_robot(tmp_path, "mode=idle") as robot, intake((*DEFAULT_SOURCES, mode), board):
+        wait_until(lambda: board.mode and board.mode.value.name == "idle", "the mode from before the gateway")
+        robot.change(commander="keyboard", mode="returning", components={"drive": "error", "lidar": "stale"})
+        wait_until(lambda: CommandSource.KEYBOARD in board.mux_inputs, "the keyboard's commands")
+        wait_until(lambda: board.mode and board.mode.value.name == "returning", "the new mode")
+        wait_until(
+            lambda: (
+                levels()
+                == {
+                    "drive": DiagnosticLevel.ERROR,
+                    "power": DiagnosticLevel.OK,
+                    "vision": DiagnosticLevel.OK,
+                    "lidar": DiagnosticLevel.STALE,
+                }
+            ),
+            "the components' levels",
+        )
+
+
 def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) -> None:
     with simulated_robot(tmp_path) as robot:
         started = time.monotonic()
@@ -88,8 +125,10 @@ def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> N
         assert set(robot.change()["silent"]) == {"battery", "odometry"}
         assert simrobot("control", *at, "resume", "odometry").returncode == 0
         assert robot.change()["silent"] == ["battery"]
-        assert simrobot("control", *at, "set", "speed_mps=2.5").returncode == 0
+        changed = simrobot("control", *at, "set", "speed_mps=2.5", "components=drive:error,lidar:stale")
+        assert changed.returncode == 0, changed.stderr
         assert robot.change()["speed_mps"] == 2.5
+        assert robot.change()["components"] == {"drive": "error", "lidar": "stale"}
         with pytest.raises(UserError, match="silent"):
             robot.change(silent=["sonar"])
 

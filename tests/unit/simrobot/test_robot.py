@@ -46,6 +46,14 @@ def test_topics_are_silenced_by_name() -> None:
     assert robot(silent=["odometry"]).behaviour.silent == {Topic.ODOMETRY}
 
 
+def test_a_mode_is_news_once() -> None:
+    running = robot(mode="idle")
+    assert running.news_of_mode()
+    assert not running.news_of_mode()
+    running.change({"mode": "returning"}, now_s=101.0)
+    assert running.news_of_mode()
+
+
 @pytest.mark.parametrize(
     ("wish", "named"),
     [
@@ -54,6 +62,8 @@ def test_topics_are_silenced_by_name() -> None:
         ({"silent": ["sonar"]}, "silent"),
         ({"speed_mps": "fast"}, "speed_mps"),
         ({"detection_count": -1}, "detection_count"),
+        ({"commander": "ghost"}, "commander"),
+        ({"components": {"drive": "broken"}}, "components"),
     ],
 )
 def test_a_wish_that_makes_no_sense_changes_nothing(wish: dict[str, Any], named: str) -> None:
