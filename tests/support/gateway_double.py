@@ -22,6 +22,12 @@ from omniseer.gateway.v1 import (
 from omniseer.gateway.v1 import states_pb2 as states
 
 STREAM_URI = "srt://127.0.0.1:7100"
+_TARGETS = {
+    preview_pb2.PREVIEW_PROFILE_LOW_BW: (15, 1000),
+    preview_pb2.PREVIEW_PROFILE_BALANCED: (30, 2500),
+    preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY: (60, 4500),
+}
+"""Frames per second and kbit/s."""
 
 
 def healthy_status() -> system_status_pb2.SystemStatus:
@@ -52,8 +58,12 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         status: the answer to GetSystemStatus; also part of GetOverlaySnapshot.
         overlay: detections and events of the answer to GetOverlaySnapshot.
         info: the answer to GetGatewayInfo.
+        accept: whether wishes are taken.
+        works: whether an enabled preview comes to run; else it ends FAULTED.
+        fault: why it is FAULTED, and what to do.
         failures: (code, details) pairs; each call takes one and fails with it, until none is left.
-        preview_becomes: states of the preview after an enable, one per later look at the status.
+        preview_becomes: states of the preview after an enable, one for each later look at the status. When it
+            is empty, an enable comes to its end at once.
         hold: while cleared, calls wait (at most 20 s) before they are answered.
         calls: names of the methods called, in order.
         wishes: what SetPreviewMode was asked.
@@ -69,6 +79,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.preview_becomes: deque[int] = deque()
         self.fault = "no encoder works. Type: robot-preview encoders"
         self.accept = True
+        self.works = True
         self.hold = threading.Event()
         self.hold.set()
         self.calls: list[str] = []
@@ -95,17 +106,19 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     ) -> robot_gateway_pb2.SetPreviewModeResponse:
         self._begin("SetPreviewMode", context)
         self.wishes.append(request)
-        if self.accept:
-            if request.profile:
-                self.status.preview.profile = request.profile
-            if request.enabled:
-                self._preview_moves_on()
-            else:
-                self.status.preview.state = states.PREVIEW_DISABLED
-        message = "taken note" if self.accept else "the robot is being serviced"
+        if request.enabled and request.profile not in preview_pb2.PreviewProfile.values():
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"profile {request.profile} does not exist")
+        message = self._switch(request) if self.accept else "the robot is being serviced"
         return robot_gateway_pb2.SetPreviewModeResponse(
             accepted=self.accept, message=message, preview=self.status.preview
         )
+
+    def preview_service_dies(self) -> None:
+        """From now on nobody makes video; what is wanted stays wanted."""
+        preview = self.status.preview
+        preview.service_reachable = False
+        if preview.state != states.PREVIEW_DISABLED:
+            self._preview_faults("preview service unreachable. Start or restart it")
 
     def _begin(self, name: str, context: Any) -> None:
         self.calls.append(name)
@@ -114,16 +127,39 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             context.abort(code, details)
         self.hold.wait(20)
 
+    def _switch(self, request: robot_gateway_pb2.SetPreviewModeRequest) -> str:
+        preview = self.status.preview
+        if not request.enabled:
+            preview.state, preview.last_error = states.PREVIEW_DISABLED, ""
+            return "preview is off"
+        profile = request.profile or preview.profile or preview_pb2.PREVIEW_PROFILE_BALANCED
+        if preview.state == states.PREVIEW_RUNNING and profile == preview.profile:
+            return "preview is already running; nothing was touched"
+        preview.profile = profile
+        if not self.preview_becomes:
+            self.preview_becomes.append(states.PREVIEW_RUNNING if self.works else states.PREVIEW_FAULTED)
+        self._preview_moves_on()
+        if preview.state == states.PREVIEW_FAULTED:
+            return f"preview is not delivering yet: {preview.last_error}"
+        return "preview is running" if preview.state == states.PREVIEW_RUNNING else "preview is on its way"
+
     def _preview_moves_on(self) -> None:
         if not self.preview_becomes:
             return
-        preview = self.status.preview
-        preview.state = self.preview_becomes.popleft()
-        if preview.state == states.PREVIEW_FAULTED:
-            preview.last_error = self.fault
-            preview.counters.faults += 1
-        if preview.state == states.PREVIEW_RUNNING:
+        preview, before = self.status.preview, self.status.preview.state
+        state = self.preview_becomes.popleft()
+        if state == states.PREVIEW_FAULTED:
+            self._preview_faults(self.fault)
+            return
+        preview.state, preview.last_error = state, ""
+        if state == states.PREVIEW_RUNNING:
+            preview.counters.starts += before != states.PREVIEW_RUNNING
             _describe_stream(preview)
+
+    def _preview_faults(self, why: str) -> None:
+        preview = self.status.preview
+        preview.state, preview.last_error = states.PREVIEW_FAULTED, why
+        preview.counters.faults += 1
 
 
 def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
@@ -139,8 +175,8 @@ def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
         )
     )
     preview.encoder.name = preview.encoder.wanted = "x264"
-    preview.video.width_px, preview.video.height_px, preview.video.fps = 1280, 720, 30
-    preview.target_bitrate_kbps = 2500
+    fps, preview.target_bitrate_kbps = _TARGETS[preview.profile or preview_pb2.PREVIEW_PROFILE_BALANCED]
+    preview.video.width_px, preview.video.height_px, preview.video.fps = 1280, 720, fps
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import grpc
 import pytest
@@ -134,6 +135,51 @@ def test_an_error_of_the_gateway_is_one_line(target: str, double: GatewayDouble)
     assert "first line second line" in only_line(ended.stderr)
 
 
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [
+        (grpc.StatusCode.PERMISSION_DENIED, "not_allowed"),
+        (grpc.StatusCode.UNIMPLEMENTED, "unsupported"),
+        (grpc.StatusCode.RESOURCE_EXHAUSTED, "overloaded"),
+    ],
+)
+def test_what_kind_of_no_it_was_is_for_scripts(
+    target: str, double: GatewayDouble, code: grpc.StatusCode, kind: str
+) -> None:
+    double.failures.append((code, "because"))
+    ended = robotctl("status", "--json", "--target", target)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    error = json.loads(only_line(ended.stderr))["error"]
+    assert (error["kind"], error["exit_code"]) == (kind, 1)
+    assert error["remedy"]
+
+
+def test_a_passphrase_is_never_printed(target: str, double: GatewayDouble) -> None:
+    robotctl("preview", "on", "--target", target)
+    double.status.preview.endpoint.passphrase = "correct horse battery"
+    for words in (("status",), ("status", "--json"), ("preview", "on"), ("preview", "on", "--json")):
+        ended = robotctl(*words, "--target", target)
+        assert ended.returncode == 0
+        assert "srt://" in ended.stdout
+        assert "correct horse" not in ended.stdout + ended.stderr
+
+
+def test_an_output_that_takes_nothing_is_one_line(target: str) -> None:
+    for words in (("status",), ("status", "--json"), ("watch", "--count", "1")):
+        with Path("/dev/full").open("w") as full:
+            ended = subprocess.run(
+                [ROBOTCTL, *words, "--target", target],
+                stdout=full,
+                stderr=subprocess.PIPE,
+                text=True,
+                env=environment(),
+                timeout=ENDS_WITHIN_S,
+                check=False,
+            )
+        assert ended.returncode == 1
+        assert "the output can't be written: No space left on device" in only_line(ended.stderr)
+
+
 def unreachable(words: tuple[str, ...]) -> str:
     began_s = time.monotonic()
     ended = robotctl(*words)
@@ -192,6 +238,8 @@ def test_a_wrong_command_line_is_one_line_and_ends_2(words: tuple[str, ...]) -> 
     ended = robotctl(*words)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert only_line(ended.stderr).startswith("error: ")
+    error = json.loads(only_line(robotctl(*words, "--json").stderr))["error"]
+    assert (error["kind"], error["exit_code"]) == ("usage", 2)
 
 
 def test_help_and_version_need_no_robot() -> None:

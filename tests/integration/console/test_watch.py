@@ -18,10 +18,10 @@ import pytest
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment
+from tests.support.terminal import seen
 from tests.support.waiting import wait_until
 
 SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
-CURSOR_UP = re.compile(r"\x1b\[1A|\x1b\[\d+A")
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -133,7 +133,9 @@ def test_a_terminal_is_redrawn_in_place(double: GatewayDouble) -> None:
         screen.wait_for("robot healthy")
         double.status.health.measured_vx_mps = double.status.health.linear_speed_mps = 1.25
         screen.wait_for("1.25 m/s")
-        assert CURSOR_UP.search(screen.drawn), "it went back to where it began"
+        shown = seen(screen.read())
+        assert sum("robot healthy" in line for line in shown) == 1, "one table, the newest"
+        assert not any("0.50 m/s" in line for line in shown)
         assert COLOUR.search(screen.drawn)
         assert screen.drawn.startswith(HIDE_CURSOR)
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor
-from google.protobuf.message import Message
 
 from console.client.mapping import enums
 from console.client.mapping.methods import METHODS, SET_PREVIEW_MODE, PreviewWish
@@ -21,6 +20,7 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
+from tests.support.filled import fill, value_of
 
 FILES = (
     source_pb2,
@@ -61,30 +61,6 @@ def paths(message: Descriptor, above: Path = ()) -> Iterator[Path]:
             yield from paths(field.message_type, (*above, field))
         else:
             yield (*above, field)
-
-
-def fill(message: Message) -> None:
-    """Every field set, every flag up, every list with one item."""
-    for field in message.DESCRIPTOR.fields:
-        if field.message_type:
-            fill(getattr(message, field.name).add() if field.is_repeated else getattr(message, field.name))
-        else:
-            setattr(message, field.name, value_of(field, first=True))
-
-
-def value_of(field: FieldDescriptor, *, first: bool) -> Any:
-    """One of two values that differ."""
-    if field.enum_type:
-        return field.enum_type.values[-1 if first else 0].number
-    match field.cpp_type:
-        case FieldDescriptor.CPPTYPE_BOOL:
-            return first
-        case FieldDescriptor.CPPTYPE_STRING:
-            return "first" if first else "second"
-        case FieldDescriptor.CPPTYPE_FLOAT:
-            return 1.5 if first else 2.5
-        case _:
-            return 7 if first else 8
 
 
 def change(message: Any, path: Path) -> None:
