@@ -120,11 +120,13 @@ class Reconciler:
         """First contact, and nobody has asked yet: what an earlier gateway had applied stays in force."""
         self._ours = True
         enabled = actual.state in _ALIVE
+        # A service without a wish names the profile it would take; nobody chose it.
+        chosen = actual.profile if actual.applied_revision else None
         self._wish = replace(
             self._wish,
             revision=actual.applied_revision,
             enabled=enabled,
-            profile=actual.profile or self._wish.profile,
+            profile=chosen or self._wish.profile,
         )
         if enabled and self._new_passphrase and not self._wish.passphrase:
             self.ask(enabled=True, profile=None)

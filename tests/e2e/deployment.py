@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -82,7 +82,9 @@ class Deployment:
     def signal_all(self, service: str, number: signal.Signals) -> None:
         """Sends a signal from outside, as the kernel would: the engine is not asked and does not know."""
         for pid in self.pids(service):
-            os.kill(pid, number)
+            # The first one is the container's init: with it the kernel ends the others.
+            with suppress(ProcessLookupError):
+                os.kill(pid, number)
 
     def restarts(self, service: str) -> int:
         """How often the engine has started it again."""

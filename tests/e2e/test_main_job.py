@@ -33,7 +33,7 @@ class Place:
         self.directory = directory
         self.domain = domain
 
-    def start(self, *arguments: str) -> "subprocess.Popen[str]":
+    def start(self, *arguments: str, **environment: str) -> "subprocess.Popen[str]":
         """The demo, its output in files: a pipe would be held open by whatever it leaves behind."""
         with self.out.open("w") as out, self.err.open("w") as err:
             return subprocess.Popen(
@@ -41,13 +41,13 @@ class Place:
                 stdout=out,
                 stderr=err,
                 text=True,
-                env={**os.environ, "TMPDIR": str(self.directory)},
+                env={**os.environ, "TMPDIR": str(self.directory), **environment},
                 start_new_session=True,
             )
 
-    def run(self, *arguments: str) -> int:
+    def run(self, *arguments: str, **environment: str) -> int:
         """The demo to its end; its exit code."""
-        with self.start(*arguments) as demo:
+        with self.start(*arguments, **environment) as demo:
             try:
                 return demo.wait(240)
             finally:
@@ -157,6 +157,67 @@ def test_a_step_that_fails_says_why_and_shows_the_logs(place: Place) -> None:
         assert path, errors
         assert Path(path[1]).is_file(), "the log that is named can be read"
     place.wait_until_gone()
+
+
+def test_pictures_that_never_change_are_no_video(place: Place) -> None:
+    still = "gst:videotestsrc pattern=black is-live=true ! video/x-raw,width=1280,height=720,framerate=30/1"
+    assert place.run("--check", "--source", still) == 1
+    *_, failed, last = place.out.read_text().splitlines()
+    assert last == "main job: failed"
+    assert re.match(r"FAIL +\d+\.\d\d s  video: .*all show the same picture", failed), place.said()
+    place.wait_until_gone()
+
+
+def test_a_file_that_is_no_video_fails_the_step_that_needs_it(place: Place) -> None:
+    text = place.directory / "letter.mp4"
+    text.write_text("Dear robot,\n" * 1000)
+    assert place.run("--check", "--source", f"file:{text}") == 1
+    *_, failed, last = place.out.read_text().splitlines()
+    assert last == "main job: failed"
+    assert re.match(r"FAIL +\d+\.\d\d s  preview on: ", failed), place.said()
+    place.wait_until_gone()
+
+
+@pytest.mark.parametrize("broken", PROGRAMS)
+def test_a_program_that_does_not_start_is_named(place: Place, broken: str) -> None:
+    # The demo starts its programs through setpriv: this one stands before the real one.
+    setpriv = place.directory / "bin/setpriv"
+    setpriv.parent.mkdir()
+    setpriv.write_text(
+        f'#!/bin/sh\ncase "$*" in */{broken}\\ *) echo "no such library" >&2; exit 7;; esac\n'
+        f'exec {shutil.which("setpriv")} "$@"\n'
+    )
+    setpriv.chmod(0o755)
+    assert place.run("--check", PATH=f"{setpriv.parent}:{os.environ['PATH']}") == 1
+    *_, failed, last = place.out.read_text().splitlines()
+    assert last == "main job: failed"
+    assert re.match(rf"FAIL +\d+\.\d\d s  start: {broken} ended with exit code 7", failed), place.said()
+    assert "no such library" in place.err.read_text(), "the end of its log"
+    place.wait_until_gone()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("step", ["start", "preview on"])
+def test_a_signal_in_the_middle_of_the_check_leaves_nothing(
+    place: Place, number: signal.Signals, step: str
+) -> None:
+    with place.start("--check") as demo:
+        wait_until(lambda: f"  {step}: " in place.out.read_text(), f"step '{step}' is done", UP_WITHIN_S)
+        demo.send_signal(number)
+        assert demo.wait(GONE_WITHIN_S) == 1, place.said()
+    lines = place.out.read_text().splitlines()
+    assert lines[-1] == "main job: interrupted"
+    assert not any(line.startswith("FAIL") for line in lines)
+    place.wait_until_gone()
+    assert not place.left_behind()
+    ports = {
+        kind: int(port)
+        for kind, port in re.findall(r"(gRPC |srt://127\.0\.0\.1:)(\d+)", place.out.read_text())
+    }
+    for kind, port in ports.items():
+        with socket.socket(type=socket.SOCK_STREAM if kind == "gRPC " else socket.SOCK_DGRAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

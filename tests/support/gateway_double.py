@@ -130,7 +130,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     def _switch(self, request: robot_gateway_pb2.SetPreviewModeRequest) -> str:
         preview = self.status.preview
         if not request.enabled:
-            preview.state, preview.last_error = states.PREVIEW_DISABLED, ""
+            preview.state = states.PREVIEW_DISABLED
             return "preview is off"
         profile = request.profile or preview.profile or preview_pb2.PREVIEW_PROFILE_BALANCED
         if preview.state == states.PREVIEW_RUNNING and profile == preview.profile:

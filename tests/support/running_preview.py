@@ -37,6 +37,7 @@ class RunningPreview:
         directory: for its configuration, socket and log.
         settings: keys of the configuration that differ from the test's own: a moving picture, x264, small.
         doubles: hardware encoders to pretend, element -> how it fails (see encoder_doubles).
+        small: whether profiles are smaller than the service's own.
     """
 
     def __init__(
@@ -44,6 +45,8 @@ class RunningPreview:
         directory: Path,
         settings: Mapping[str, Any] | None = None,
         doubles: Mapping[str, str] | None = None,
+        *,
+        small: bool = True,
     ) -> None:
         self.port = free_udp_port()
         self.socket = directory / "preview.sock"
@@ -56,7 +59,7 @@ class RunningPreview:
             "socket": str(self.socket),
             "runtime_dir": str(self.runtime_dir),
             "source": {"kind": "test"},
-            "profiles": PROFILES,
+            "profiles": PROFILES if small else {},
             "srt": {"port": self.port, "bind": "127.0.0.1", "latency_ms": 20},
             "encoders": {"order": ["x264"]},
         }

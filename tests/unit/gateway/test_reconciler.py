@@ -121,6 +121,13 @@ def test_a_refused_wish_is_not_repeated_to_the_same_process_but_to_the_next() ->
     assert reconciler.pending() == wish
 
 
+def test_the_profile_of_a_service_without_a_wish_was_chosen_by_nobody() -> None:
+    reconciler = Reconciler(FIRST)
+    reconciler.heard(told(revision=0, profile=Profile.HIGH_QUALITY), 0.0)
+    assert reconciler.view.profile is None
+    assert reconciler.ask(enabled=True, profile=None).profile is Profile.BALANCED
+
+
 def test_a_restarted_gateway_takes_the_wish_over_and_touches_nothing() -> None:
     reconciler = Reconciler(FIRST)
     reconciler.heard(told(S.RUNNING, 77, profile=Profile.HIGH_QUALITY, starts=4), 0.0)
