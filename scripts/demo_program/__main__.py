@@ -2,12 +2,9 @@
 
 import argparse
 import os
-import signal
 import sys
 import time
 from pathlib import Path
-from types import FrameType
-from typing import NoReturn
 
 from common.errors import ExitCode, UserError
 from common.program import end_with
@@ -17,6 +14,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from demo_program.check import check
 from demo_program.ground import DEFAULT_GRPC_PORT, DEFAULT_SRT_PORT, Ground, Wishes, prepared
+from demo_program.interruption import Interruption
 from demo_program.programs import Programs, ProgramTroubleError
 from demo_program.show import show
 from demo_program.sources import parse_source
@@ -25,12 +23,11 @@ from demo_program.sources import parse_source
 def main() -> int:
     """Ends 0, or 1 with a reason and the end of each log."""
     wishes, is_check = _command_line()
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupted)
+    interruption = Interruption()
     try:
         with prepared(wishes) as ground:
             try:
-                with Programs(ground) as programs:
+                with Programs(ground, interruption) as programs:
                     (check if is_check else show)(ground, programs, _began_s())
             except KeyboardInterrupt:
                 if is_check:
@@ -59,10 +56,6 @@ def _failed(is_check: bool, tails: str) -> int:
     if is_check:
         print("main job: failed", flush=True)
     return int(ExitCode.FAILED)
-
-
-def _interrupted(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise KeyboardInterrupt
 
 
 def _began_s() -> float:

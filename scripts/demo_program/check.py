@@ -34,33 +34,34 @@ def check(ground: Ground, programs: Programs, began_s: float) -> None:
     """Raises UserError at the first step that fails; the step's line says so."""
     print(f"ok   {time.monotonic() - began_s:6.2f} s  setup: the environment is complete", flush=True)
     with GatewayClient(ground.target) as robot:
-        with _step("start") as say:
+        with _step("start", programs) as say:
             wait_until_up(ground, programs, robot)
             say(f"{', '.join(programs.pids())} are up (gRPC {ground.grpc_port}, ROS domain {ground.domain})")
-        with _step("status") as say:
+        with _step("status", programs) as say:
             say(_fresh(programs, robot))
-        with _step("values") as say:
+        with _step("values", programs) as say:
             say(_values_follow(ground, programs, robot))
-        with _step("silence") as say:
+        with _step("silence", programs) as say:
             say(_silence_is_seen(ground, programs, robot))
-        with _step("preview on") as say:
+        with _step("preview on", programs) as say:
             preview = _preview_on(robot)
             say(_preview_in_words(preview))
-        with _step("video") as say:
+        with _step("video", programs) as say:
             say(_video(preview))
-        with _step("preview off") as say:
+        with _step("preview off", programs) as say:
             say(_preview_off(ground, programs, robot))
-    with _step("stop") as say:
+    with _step("stop", programs) as say:
         programs.stop()
         say("all programs ended in good order")
 
 
 @contextmanager
-def _step(name: str) -> Iterator[Say]:
+def _step(name: str, programs: Programs) -> Iterator[Say]:
     began_s = time.monotonic()
     seen: list[str] = []
     try:
         yield seen.append
+        programs.check_alive()
     except UserError as error:
         print(f"FAIL {time.monotonic() - began_s:6.2f} s  {name}: {error.what}", flush=True)
         raise

@@ -13,6 +13,7 @@ from typing import Final, Self, TypeVar
 
 from common.errors import UserError
 from demo_program.ground import Ground
+from demo_program.interruption import SIGNALS, Interruption
 
 _BIN: Final = Path(sys.executable).parent
 _STOP_WITHIN_S: Final = 8.0
@@ -35,10 +36,16 @@ class ProgramTroubleError(UserError):
 
 
 class Programs:
-    """Simulated robot, preview service and gateway; running inside the `with` block, gone after it."""
+    """Simulated robot, preview service and gateway; running inside the `with` block, gone after it.
 
-    def __init__(self, ground: Ground) -> None:
+    Args:
+        ground: where they run.
+        interruption: looked at while something is waited for.
+    """
+
+    def __init__(self, ground: Ground, interruption: Interruption) -> None:
         self._ground = ground
+        self._interruption = interruption
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._stops = ExitStack()
 
@@ -78,7 +85,8 @@ class Programs:
         return {name: process.pid for name, process in self._running.items()}
 
     def check_alive(self) -> None:
-        """Raises ProgramTroubleError when one has ended by itself."""
+        """Raises ProgramTroubleError when one has ended by itself, KeyboardInterrupt when all shall end."""
+        self._interruption.raise_if_asked()
         for name, process in self._running.items():
             code = process.poll()
             if code is not None:
@@ -154,8 +162,7 @@ class _undisturbed:  # noqa: N801 - reads as what it is in `with _undisturbed()`
     """Keeps an impatient second Ctrl-C from leaving programs behind: ending is bounded anyway."""
 
     def __enter__(self) -> None:
-        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        self._before = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
+        self._before = {number: signal.signal(number, signal.SIG_IGN) for number in SIGNALS}
 
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
