@@ -6,5 +6,6 @@ pytest_plugins = ["tests.support.engine", "tests.support.ros"]
 
 
 def pytest_configure() -> None:
-    """A run in the background inherits an ignored SIGINT and would pass it on to the programs under test."""
+    """A run in the background inherits ignored signals and would pass them on to the programs under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
