@@ -1,14 +1,48 @@
-"""Logging for all programs: one line per event, on standard error."""
+"""Logging for all programs: one line per event, on standard error, for people or for programs."""
 
+import json
 import logging
 import sys
+from datetime import UTC, datetime
+from typing import Final, Literal, TypeAlias
 
-_FORMAT = "%(asctime)s %(levelname)-7s %(name)s: %(message)s"
+from common import request_id
+
+Format: TypeAlias = Literal["human", "json"]
+
+_HUMAN: Final = "%(asctime)s %(levelname)-7s %(name)s: %(message)s%(of_request)s"
 
 
-def configure(level: str) -> None:
+def configure(level: str, form: Format = "human") -> None:
     """Sends all log records from `level` ("debug", "info", "warning", "error") up to standard error."""
-    logging.basicConfig(level=level.upper(), format=_FORMAT, stream=sys.stderr, force=True)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_Json() if form == "json" else logging.Formatter(_HUMAN))
+    handler.addFilter(_tell_request)
+    logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     # The debug chatter of asyncio and gRPC says nothing about the robot.
     for name in ("asyncio", "grpc"):
         logging.getLogger(name).setLevel(logging.WARNING)
+
+
+def _tell_request(record: logging.LogRecord) -> bool:
+    """Notes which request a record belongs to; lets every record pass."""
+    record.request_id = request_id.current()
+    record.of_request = f" [request {record.request_id}]" if record.request_id else ""
+    return True
+
+
+class _Json(logging.Formatter):
+    """One object a line: time (UTC), level, logger, message; request_id and exception where there is one."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+        }
+        if of_request := getattr(record, "request_id", ""):
+            line["request_id"] = of_request
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False)

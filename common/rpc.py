@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import grpc
 
+from common import request_id
 from common.errors import DomainError, InvalidRequestError, NotNowError
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def _guarded(handler: Handler, method: str) -> Handler:
 
 def _guarded_unary(behavior: Any, method: str) -> Any:
     async def call(request: Any, context: Context) -> Any:
+        request_id.begin(context)
         try:
             return await behavior(request, context)
         except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
@@ -114,6 +116,7 @@ def _guarded_unary(behavior: Any, method: str) -> Any:
 
 def _guarded_stream(behavior: Any, method: str) -> Any:
     async def call(request: Any, context: Context) -> AsyncIterator[Any]:
+        request_id.begin(context)
         try:
             async for response in behavior(request, context):
                 yield response

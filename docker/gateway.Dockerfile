@@ -70,6 +70,7 @@ FROM system
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    GATEWAY__LOG_FORMAT=json \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
     HEALTH_TARGET=127.0.0.1:50051

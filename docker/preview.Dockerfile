@@ -42,6 +42,7 @@ FROM system
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # The registry is made anew by every container: one made where the encoder's device was missing keeps hiding it.
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    PREVIEW__LOG_FORMAT=json \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
     XDG_RUNTIME_DIR=/tmp \

@@ -25,7 +25,7 @@ Config = Annotated[
 def serve(config: Config = None) -> None:
     """Serve operators until SIGINT or SIGTERM."""
     settings = load_settings(config)
-    logs.configure(settings.log_level)
+    logs.configure(settings.log_level, settings.log_format)
     run(lambda stop: serve_until(settings, stop))
 
 

@@ -158,6 +158,8 @@ class GatewaySettings(Settings):
     name: str = Field(default="robot-gateway", min_length=1, max_length=64)
     """What operators see as this robot's gateway."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["human", "json"] = "human"
+    """For people, or one JSON object a line for programs."""
     grpc: GrpcSettings = GrpcSettings()
     security: SecuritySettings = SecuritySettings()
     preview: PreviewSettings = PreviewSettings()

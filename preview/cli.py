@@ -46,7 +46,7 @@ def main() -> None:
 
 def _serve(config_file: Path | None) -> None:
     settings = config.load(PreviewSettings, config_file)
-    logs.configure(settings.log_level)
+    logs.configure(settings.log_level, settings.log_format)
     # Trials are started by fork and exec; gRPC's own handlers for a bare fork only get in their way.
     os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
     # Imported late: without GStreamer a check of the configuration still works.
@@ -62,7 +62,7 @@ def _check(config_file: Path | None) -> None:
 
 def _encoders(config_file: Path | None, *, as_json: bool) -> None:
     settings = config.load(PreviewSettings, config_file)
-    logs.configure(settings.log_level)
+    logs.configure(settings.log_level, settings.log_format)
     from preview.encoders import listing  # noqa: PLC0415  # as above
 
     rows = asyncio.run(listing.try_all(settings))

@@ -184,6 +184,8 @@ class PreviewSettings(Settings):
     socket: Path = Path("/run/robot-gateway/preview.sock")
     """The Unix socket the gateway speaks to."""
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["human", "json"] = "human"
+    """For people, or one JSON object a line for programs."""
     source: Source = Field(default_factory=lambda: V4l2Source(card="rkisp_mainpath"))
     profiles: ProfilesSettings = ProfilesSettings()
     srt: SrtSettings = SrtSettings()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import grpc
 
+from common import request_id
 from gateway.preview_link.news import News
 from gateway.preview_link.reconciler import Reconciler
 from gateway.preview_link.wire import UnknownSpeechError, from_wire, to_wire
@@ -76,7 +77,10 @@ class PreviewLink:
 
     def ask(self, *, enabled: bool, profile: Profile | None) -> Wish:
         """Takes a new wish of an operator; it is on its way when this returns."""
-        wish = self._reconciler.ask(enabled=enabled, profile=profile)
+        wish = self._reconciler.ask(enabled=enabled, profile=profile, request_id=request_id.current())
+        _log.info(
+            "wish %d: %s", wish.revision, f"on, {wish.profile.value}" if wish.profile and enabled else "off"
+        )
         self.news.spread()
         return wish
 
@@ -137,8 +141,9 @@ class PreviewLink:
                 await self._pause(rounds)
 
     async def _apply(self, stub: "PreviewServiceAsyncStub", wish: Wish) -> None:
+        metadata = ((request_id.HEADER, wish.request_id),) if wish.request_id else None
         try:
-            reply = await stub.ApplyDesiredState(to_wire(wish), timeout=APPLY_DEADLINE_S)
+            reply = await stub.ApplyDesiredState(to_wire(wish), timeout=APPLY_DEADLINE_S, metadata=metadata)
         except grpc.aio.AioRpcError as error:
             if error.code() in _GONE:
                 raise

@@ -48,7 +48,7 @@ class Reconciler:
         """What is wanted now."""
         return self._wish
 
-    def ask(self, *, enabled: bool, profile: Profile | None) -> Wish:
+    def ask(self, *, enabled: bool, profile: Profile | None, request_id: str = "") -> Wish:
         """A new wish of an operator; without a profile the last one stays, BALANCED when there is none."""
         profile = profile or self._wish.profile
         if enabled and profile is None:
@@ -57,7 +57,7 @@ class Reconciler:
         if enabled and not passphrase and self._new_passphrase:
             passphrase = self._new_passphrase()
         revision = max(self._wish.revision, self._applied_revision()) + 1
-        self._wish = Wish(revision, enabled, profile, passphrase if enabled else "")
+        self._wish = Wish(revision, enabled, profile, passphrase if enabled else "", request_id)
         self._ours, self._applied_once = True, False
         self._failures_at_wish = self._failures
         self._publish()

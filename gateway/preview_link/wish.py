@@ -12,9 +12,11 @@ class Wish:
     Attributes:
         profile: None when none was ever chosen, which no enabled wish has.
         passphrase: of the session, from enable to disable; empty for a stream that is not encrypted.
+        request_id: of the request that asked for it, for the logs; empty when none did.
     """
 
     revision: int
     enabled: bool
     profile: Profile | None
     passphrase: str = field(default="", repr=False)
+    request_id: str = ""
