@@ -9,7 +9,9 @@ from common.gst import GLib, Gst
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.errors import UndecodableError, ended, from_srt
+from console.receiver.file_branch import FileBranch
 from console.receiver.inbox import Inbox
+from console.receiver.setup import Setup
 
 _STOP = "stop"
 _BRANCH_GONE = "branch-gone"
@@ -24,14 +26,17 @@ class Connection:
     Args:
         address: what to call.
         inbox: where pictures and the end go.
+        setup: what the caller wants of the pictures, and whether the stream is kept.
 
     Raises:
         UserError: a GStreamer element is not installed.
     """
 
-    def __init__(self, address: StreamAddress, inbox: Inbox) -> None:
+    def __init__(self, address: StreamAddress, inbox: Inbox, setup: Setup) -> None:
         self._address = address
         self._inbox = inbox
+        self._setup = setup
+        self._file: FileBranch | None = None
         self._had_data = False
         self._branches: dict[str, DecodingBranch] = {}
         self._leaving: deque[DecodingBranch] = deque()
@@ -51,6 +56,8 @@ class Connection:
         for branch in (*self._branches.values(), *self._leaving):
             branch.detach(self._pipeline)
         self._branches.clear()
+        if self._file:
+            self._file.detach()
         if self._probe is not None:
             self._way_in.remove_probe(self._probe)
         for handler in self._handlers:
@@ -79,7 +86,11 @@ class Connection:
         ]
         for one in (source, demuxer):
             self._pipeline.add(one)
-        source.link(demuxer)
+        if self._setup.recording and self._setup.recording.is_writable():
+            self._file = FileBranch(self._setup.recording)
+            self._file.attach(self._pipeline, source).link(demuxer)
+        else:
+            source.link(demuxer)
 
     # Called on GStreamer's thread.
 
@@ -97,7 +108,7 @@ class Connection:
             self._inbox.end(_undecodable(self._address, media_type))
             return
         try:
-            branch = DecodingBranch(codec, self._inbox.put)
+            branch = DecodingBranch(codec, self._inbox.put, self._setup)
         except UserError as error:
             self._inbox.end(UndecodableError(error.what, error.remedy, final=True))
             return
@@ -130,6 +141,8 @@ class Connection:
 
     def _on_error(self, message: Any) -> None:
         error, detail = message.parse_error()
+        if self._file and self._file.take_error(message.src, error.message):
+            return
         if error.matches(GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE):
             self._inbox.end(_undecodable(self._address, error.message))
         else:

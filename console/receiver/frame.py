@@ -1,7 +1,17 @@
 """One decoded picture."""
 
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Protocol
+
+
+class PixelFormat(Enum):
+    """How the pixels of a picture lie in memory; the values are GStreamer's words."""
+
+    I420 = "I420"
+    """A plane of luma, then two of chroma at half the size: what decoders give."""
+    BGRX = "BGRx"
+    """One plane, four bytes a pixel: what screens take."""
 
 
 class Pixels(Protocol):
@@ -28,7 +38,7 @@ class Plane:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A decoded picture in I420: a plane of luma, then two of chroma at half the size.
+    """A decoded picture.
 
     The pixels stay in GStreamer's memory until they are asked for, and are copied once then.
 
@@ -39,8 +49,10 @@ class Frame:
         pts_ns: the sender's presentation time as the demultiplexer gives it; None when it gave none.
         arrival_s: when the decoder handed it out, on `time.monotonic()`.
         corrupt: whether the decoder had to guess parts of it, because packets were lost.
-        planes: luma, Cb, Cr.
+        planes: luma, Cb, Cr in I420; else one.
         pixels: the memory.
+        pixel_format: how they lie there.
+        decoder: GStreamer's element that made it.
     """
 
     width: int
@@ -49,15 +61,17 @@ class Frame:
     pts_ns: int | None
     arrival_s: float
     corrupt: bool
-    planes: tuple[Plane, Plane, Plane] = field(repr=False)
+    planes: tuple[Plane, ...] = field(repr=False)
     pixels: Pixels = field(repr=False)
+    pixel_format: PixelFormat = PixelFormat.I420
+    decoder: str = ""
 
     def plane(self, index: int) -> bytes:
-        """All rows of a plane, `planes[index].stride` bytes each (0 is luma, 1 Cb, 2 Cr)."""
+        """All rows of a plane, `planes[index].stride` bytes each (in I420 0 is luma, 1 Cb, 2 Cr)."""
         return self._rows(self.planes[index], 0, self.planes[index].rows)
 
     def luma_rows(self, first: int, count: int) -> bytes:
-        """Some rows of luma, `planes[0].stride` bytes each; cheaper than the whole plane.
+        """Some rows of luma of an I420 picture, `planes[0].stride` bytes each; cheaper than the whole plane.
 
         Raises:
             IndexError: rows outside the picture.

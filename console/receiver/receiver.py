@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -11,6 +12,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError, closed, nothing_within
 from console.receiver.frame import Frame
 from console.receiver.inbox import Inbox
+from console.receiver.setup import Setup
 
 
 class Call(Protocol):
@@ -23,11 +25,11 @@ class Call(Protocol):
 Dial = Callable[[StreamAddress, Inbox], Call]
 
 
-def _dial(address: StreamAddress, inbox: Inbox) -> Call:
+def _dial(address: StreamAddress, inbox: Inbox, setup: Setup) -> Call:
     # Imported here so that a program without GStreamer fails only when it is asked for pictures.
     from console.receiver.connection import Connection  # noqa: PLC0415
 
-    return Connection(address, inbox)
+    return Connection(address, inbox, setup)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,7 @@ class Receiver:
         address: what to call.
         queue_size: how many decoded pictures may wait for the caller.
         reconnect: call again when the connection is lost, inside `next_frame`; None raises the reason.
+        setup: what the caller wants of the pictures, and whether the stream is kept.
         dial: makes connections; only tests give another one.
 
     Raises:
@@ -95,18 +98,19 @@ class Receiver:
         *,
         queue_size: int = 2,
         reconnect: Reconnect | None = None,
-        dial: Dial = _dial,
+        setup: Setup | None = None,
+        dial: Dial | None = None,
     ) -> None:
         self._address = address
         self._inbox = Inbox(queue_size)
         self._redialling = _Redialling(reconnect) if reconnect else None
-        self._dial = dial
+        self._dial = dial or partial(_dial, setup=setup or Setup())
         self._last_trouble: StreamError | None = None
         self._closing = threading.Event()
         self._changing_call = threading.Lock()
         self.reconnects = 0
         """How often the receiver called again."""
-        self._call = dial(address, self._inbox)
+        self._call = self._dial(address, self._inbox)
 
     def __enter__(self) -> Self:
         """The connection is under way already."""

@@ -72,6 +72,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+        ("console/monitor/", (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window")),
     ],
 )
 def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) -> None:
@@ -84,7 +85,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
     [
         ("rclpy", ("gateway/ros/", "simrobot/")),
         ("gi", ("common/gst.py",)),
-        ("PySide6", ("console/monitor/",)),
+        ("PySide6", ("console/window/",)),
         ("psutil", ("gateway/platform",)),
         ("yaml", ("common/config.py",)),
         ("google.protobuf", ("gateway/rpc/", "gateway/preview_link", "preview/rpc/", "console/client/")),

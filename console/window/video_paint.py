@@ -1,0 +1,89 @@
+"""What is drawn over a picture: boxes with labels, and a banner."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
+
+from console.viewer.banner import Banner
+from console.viewer.geometry import Box
+from console.viewer.overlay import Mark
+from console.window.look import COLOURS
+
+_HALO: Final = QPen(QColor(0, 0, 0, 190), 5.0)
+_LINE: Final = QPen(QColor("#F0E442"), 2.0)
+"""Yellow of Okabe and Ito's palette in a dark halo: seen on any picture, by colour-blind people, too."""
+_LABEL_GROUND: Final = QColor(0, 0, 0, 190)
+_LABEL_INK: Final = QColor("#F0E442")
+_PAPER: Final = QColor(16, 18, 20, 225)
+_INK: Final = QColor("#FFFFFF")
+_DIM_INK: Final = QColor("#C8CCD0")
+_QUIET: Final = QColor("#8A9099")
+_PAD: Final = 4.0
+_MARGIN: Final = 16.0
+_WIDEST: Final = 640.0
+_STRIPE: Final = 5.0
+_GAP: Final = 6.0
+_TITLE_FACTOR: Final = 1.35
+
+
+def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
+    """Boxes first, labels above all boxes."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for pen in (_HALO, _LINE):
+        painter.setPen(pen)
+        for mark in marks:
+            painter.drawRect(_rect(mark.box))
+    for mark in marks:
+        if mark.label:
+            _draw_label(painter, mark)
+
+
+def draw_banner(painter: QPainter, whole: QRectF, words: Banner, *, over_picture: bool) -> None:
+    """A card: at the lower edge over a picture, so that it hides little; else in the middle."""
+    title_font, font = QFont(painter.font()), QFont(painter.font())
+    title_font.setBold(True)
+    title_font.setPointSizeF(font.pointSizeF() * _TITLE_FACTOR)
+    width = min(whole.width() - 2 * _MARGIN, _WIDEST)
+    room = QRectF(0, 0, width - 2 * _MARGIN - _STRIPE, whole.height())
+    title = _extent(title_font, room, words.title)
+    detail = _extent(font, room, words.detail)
+    height = title.height() + (detail.height() + _GAP if words.detail else 0) + 2 * _MARGIN
+    top = whole.bottom() - _MARGIN - height if over_picture else whole.center().y() - height / 2
+    card = QRectF(whole.center().x() - width / 2, max(whole.top(), top), width, height)
+    _draw_card(painter, card, COLOURS.get(words.tone, _QUIET))
+    room.moveTo(card.left() + _STRIPE + _MARGIN, card.top() + _MARGIN)
+    _write(painter, title_font, _INK, room, words.title)
+    room.translate(0, title.height() + _GAP)
+    _write(painter, font, _DIM_INK, room, words.detail)
+
+
+def _draw_card(painter: QPainter, card: QRectF, colour: QColor) -> None:
+    painter.fillRect(card, _PAPER)
+    painter.fillRect(QRectF(card.left(), card.top(), _STRIPE, card.height()), colour)
+
+
+def _extent(font: QFont, room: QRectF, text: str) -> QRectF:
+    return QFontMetricsF(font).boundingRect(room, int(Qt.TextFlag.TextWordWrap), text)
+
+
+def _write(painter: QPainter, font: QFont, colour: QColor, room: QRectF, text: str) -> None:
+    painter.setFont(font)
+    painter.setPen(colour)
+    painter.drawText(room, int(Qt.TextFlag.TextWordWrap), text)
+
+
+def _draw_label(painter: QPainter, mark: Mark) -> None:
+    metrics = QFontMetricsF(painter.font())
+    ground = QRectF(0, 0, metrics.horizontalAdvance(mark.label) + 2 * _PAD, metrics.height() + _PAD)
+    # Above the box; inside it where there is no room above.
+    above = mark.box.y - ground.height()
+    ground.moveTo(mark.box.x, above if above >= 0 else mark.box.y)
+    painter.fillRect(ground, _LABEL_GROUND)
+    painter.setPen(_LABEL_INK)
+    painter.drawText(QPointF(ground.left() + _PAD, ground.top() + _PAD / 2 + metrics.ascent()), mark.label)
+
+
+def _rect(box: Box) -> QRectF:
+    return QRectF(box.x, box.y, box.width, box.height)
