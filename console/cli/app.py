@@ -8,6 +8,7 @@ from common.version import project_version
 from console.cli.doctor import doctor
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
+from console.cli.monitor import monitor
 from console.cli.options import JsonOption, TargetOption, remember, session_of
 from console.cli.preview import preview_app
 from console.cli.tables import overlay_view, status_view
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 app.add_typer(preview_app, name="preview")
 app.command()(doctor)
+app.command()(monitor)
 
 
 def _print_version(wanted: bool) -> None:

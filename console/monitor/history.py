@@ -1,0 +1,89 @@
+"""The last two minutes of a few figures, in slots of half a second."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+from console.client import SystemStatus
+from console.client.results import Sample
+
+SPAN_S: Final = 120.0
+STEP_S: Final = 0.5
+SLOTS: Final = int(SPAN_S / STEP_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A figure worth a plot.
+
+    Args:
+        title: its name.
+        unit: what stands behind its number.
+        bottom: lower end of the scale.
+        top: upper end of the scale; it grows when values do not fit.
+        digits: after the decimal point.
+    """
+
+    title: str
+    unit: str
+    bottom: float
+    top: float
+    digits: int = 0
+
+
+METRICS: Final = (
+    Metric("Video rate", "fps", 0, 30),
+    Metric("Video bit rate", "kbit/s", 0, 1000),
+    Metric("Video round trip", "ms", 0, 20, digits=1),
+    Metric("CPU load", "%", 0, 100),
+    Metric("CPU temperature", "°C", 20, 100),
+)
+Values: TypeAlias = tuple[float | None, ...]
+"""One for each of METRICS; None where it is not known."""
+NOTHING: Final[Values] = (None,) * len(METRICS)
+
+
+def values_of(status: SystemStatus) -> Values:
+    """The figures of one status. What is stale is not known."""
+    measured, compute = status.preview.measured, status.platform.compute
+    video = (measured.fps, measured.bitrate_kbps, measured.worst_rtt_ms) if _fresh(measured) else (None,) * 3
+    computer = (compute.cpu_percent, compute.cpu_temperature_c) if _fresh(compute) else (None,) * 2
+    return (*video, *computer)
+
+
+class History:
+    """A ring of SLOTS slots. Time that nobody recorded is a gap, not a line between its ends."""
+
+    def __init__(self) -> None:
+        self._slots: list[Values] = [NOTHING] * SLOTS
+        self._newest = -1
+
+    def record(self, now_s: float, values: Values) -> None:
+        """Notes the values of this moment, on the monotonic clock. The last of a slot counts."""
+        slot = int(now_s / STEP_S)
+        for skipped in range(max(self._newest + 1, slot - SLOTS + 1), slot):
+            self._slots[skipped % SLOTS] = NOTHING
+        self._newest = slot
+        self._slots[slot % SLOTS] = values
+
+    def series(self, index: int) -> list[float | None]:
+        """The values of METRICS[index], oldest first, the newest at the end."""
+        first = self._newest + 1
+        return [self._slots[(first + offset) % SLOTS][index] for offset in range(SLOTS)]
+
+
+def top_of_scale(metric: Metric, series: Sequence[float | None]) -> float:
+    """The upper end of the scale: the metric's own, or the next round number above what is there."""
+    highest = max((value for value in series if value is not None), default=metric.top)
+    if highest <= metric.top:
+        return metric.top
+    step = 1.0
+    while True:
+        for digit in (1, 2, 2.5, 5):
+            if step * digit >= highest:
+                return step * digit
+        step *= 10
+
+
+def _fresh(sample: Sample) -> bool:
+    return sample.available and not sample.stale

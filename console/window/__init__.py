@@ -1,0 +1,1 @@
+"""The operator's windows: the only place that imports Qt."""

@@ -1,0 +1,105 @@
+"""Lines of the side panel: a component, a fault. Changed in place, never made anew."""
+
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QPalette
+from PySide6.QtWidgets import QFrame, QGridLayout
+
+from console.cli.rows import Tone
+from console.monitor.components import Component
+from console.monitor.faults import FaultLine
+from console.window.labels import RIGHT, TOP, WrappedLabel, set_bold, set_text, width_of, word_label
+from console.window.look import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
+
+_LONGEST_NAME = "Its battery"
+_LONGEST_MARK = "no data"
+_LONGEST_AGE = "59 min 00 s"
+_LONGEST_SEVERITY = "warning"
+
+
+class TintedLine(QFrame):
+    """A line whose ground takes the colour of its tone, behind a marker of the tone's shape."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.marker = Marker()
+        self.setAutoFillBackground(True)
+        self.grid = QGridLayout(self)
+        self.grid.setContentsMargins(6, 3, 6, 3)
+        self.grid.setHorizontalSpacing(8)
+        self.grid.setVerticalSpacing(1)
+        self.grid.addWidget(self.marker, 0, 0, TOP)
+
+    def show_tone(self, tone: Tone) -> None:
+        """Changes shape and ground."""
+        self.marker.show_tone(tone)
+        self._colour_ground()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """The desktop may turn from light to dark."""
+        super().changeEvent(event)
+        if event.type() in PALETTE_CHANGES:
+            self._colour_ground()
+
+    def _colour_ground(self) -> None:
+        parent = self.parentWidget()
+        ground = tinted_ground((parent or self).palette(), self.marker.tone)
+        palette = self.palette()
+        if palette.color(QPalette.ColorRole.Window) != ground:
+            palette.setColor(QPalette.ColorRole.Window, ground)
+            self.setPalette(palette)
+
+
+class ComponentLine(TintedLine):
+    """A part of the robot: marker, name, mark, values, age."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.name, self.mark = word_label(), word_label()
+        self.values, self.age = WrappedLabel(), DimLabel()
+        self.name.setFixedWidth(width_of(_LONGEST_NAME))
+        self.mark.setFixedWidth(width_of(_LONGEST_MARK, bold=True))
+        self.age.setFixedWidth(width_of(_LONGEST_AGE))
+        self.age.setAlignment(RIGHT)
+        for column, label in enumerate((self.name, self.mark), start=1):
+            self.grid.addWidget(label, 0, column, TOP)
+        self.grid.addWidget(self.values, 0, 3)
+        self.grid.addWidget(self.age, 0, 4, TOP)
+        self.grid.setColumnStretch(3, 1)
+
+    def show_item(self, item: Component) -> None:
+        """Shows one component."""
+        self.show_tone(item.tone)
+        set_text(self.name, item.name)
+        set_text(self.mark, item.mark)
+        set_bold(self.mark, item.tone in (Tone.WARNING, Tone.BAD))
+        set_text(self.values, item.values)
+        set_text(self.age, item.age)
+        self.setAccessibleName(f"{item.name}: {item.mark}. {item.values}. {item.age}")
+
+
+class FaultWidget(TintedLine):
+    """A fault: marker, severity, what is wrong, since when; below it what to do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.mark, self.message = word_label(), WrappedLabel()
+        self.remedy, self.since = WrappedLabel(), DimLabel()
+        self.mark.setFixedWidth(width_of(_LONGEST_SEVERITY, bold=True))
+        self.since.setAlignment(RIGHT)
+        set_bold(self.mark, True)
+        set_bold(self.message, True)
+        self.grid.addWidget(self.mark, 0, 1, TOP)
+        self.grid.addWidget(self.message, 0, 2)
+        self.grid.addWidget(self.since, 0, 3, TOP)
+        self.grid.addWidget(self.remedy, 1, 2, 1, 2)
+        self.grid.setColumnStretch(2, 1)
+
+    def show_item(self, item: FaultLine) -> None:
+        """Shows one fault."""
+        self.show_tone(item.tone)
+        set_text(self.mark, item.mark)
+        set_text(self.message, item.message)
+        set_text(self.remedy, item.remedy)
+        self.remedy.setVisible(bool(item.remedy))
+        set_text(self.since, item.since)
+        self.setAccessibleName(f"{item.mark}: {item.message}. {item.remedy}")

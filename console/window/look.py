@@ -1,0 +1,144 @@
+"""Colours and shapes. Okabe and Ito's palette, for colour-blind people, too; no colour stands alone."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+
+from console.cli.rows import Tone
+
+COLOURS: Final[Mapping[Tone, QColor]] = {
+    Tone.GOOD: QColor("#009E73"),
+    Tone.WARNING: QColor("#E69F00"),
+    Tone.BAD: QColor("#D55E00"),
+}
+"""Bluish green, orange, vermillion. What is QUIET has no colour of its own."""
+CURVE_ON_LIGHT: Final = QColor("#0072B2")
+CURVE_ON_DARK: Final = QColor("#56B4E9")
+PALETTE_CHANGES: Final = (QEvent.Type.ApplicationPaletteChange, QEvent.Type.PaletteChange)
+_INK: Final = QColor("#000000")
+"""What is drawn on a coloured shape: black has a contrast of 5 or more on all three."""
+_TINT: Final = 0.16
+_DIM: Final = 0.30
+_MIDDLE_GREY: Final = 128
+
+
+def is_dark(palette: QPalette) -> bool:
+    """Whether light text stands on a dark ground."""
+    return palette.color(QPalette.ColorRole.Window).lightness() < _MIDDLE_GREY
+
+
+def mixed(one: QColor, other: QColor, share: float) -> QColor:
+    """`share` (0 to 1) of the other colour in the one."""
+    mix = [
+        a + (b - a) * share
+        for a, b in zip(one.getRgbF()[:3], other.getRgbF()[:3], strict=True)  # type: ignore[index]
+    ]
+    return QColor.fromRgbF(*mix)
+
+
+def tinted_ground(palette: QPalette, tone: Tone) -> QColor:
+    """The ground behind a line of this tone."""
+    ground = palette.color(QPalette.ColorRole.Window)
+    colour = COLOURS.get(tone)
+    return mixed(ground, colour, _TINT) if colour and tone is not Tone.GOOD else ground
+
+
+def dim_text(palette: QPalette) -> QColor:
+    """For what matters less: nearer to the ground than text is, and still easy to read."""
+    text, ground = palette.color(QPalette.ColorRole.WindowText), palette.color(QPalette.ColorRole.Window)
+    return mixed(text, ground, _DIM)
+
+
+class DimLabel(QLabel):
+    """A word that matters less, in the desktop's light or dark colours, also when these change."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self._colour()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """The desktop may turn from light to dark."""
+        super().changeEvent(event)
+        if event.type() in PALETTE_CHANGES:
+            self._colour()
+
+    def _colour(self) -> None:
+        palette, dim = self.palette(), dim_text(QGuiApplication.palette())
+        if palette.color(self.foregroundRole()) != dim:
+            palette.setColor(self.foregroundRole(), dim)
+            self.setPalette(palette)
+
+
+class Marker(QWidget):
+    """A small shape: a disc with a tick, a triangle with "!", a square with a cross, an empty ring.
+
+    Args:
+        tone: which of them.
+    """
+
+    def __init__(self, tone: Tone = Tone.QUIET) -> None:
+        super().__init__()
+        self._tone = tone
+        self._blank = False
+        side = self.fontMetrics().height()
+        self.setFixedSize(side, side)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    @property
+    def tone(self) -> Tone:
+        """What it shows."""
+        return self._tone
+
+    def show_tone(self, tone: Tone) -> None:
+        """Changes the shape."""
+        if tone is not self._tone:
+            self._tone = tone
+            self.update()
+
+    def show_blank(self, blank: bool) -> None:
+        """Shows nothing, but keeps its place."""
+        if blank is not self._blank:
+            self._blank = blank
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Draws it."""
+        if self._blank:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        draw_shape(painter, QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), self._tone, self.palette())
+
+
+def draw_shape(painter: QPainter, box: QRectF, tone: Tone, palette: QPalette) -> None:
+    """The shape of a tone, as large as the box."""
+    outline = palette.color(QPalette.ColorRole.WindowText)
+    painter.setPen(QPen(outline, 1))
+    painter.setBrush(COLOURS.get(tone, QColor(Qt.GlobalColor.transparent)))
+    ink = QPen(_INK, max(1.5, box.width() / 7), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
+
+    def at(x: float, y: float) -> QPointF:
+        return QPointF(box.left() + x * box.width(), box.top() + y * box.height())
+
+    match tone:
+        case Tone.GOOD:
+            painter.drawEllipse(box)
+            painter.setPen(ink)
+            painter.drawPolyline(QPolygonF([at(0.28, 0.52), at(0.45, 0.70), at(0.74, 0.32)]))
+        case Tone.WARNING:
+            painter.drawPolygon(QPolygonF([at(0.5, 0.0), at(1.0, 0.95), at(0.0, 0.95)]))
+            painter.setPen(ink)
+            painter.drawLine(at(0.5, 0.36), at(0.5, 0.62))
+            painter.drawPoint(at(0.5, 0.81))
+        case Tone.BAD:
+            painter.drawRect(box)
+            painter.setPen(ink)
+            painter.drawLine(at(0.28, 0.28), at(0.72, 0.72))
+            painter.drawLine(at(0.72, 0.28), at(0.28, 0.72))
+        case Tone.QUIET:
+            painter.setPen(QPen(dim_text(palette), 1.5))
+            painter.drawEllipse(box.adjusted(1.5, 1.5, -1.5, -1.5))

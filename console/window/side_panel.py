@@ -1,0 +1,71 @@
+"""The right side: faults with remedies, status by component, events."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from console.cli.rows import Tone
+from console.cli.words import age
+from console.monitor.components import Component, components
+from console.monitor.faults import FaultLine, fault_lines
+from console.monitor.state import MonitorState
+from console.window.event_list import EventList
+from console.window.labels import set_bold, set_text
+from console.window.line_list import LineList
+from console.window.lines import ComponentLine, FaultWidget
+
+_SMALLEST_WIDTH = 34
+"""In average letters."""
+_NO_FAULT = FaultLine("none", Tone.GOOD, "The robot reports no fault", "", "")
+_NOTHING_KNOWN = FaultLine("", Tone.QUIET, "Nothing is known yet", "", "")
+
+
+class SidePanel(QWidget):
+    """Everything the robot tells in words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.faults_title, self.status_title = _heading("Faults"), _heading("Status")
+        self.faults: LineList[FaultLine] = LineList(FaultWidget)
+        self.components: LineList[Component] = LineList(ComponentLine)
+        self.events = EventList()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._scrolled(), 1)
+        layout.addWidget(_heading("Events"))
+        layout.addWidget(self.events)
+
+    def show_state(self, state: MonitorState, now_s: float) -> None:
+        """Shows the newest."""
+        none = _NOTHING_KNOWN if state.snapshot is None else _NO_FAULT
+        self.faults.show_items(fault_lines(state, now_s) or [none])
+        self.components.show_items(components(state, now_s))
+        since = ""
+        if state.snapshot and state.outdated(now_s):
+            since = f", as heard {age(state.silent_ms(now_s))} ago"
+        set_text(self.faults_title, f"Faults{since}")
+        set_text(self.status_title, f"Status{since}")
+        if state.snapshot:
+            self.events.add(state.snapshot)
+
+    def _scrolled(self) -> QScrollArea:
+        inner = QWidget()
+        column = QVBoxLayout(inner)
+        column.setContentsMargins(0, 0, 4, 0)
+        for title, part in ((self.faults_title, self.faults), (self.status_title, self.components)):
+            column.addWidget(title)
+            column.addWidget(part)
+        column.addStretch(1)
+        scroll = QScrollArea()
+        scroll.setWidget(inner)
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setAccessibleName("Faults and status")
+        scroll.setMinimumWidth(_SMALLEST_WIDTH * self.fontMetrics().horizontalAdvance("m"))
+        return scroll
+
+
+def _heading(text: str) -> QLabel:
+    label = QLabel(text)
+    set_bold(label, True)
+    return label
