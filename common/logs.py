@@ -26,8 +26,8 @@ def configure(level: str, form: Format = "human") -> None:
 
 def _tell_request(record: logging.LogRecord) -> bool:
     """Notes which request a record belongs to; lets every record pass."""
-    record.request_id = request_id.current()
-    record.of_request = f" [request {record.request_id}]" if record.request_id else ""
+    of = request_id.current()
+    record.__dict__.update(request_id=of, of_request=f" [request {of}]" if of else "")
     return True
 
 

@@ -4,6 +4,7 @@ common.listen binds what `new_server` makes to a TCP port or a Unix socket.
 """
 
 import logging
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 else:
     # grpc's classes are generic in its stubs only.
     Handler, Context = grpc.RpcMethodHandler, grpc.aio.ServicerContext
+
+Observe: TypeAlias = Callable[[str, grpc.StatusCode, float], None]
+"""Told of every call that ends: the method's full name, the code, how many seconds it took."""
 
 _log = logging.getLogger(__name__)
 
@@ -43,19 +47,28 @@ _SERVER_OPTIONS: Final = (
     # Clients may look more often themselves (ours every 2 s) without being sent away.
     ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
 )
+_LEFT: Final = grpc.StatusCode.CANCELLED
+"""How a call ends whose caller leaves before the answer."""
 _MAX_CONCURRENT_CALLS: Final = 256
 """More at once are refused with RESOURCE_EXHAUSTED. (HTTP/2's own limit per connection resets streams, which
 callers see as UNAVAILABLE, as if the robot were gone.)"""
 
 
-def new_server(interceptors: Sequence[grpc.aio.ServerInterceptor] = ()) -> grpc.aio.Server:
+def unobserved(_method: str, _code: grpc.StatusCode, _seconds: float) -> None:
+    """Nobody counts."""
+
+
+def new_server(
+    interceptors: Sequence[grpc.aio.ServerInterceptor] = (), observe: Observe = unobserved
+) -> grpc.aio.Server:
     """A server with the project's limits that answers domain errors with their codes.
 
     Args:
         interceptors: more of them, innermost last; they see domain errors before these become codes.
+        observe: told of every call that ends.
     """
     return grpc.aio.server(
-        interceptors=(ErrorInterceptor(), *interceptors),
+        interceptors=(ErrorInterceptor(observe), *interceptors),
         options=_SERVER_OPTIONS,
         maximum_concurrent_rpcs=_MAX_CONCURRENT_CALLS,
     )
@@ -68,7 +81,8 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
     nothing but that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, observe: Observe = unobserved) -> None:
+        self._observe = observe
         # One entry per method that exists, so the wrapping is paid once, not per call.
         self._guarded: dict[str, Handler] = {}
 
@@ -83,55 +97,76 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
             handler = await continuation(handler_call_details)
             if handler is None:
                 return None
-            self._guarded[method] = _guarded(handler, method)
+            self._guarded[method] = _guarded(handler, method, self._observe)
         return self._guarded[method]
 
 
-def _guarded(handler: Handler, method: str) -> Handler:
+def _guarded(handler: Handler, method: str, observe: Observe) -> Handler:
     if handler.unary_unary:
         return grpc.unary_unary_rpc_method_handler(
-            _guarded_unary(handler.unary_unary, method),
+            _guarded_unary(handler.unary_unary, method, observe),
             handler.request_deserializer,
             handler.response_serializer,
         )
     if handler.unary_stream:
         return grpc.unary_stream_rpc_method_handler(
-            _guarded_stream(handler.unary_stream, method),
+            _guarded_stream(handler.unary_stream, method, observe),
             handler.request_deserializer,
             handler.response_serializer,
         )
     raise TypeError(f"{method}: a stream of requests has no guard yet")
 
 
-def _guarded_unary(behavior: Any, method: str) -> Any:
+def _guarded_unary(behavior: Any, method: str, observe: Observe) -> Any:
     async def call(request: Any, context: Context) -> Any:
         request_id.begin(context)
+        began_s, code = time.perf_counter(), _LEFT
         try:
-            return await behavior(request, context)
+            reply = await behavior(request, context)
+            code = grpc.StatusCode.OK
         except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
+            code = _code_of(error, context)
             await _end(context, error, method)
+        else:
+            return reply
+        finally:
+            observe(method, code, time.perf_counter() - began_s)
 
     return call
 
 
-def _guarded_stream(behavior: Any, method: str) -> Any:
+def _guarded_stream(behavior: Any, method: str, observe: Observe) -> Any:
     async def call(request: Any, context: Context) -> AsyncIterator[Any]:
         request_id.begin(context)
+        began_s, code = time.perf_counter(), _LEFT
         try:
             async for response in behavior(request, context):
                 yield response
+            code = grpc.StatusCode.OK
         except Exception as error:  # noqa: BLE001  # the border: whatever it is, the caller gets a code
+            code = _code_of(error, context)
             await _end(context, error, method)
+        finally:
+            observe(method, code, time.perf_counter() - began_s)
 
     return call
+
+
+def _code_of(error: Exception, context: Context) -> grpc.StatusCode:
+    """What the caller gets for it."""
+    if isinstance(error, grpc.aio.AbortError):
+        return context.code()
+    if isinstance(error, DomainError):
+        return STATUS_CODES.get(type(error), grpc.StatusCode.INTERNAL)
+    return grpc.StatusCode.INTERNAL
 
 
 async def _end(context: Context, error: Exception, method: str) -> None:
     """Raises grpc's own AbortError, always."""
     if isinstance(error, grpc.aio.AbortError):
         raise error
-    code = STATUS_CODES.get(type(error)) if isinstance(error, DomainError) else None
-    if code is None:
+    code = _code_of(error, context)
+    if code is grpc.StatusCode.INTERNAL:
         _log.error("%s failed", method, exc_info=error)
         await context.abort(grpc.StatusCode.INTERNAL, "internal error; the robot's log says more")
     else:

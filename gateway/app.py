@@ -4,14 +4,19 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from typing import Final
 
 from common.health import Health
-from gateway.config import GatewaySettings, SourceSettings
+from common.rpc import Observe, unobserved
+from gateway.config import GatewaySettings, MetricsSettings, SourceSettings
 from gateway.knowledge import Knowledge
+from gateway.metrics.calls import Calls
+from gateway.metrics.collector import GatewayCollector
+from gateway.metrics.endpoint import serving_metrics
+from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
 from gateway.preview_link.control import PreviewControl
 from gateway.preview_link.link import PreviewLink
@@ -57,7 +62,8 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     board, health = knowledge.board, Health(SERVICE)
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
         async with (
-            serving(gateway, settings.grpc.host, settings.grpc.port, health),
+            _metrics(settings.metrics, knowledge) as observe,
+            serving(gateway, settings.grpc.host, settings.grpc.port, health, observe),
             asyncio.TaskGroup() as timers,
         ):
             background = [
@@ -95,12 +101,27 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
         yield
 
 
+@asynccontextmanager
+async def _metrics(settings: MetricsSettings, knowledge: Knowledge) -> AsyncIterator[Observe]:
+    """Serves them while the block lasts, where they are wanted. Yields what has to be told of every call."""
+    if settings.port is None:
+        yield unobserved
+        return
+    calls, loop_delay = Calls(), LoopDelay()
+    collector = GatewayCollector(knowledge.snapshot, calls, loop_delay)
+    async with serving_metrics(collector.text, settings.host, settings.port):
+        measuring = asyncio.create_task(loop_delay.run(), name="loop-delay")
+        try:
+            yield calls
+        finally:
+            measuring.cancel()
+
+
 async def _observe(knowledge: Knowledge, link: PreviewLink) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     while True:
         now = knowledge.snapshot()
-        for message in knowledge.observe(now):
-            _log.info("event: %s", message)
+        knowledge.observe(now)
         await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
 
 

@@ -127,6 +127,14 @@ class SecuritySettings(Section):
     """Whether everybody who reaches the address may read and switch everything, unencrypted."""
 
 
+class MetricsSettings(Section):
+    """What Prometheus may read: unencrypted, without asking who reads."""
+
+    host: str = Field(default="127.0.0.1", min_length=1)
+    port: int | None = Field(default=None, ge=0, le=65535)
+    """None: no metrics. 0 takes any free one; the log tells which."""
+
+
 class PreviewSettings(Section):
     """The way to the preview service, and from the viewers to its stream."""
 
@@ -165,6 +173,7 @@ class GatewaySettings(Settings):
     preview: PreviewSettings = PreviewSettings()
     platform: PlatformSettings = PlatformSettings()
     faults: FaultSettings = FaultSettings()
+    metrics: MetricsSettings = MetricsSettings()
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """None at all makes a gateway that needs no ROS."""
 

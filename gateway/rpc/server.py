@@ -10,7 +10,7 @@ from google.protobuf.message import Message
 
 from common.health import Health
 from common.listen import bind_tcp, bracketed
-from common.rpc import STOP_GRACE_S, Handler, new_server
+from common.rpc import STOP_GRACE_S, Handler, Observe, new_server, unobserved
 from gateway.rpc.servicer import RobotGateway
 from gateway.rpc.tally import Behavior
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -42,7 +42,11 @@ def method_handlers(gateway: RobotGateway) -> dict[str, Handler]:
 
 @asynccontextmanager
 async def serving(
-    gateway: RobotGateway, host: str, port: int, health: Health | None = None
+    gateway: RobotGateway,
+    host: str,
+    port: int,
+    health: Health | None = None,
+    observe: Observe = unobserved,
 ) -> AsyncIterator[int]:
     """Serves until the block ends; calls that are running then get STOP_GRACE_S to finish.
 
@@ -51,6 +55,7 @@ async def serving(
         host: an address of this machine.
         port: 0 takes any free one.
         health: answers the health service; by default one that knows the contract's service alone.
+        observe: told of every call that ends.
 
     Yields:
         The port.
@@ -58,7 +63,7 @@ async def serving(
     Raises:
         UserError: the address can't be bound.
     """
-    server = new_server()
+    server = new_server(observe=observe)
     server.add_generic_rpc_handlers(
         (grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),)
     )

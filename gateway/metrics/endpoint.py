@@ -1,0 +1,98 @@
+"""Serves the metrics over plain HTTP, on the gateway's own loop.
+
+prometheus_client has a server, too, but it gives every connection a thread and as much time as it likes; this
+one gives a few at a time some seconds.
+"""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from http import HTTPStatus
+from typing import Final
+
+from common.errors import ExitCode, UserError
+from common.listen import bracketed
+
+_log = logging.getLogger(__name__)
+
+_DEADLINE_S: Final = 3.0
+"""For a caller to ask and to take the answer."""
+_MOST_CALLERS: Final = 4
+"""At once; more are hung up on."""
+_LONGEST_REQUEST: Final = 8192
+_END_OF_REQUEST: Final = b"\r\n\r\n"
+_TEXT_FORMAT: Final = "text/plain; version=0.0.4; charset=utf-8"
+
+
+@asynccontextmanager
+async def serving_metrics(text: Callable[[], bytes], host: str, port: int) -> AsyncIterator[int]:
+    """Serves until the block ends.
+
+    Args:
+        text: makes the answer.
+        host: an address of this machine.
+        port: 0 takes any free one.
+
+    Yields:
+        The port.
+
+    Raises:
+        UserError: the address can't be bound.
+    """
+    endpoint = _Endpoint(text)
+    try:
+        server = await asyncio.start_server(endpoint.serve, host, port, limit=_LONGEST_REQUEST)
+    except OSError as error:
+        raise UserError(
+            f"metrics can't be served at {bracketed(host)}:{port} ({error.strerror})",
+            "Choose another metrics.host or metrics.port",
+            exit_code=ExitCode.USAGE,
+        ) from error
+    bound = int(server.sockets[0].getsockname()[1])
+    _log.info("metrics at http://%s:%d/metrics", bracketed(host), bound)
+    async with server:
+        yield bound
+
+
+class _Endpoint:
+    def __init__(self, text: Callable[[], bytes]) -> None:
+        self._text = text
+        self._callers = 0
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One connection: one request, one answer."""
+        self._callers += 1
+        try:
+            if self._callers <= _MOST_CALLERS:
+                async with asyncio.timeout(_DEADLINE_S):
+                    writer.write(self._answer(await reader.readuntil(_END_OF_REQUEST)))
+                    await writer.drain()
+        except (TimeoutError, OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as trouble:
+            _log.debug("a caller of the metrics got no answer: %r", trouble)
+            writer.transport.abort()
+        finally:
+            self._callers -= 1
+            writer.close()
+            with suppress(OSError):
+                await writer.wait_closed()
+
+    def _answer(self, request: bytes) -> bytes:
+        method, _, rest = request.partition(b"\r\n")[0].partition(b" ")
+        path = rest.partition(b" ")[0].partition(b"?")[0]
+        if path != b"/metrics":
+            return _http(HTTPStatus.NOT_FOUND, b"There is /metrics only.\n")
+        if method not in {b"GET", b"HEAD"}:
+            return _http(HTTPStatus.METHOD_NOT_ALLOWED, b"GET it.\n")
+        text = self._text()
+        return _http(HTTPStatus.OK, b"" if method == b"HEAD" else text, len(text))
+
+
+def _http(status: HTTPStatus, body: bytes, length: int | None = None) -> bytes:
+    head = (
+        f"HTTP/1.1 {status.value} {status.phrase}\r\n"
+        f"Content-Type: {_TEXT_FORMAT}\r\n"
+        f"Content-Length: {len(body) if length is None else length}\r\n"
+        "Connection: close\r\n\r\n"
+    )
+    return head.encode() + body
