@@ -6,8 +6,8 @@
   asked for the right one instead.
 - The only place where frames may be dropped is before the encoder: two wait there, older ones go.
 - Scaling and converting cost nothing where the source delivers what the encoder takes.
-- Stream headers are repeated with every key frame, tables about every 60 ms, a clock reference with every
-  picture.
+- Stream headers are repeated with every key frame, tables at most 100 ms apart, a clock reference with every
+  picture (and between slow ones: clock_references.py).
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,25 @@ from preview.encoders.chain import chain, size_caps
 from preview.plan import ListenerPlan, Plan
 from preview.values import Target
 
-_TABLES_EVERY: Final = 5400
-"""60 ms of the 90 kHz clock: with pictures every 16 to 67 ms, tables are at most 83 ms apart."""
+_TABLES_EVERY: Final = 4500
+"""50 ms of the 90 kHz clock: with ten pictures a second and more, tables are at most 100 ms apart."""
 _CLOCK_REFERENCE_EVERY: Final = 900
 """10 ms of the 90 kHz clock: with every picture, however fast."""
 _SRT_POLL_MS: Final = 1000
 """The listener's thread wakes this often; for ever (the default) can hang a stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dials:
+    """What is turned while it runs.
+
+    The listener is not among it: a driver that never answers keeps what it was handed, and a listener that
+    somebody keeps holds its port.
+    """
+
+    rate_caps: Any
+    size_caps: Any
+    encoder: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +54,11 @@ class Parts:
     parser_pad: Any
     muxer_pad: Any
     sink: Any
+
+    @property
+    def dials(self) -> Dials:
+        """The part of it that another profile changes."""
+        return Dials(self.rate_caps, self.size_caps, self.encoder)
 
 
 def build(plan: Plan) -> Parts:
@@ -64,20 +82,20 @@ def build(plan: Plan) -> Parts:
     parts = _parts(pipeline, source, body)
     settings.configure(parts.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
     _listen(parts.sink, plan.listener)
-    apply_target(parts, plan)
+    apply_target(parts.dials, plan)
     return parts
 
 
-def apply_target(parts: Parts, plan: Plan) -> None:
+def apply_target(dials: Dials, plan: Plan) -> None:
     """Sets rate, size and the encoder's figures; also while playing.
 
     The encoder's figures first: new caps make it start over, with what it has then.
     """
-    settings.set_figures(parts.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
+    settings.set_figures(dials.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
     size = size_caps(plan.encoder, plan.target)
     rate = Gst.Caps.from_string(_rate_caps(plan.target, exact=plan.source.any_rate))
     # Where caps don't change, setting them again would make the encoder start over for nothing.
-    for capsfilter, caps in ((parts.size_caps, size), (parts.rate_caps, rate)):
+    for capsfilter, caps in ((dials.size_caps, size), (dials.rate_caps, rate)):
         if not capsfilter.get_property("caps").is_equal(caps):
             capsfilter.set_property("caps", caps)
 

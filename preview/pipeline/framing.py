@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst
+from preview.pipeline.clock_references import ClockReferences
 
 PACKET_BYTES: Final = 188
 SLICE_BYTES: Final = 7 * PACKET_BYTES
@@ -25,22 +26,27 @@ _ALL: Final = 1 << 16
 
 
 class Framing:
-    """The probe and what it counted. The counters are written by the streaming thread and read anywhere.
+    """The probe and what it counted. The counters are written by whoever sends and read anywhere.
 
     Args:
         on_first_picture: called once, on the streaming thread: it must only hand over.
+        rate_fps: of the pictures.
     """
 
-    def __init__(self, on_first_picture: Callable[[], None]) -> None:
+    def __init__(self, on_first_picture: Callable[[], None], rate_fps: float) -> None:
         self.pictures = 0
         self.bytes = 0
         self.last_picture_at = 0.0
         """time.monotonic() of the newest picture."""
         self._on_first_picture = on_first_picture
+        self._way_out: Any = None
+        """The listener's pad; None again once it is given up, while the encoder may still be at it."""
+        self._references = ClockReferences(self._send_reference, rate_fps)
         self._detach: tuple[Callable[[], None], ...] = ()
 
     def attach(self, muxer_pad: Any) -> None:
         """Puts the probe on the muxer's source pad, which is linked to the listener."""
+        self._way_out = muxer_pad.get_peer()
         tables = muxer_pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, self._plain_caps)
         probe = muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
         self._detach = (partial(muxer_pad.remove_probe, tables), partial(muxer_pad.remove_probe, probe))
@@ -50,8 +56,14 @@ class Framing:
         for release in self._detach:
             release()
         self._detach = ()
+        self._references.stop()
+        self._way_out = None
 
-    def _plain_caps(self, pad: Any, info: Any) -> Any:
+    def set_rate(self, rate_fps: float) -> None:
+        """Another rate of pictures. May wait until one is sent."""
+        self._references.set_rate(rate_fps)
+
+    def _plain_caps(self, _pad: Any, info: Any) -> Any:
         """Takes the tables out of the caps.
 
         srtsink would send them to every new viewer once more, with counters that don't continue in the
@@ -63,30 +75,45 @@ class Framing:
         ):
             return Gst.PadProbeReturn.OK
         plain = Gst.Caps.from_string(f"video/mpegts,systemstream=true,packetsize={PACKET_BYTES}")
-        pad.get_peer().send_event(Gst.Event.new_caps(plain))
+        if way_out := self._way_out:
+            way_out.send_event(Gst.Event.new_caps(plain))
         return Gst.PadProbeReturn.DROP
 
-    def _probe(self, pad: Any, info: Any) -> Any:
+    def _probe(self, _pad: Any, info: Any) -> Any:
         if info.type & Gst.PadProbeType.BUFFER_LIST:
             packets = info.get_buffer_list()
             parts = [packets.get(index) for index in range(packets.length())]
         else:
             parts = [info.get_buffer()]
-        if parts:
-            pad.get_peer().chain_list(self._slices(parts))
-            self._count()
+        if parts and (way_out := self._way_out):
+            self._send_picture(parts, way_out)
         return Gst.PadProbeReturn.DROP
 
-    def _slices(self, parts: list[Any]) -> Any:
-        picture = Gst.Buffer.new_wrapped(b"".join(part.extract_dup(0, _ALL) for part in parts))
-        picture.pts, picture.dts = parts[0].pts, parts[0].dts
-        size = picture.get_size()
-        self.bytes += size
+    def _send_picture(self, parts: list[Any], way_out: Any) -> None:
+        joined = b"".join(part.extract_dup(0, _ALL) for part in parts)
+        slices = self._slices(joined, parts[0])
+
+        def send() -> None:
+            way_out.chain_list(slices)
+            self.bytes += len(joined)
+
+        self._references.around(joined, send)
+        self._count()
+
+    def _slices(self, joined: bytes, first: Any) -> Any:
+        picture = Gst.Buffer.new_wrapped(joined)
+        picture.pts, picture.dts = first.pts, first.dts
+        size = len(joined)
         flags = Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.TIMESTAMPS
         slices = Gst.BufferList.new_sized(size // SLICE_BYTES + 1)
         for offset in range(0, size, SLICE_BYTES):
             slices.insert(-1, picture.copy_region(flags, offset, min(SLICE_BYTES, size - offset)))
         return slices
+
+    def _send_reference(self, packet: bytes) -> None:
+        """On the clock references' thread. The listener takes what comes from one thread at a time."""
+        self._way_out.chain(Gst.Buffer.new_wrapped(packet))
+        self.bytes += len(packet)
 
     def _count(self) -> None:
         self.last_picture_at = time.monotonic()

@@ -13,13 +13,15 @@ What can fail, how it is noticed, and what follows:
 | encoder fails later | ERROR of the encoder | next encoder at once |
 | encoder gives nothing, or empty buffers | watchdog: frames go in, nothing comes out | next encoder at once |
 | starting blocks | deadline of the call | as a failure of the encoder |
+| another profile, a bit rate or a request for a key frame blocks | deadline of the call | next encoder |
 | stopping blocks in the encoder | deadline | left behind, its port and source free; next encoder |
 | stopping blocks elsewhere | deadline of the call | the process ends with code 70, to be started again |
 | a viewer is slow, frozen, gone, a stranger | the listener drops it | others notice nothing |
 
 A process with an abandoned pipeline ends, with code 70, when the preview is next disabled: only that frees
 the driver. GStreamer's threads meet us in few places (framing.py, joining.py, looping.py) and hand over to
-the loop. State changes run in threads of their own with a deadline.
+the loop. Whatever may block in a driver (state changes, live figures, requests for key frames) runs in a
+thread of its own with a deadline.
 """
 
 import asyncio
@@ -31,12 +33,12 @@ from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.adaptive import BitrateController
+from preview.adaptive import BitrateController, Decision
 from preview.config import TimeoutSettings
 from preview.encoders import settings
 from preview.pipeline import builder, faults, statistics
 from preview.pipeline.crossing import Crossing, in_thread
-from preview.pipeline.faults import Fault
+from preview.pipeline.faults import Blame, Fault
 from preview.pipeline.framing import Framing
 from preview.pipeline.joining import Joining
 from preview.pipeline.looping import Looping
@@ -48,6 +50,8 @@ _log = logging.getLogger(__name__)
 
 _LOOK_EVERY_S: Final = 0.2
 MEASURE_EVERY_S: Final = 0.5
+_DRIVER_DEADLINE_S: Final = 2.0
+"""For what an encoder is told while it runs."""
 _INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
 
@@ -92,14 +96,19 @@ class Runner:
         self._loop = asyncio.get_running_loop()
         self._crossing = Crossing()
         self._parts = builder.build(plan)
-        self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture))
+        self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture), plan.target.fps)
         self._framing.attach(self._parts.muxer_pad)
         self._looping = Looping(self._parts, self._crossing, self._loop_failed) if plan.source.loops else None
         self._joining = Joining(self._parts, self._crossing, self._request_key_frame)
         self._bus = self._parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._watch: asyncio.Task[None] | None = None
-        self._faulted = False
+        self._key_frame: asyncio.Task[None] | None = None
+        self._new_bitrate: asyncio.Task[None] | None = None
+        self._telling = asyncio.Lock()
+        """Held while the encoder is told something."""
+        self._over: asyncio.Future[None] = self._loop.create_future()
+        """Done when it has failed or is being stopped."""
 
     async def start(self) -> None:
         """Starts the pipeline. What fails is told through `on_fault`, also after this has returned."""
@@ -129,7 +138,7 @@ class Runner:
         Raises:
             HungError: the listener or the source hangs.
         """
-        self._faulted = True  # Whatever fails from here on is the teardown's own doing.
+        self._end()  # Whatever fails from here on is the teardown's own doing.
         await self._stop_watching()
         deadline_s = self._timeouts.stop_s
         for part, name in (
@@ -167,23 +176,47 @@ class Runner:
             return False
         return True
 
-    def switching(self, profile: Profile, target: Target) -> Callable[[], None]:
-        """Goes on with another profile; viewers stay connected.
-
-        Returns:
-            What is left to do: a call that may block in the encoder's driver.
-        """
+    async def switch(self, profile: Profile, target: Target) -> None:
+        """Goes on with another profile; viewers stay connected."""
         plan = self.plan = self.plan.switched(profile, target)
         self.bitrate_kbps, self.bitrate_reason = target.bitrate_kbps, ""
         if self._controller:
             self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
-        return lambda: builder.apply_target(self._parts, plan)
+
+        dials, framing = self._parts.dials, self._framing
+
+        def change() -> None:
+            builder.apply_target(dials, plan)
+            framing.set_rate(target.fps)
+
+        await self._tell_encoder(change, "the profile was changed")
+
+    async def _tell_encoder(self, call: Callable[[], None], when: str) -> None:
+        """Makes a call that may block in the encoder's driver: one at a time, and none once it is over."""
+        async with self._telling:
+            if self._over.done():
+                return
+            told = asyncio.create_task(in_thread(call, _DRIVER_DEADLINE_S), name=f"encoder: {when}")
+            try:
+                # Another failure meanwhile is not kept waiting: a viewer sits in the dark.
+                await asyncio.wait((told, self._over), return_when=asyncio.FIRST_COMPLETED)
+                if told.done():
+                    told.result()
+            except TimeoutError:
+                name = self.plan.encoder.name
+                self.fail(Fault(Blame.ENCODER, f"encoder {name} hung when {when}"))
+            finally:
+                told.cancel()
 
     def fail(self, fault: Fault) -> None:
         """Something is wrong with it. Only the first fault counts."""
-        if not self._faulted:
-            self._faulted = True
+        if not self._over.done():
+            self._end()
             self._on_fault(fault)
+
+    def _end(self) -> None:
+        if not self._over.done():
+            self._over.set_result(None)
 
     def draw(self) -> str:
         """The pipeline as a DOT graph."""
@@ -203,15 +236,22 @@ class Runner:
                 self.fail(faults.ended(self.plan))
 
     def _first_picture(self) -> None:
-        if not self._faulted:
+        if not self._over.done():
             self._on_first_picture()
 
     def _loop_failed(self) -> None:
         self.fail(faults.ended(self.plan))
 
     def _request_key_frame(self) -> None:
-        sink_pad = self._parts.sink.get_static_pad("sink")
-        settings.request_key_frame(self._parts.encoder, self.plan.encoder, sink_pad)
+        """For a viewer that joined. While one request is still under way, its key frame serves both."""
+        if self._over.done():
+            return  # A viewer that joined a listener that is being stopped.
+        if self._key_frame is None or self._key_frame.done():
+            element, sink_pad = self._parts.encoder, self._parts.sink.get_static_pad("sink")
+            call = partial(settings.request_key_frame, element, self.plan.encoder, sink_pad)
+            self._key_frame = asyncio.create_task(
+                self._tell_encoder(call, "it was asked for a key frame"), name="key frame"
+            )
 
     async def _supervise(self) -> None:
         """Looks at the counters ten times a second until the pipeline is stopped."""
@@ -242,20 +282,33 @@ class Runner:
         return now
 
     def _follow(self, controller: BitrateController, link: statistics.LinkReport | None) -> None:
+        if self._new_bitrate and not self._new_bitrate.done():
+            return  # First the encoder has to take the last one.
         decision = controller.decide(link, time.monotonic())
-        if decision.bitrate_kbps != self.bitrate_kbps:
-            settings.set_bitrate_live(
-                self._parts.encoder, self.plan.encoder, decision.bitrate_kbps, self.plan.gop_frames
-            )
-            _log.info("bit rate: %s", decision.reason)
-        self.bitrate_kbps, self.bitrate_reason = decision.bitrate_kbps, decision.reason
+        if decision.bitrate_kbps == self.bitrate_kbps:
+            self.bitrate_reason = decision.reason
+        else:
+            self._new_bitrate = asyncio.create_task(self._set_bitrate(decision), name="bit rate")
+
+    async def _set_bitrate(self, decision: Decision) -> None:
+        _log.info("bit rate: %s", decision.reason)
+        encoder, plan = self._parts.encoder, self.plan
+
+        def change() -> None:
+            if plan is self.plan:  # Not another profile meanwhile: its figures count.
+                settings.set_bitrate_live(encoder, plan.encoder, decision.bitrate_kbps, plan.gop_frames)
+
+        await self._tell_encoder(change, "its bit rate was changed")
+        if plan is self.plan:
+            self.bitrate_kbps, self.bitrate_reason = decision.bitrate_kbps, decision.reason
 
     async def _stop_watching(self) -> None:
         self._loop.remove_reader(self._bus_fd)
-        if self._watch:
-            self._watch.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._watch
+        for task in (self._watch, self._key_frame, self._new_bitrate):
+            if task:
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
 
 
 def _to_null(element: Any) -> None:

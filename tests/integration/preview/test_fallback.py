@@ -2,6 +2,7 @@
 
 import signal
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,27 @@ def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp
         assert state.encoder.name == "va-h265"
         assert "hung" in state.encoder.fallback_reason
         assert state.counters.faults == 0
+
+
+def test_a_driver_that_hangs_when_told_something_holds_nobody_up(tmp_path: Path) -> None:
+    doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview, ExitStack() as stack:
+        preview.wish(pb.PROFILE_BALANCED)
+        preview.running()
+        watcher = stack.enter_context(Watcher(preview.port))
+        watcher.wait_for_pictures(10)
+        preview.wish(pb.PROFILE_LOW_BW)
+        # The loop answers while the driver does not.
+        assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
+        state = preview.wait_for(
+            lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
+        )
+        watcher.wait_for_pictures(10)
+        passed_over(state, "va-h265", "hung when the profile was changed")
+        assert state.profile == pb.PROFILE_LOW_BW
+        # The old pictures flow on until it is given up; the port is free although the driver keeps its call.
+        assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
+        print(f"stuck: {watcher.longest_pause_s:.2f} s without a picture")
 
 
 def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:

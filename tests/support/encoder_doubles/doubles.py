@@ -11,6 +11,7 @@ ENCODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not 
 | empty | every buffer is empty |
 | error:N | an ERROR message after N frames |
 | hang:N | the driver never comes back after N frames, not even for a stop |
+| stuck:N | after N frames, whoever tells it another bit rate is never answered |
 | crash:N | the process dies after N frames |
 
 With "later " before it, the encoder proves itself in its trial and fails in the pipeline only.
@@ -72,6 +73,8 @@ class _Double(Gst.Bin):
     def do_set_property(self, pspec: Any, value: Any) -> None:
         self.figures[pspec.name] = value
         if pspec.name == self.bitrate_property:
+            if self._fault == "stuck" and self._frames > self._after:
+                _ENDLESS.wait()
             self.body.get_by_name("inner").set_property("bitrate", max(1, value // self.bitrate_divisor))
 
     def _on_frame(self, pad: Any, info: Any) -> Any:

@@ -1,0 +1,56 @@
+"""Tables and clock of the stream at unusual rates, and while the rate changes."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.mpegts import Stream, analyse
+from tests.support.recording import record
+from tests.support.running_preview import RunningPreview
+
+pytestmark = pytest.mark.gst
+
+SECONDS = 3
+SWITCHES = ((pb.PROFILE_LOW_BW, 15), (pb.PROFILE_BALANCED, 30), (pb.PROFILE_LOW_BW, 15))
+
+
+def in_order(stream: Stream) -> None:
+    assert stream.counter_gaps == []
+    assert stream.clock_times_ms == sorted(stream.clock_times_ms), "the clock never runs back"
+    assert len(stream.pictures) > SECONDS
+
+
+def late(stream: Stream) -> list[float]:
+    """Distances between clock references that are too long, in ms."""
+    return [later - earlier for earlier, later in pairwise(stream.clock_times_ms) if later - earlier > 40]
+
+
+@pytest.mark.parametrize("fps", [10, 12, 19, 24, 25])
+def test_at_rates_of_ones_own(tmp_path: Path, fps: int) -> None:
+    with RunningPreview(tmp_path, {"profiles": {"balanced": {"fps": fps}}}) as preview:
+        preview.wish()
+        preview.running()
+        stream = analyse(record(preview.port, SECONDS))
+    in_order(stream)
+    # A busy machine may hold one of them up.
+    assert len(late(stream)) <= len(stream.clock_times_ms) / 50
+    assert stream.longest_without_pat_ms <= 100
+    assert stream.longest_without_pmt_ms <= 100
+
+
+def test_while_the_profile_changes(preview: RunningPreview) -> None:
+    preview.wish(pb.PROFILE_HIGH_QUALITY)
+    preview.running()
+    with ThreadPoolExecutor(1) as viewer:
+        recording = viewer.submit(record, preview.port, 2 * SECONDS)
+        preview.wait_for(lambda a: a.measurement.viewer_count == 1, "a viewer")
+        for profile, fps in SWITCHES:
+            preview.wish(profile)
+            preview.wait_for(lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5, f"{fps} fps")
+        stream = analyse(recording.result())
+    in_order(stream)
+    # The rhythm breaks at a switch, once each; before and after it the clock comes in time.
+    assert len(late(stream)) <= len(SWITCHES) + len(stream.clock_times_ms) / 50
