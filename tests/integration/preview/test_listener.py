@@ -5,6 +5,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -14,7 +15,9 @@ from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from console.receiver.receiver import Receiver
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
+from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
@@ -97,6 +100,24 @@ def test_comers_and_goers(preview: RunningPreview) -> None:
                 guest.next_frame(timeout_s=10)
         watcher.wait_for_pictures(5)
         assert watcher.reconnects == 0
+    assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> None:
+    preview.wish()
+    preview.running()
+    descriptors = Path(f"/proc/{preview.process.pid}/fd")
+    with Watcher(preview.port) as watcher:
+        watcher.wait_for_pictures(5)
+        before = len(list(descriptors.iterdir()))
+        with ThreadPoolExecutor(8) as crowd:
+            visits = list(crowd.map(lambda _: record(preview.port, 0.0), range(200)))
+        assert all(len(visit) >= 188 for visit in visits)
+        watcher.wait_for_pictures(5)
+        assert watcher.reconnects == 0
+        assert watcher.longest_pause_s < 1.0
+        viewers(preview, 1)
+        wait_until(lambda: len(list(descriptors.iterdir())) <= before, "as many descriptors as before")
     assert preview.running().counters == pb.Counters(starts=1)
 
 

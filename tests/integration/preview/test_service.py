@@ -1,26 +1,18 @@
 """The service's life, seen from the gateway's side of the socket."""
 
-import socket
 from pathlib import Path
 
 import grpc
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.ports import udp_port_is_free
+from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
-
-
-def port_is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-        return True
 
 
 def test_nothing_is_there_until_it_is_wanted(preview: RunningPreview) -> None:
@@ -30,7 +22,7 @@ def test_nothing_is_there_until_it_is_wanted(preview: RunningPreview) -> None:
     assert not state.HasField("encoder")
     assert not state.HasField("measurement")
     assert (state.listener.port, state.listener.latency_ms) == (preview.port, 20)
-    assert port_is_free(preview.port)
+    assert udp_port_is_free(preview.port)
 
 
 def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPreview) -> None:
@@ -51,7 +43,7 @@ def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPrevie
     assert not gone.HasField("worst_rtt_ms")
     preview.wish(None)
     after = preview.disabled()
-    assert port_is_free(preview.port)
+    assert udp_port_is_free(preview.port)
     assert after.profile == pb.PROFILE_BALANCED
     assert after.counters == pb.Counters(starts=1)
 
@@ -165,6 +157,8 @@ def test_again_and_again_leaves_nothing_behind(preview: RunningPreview) -> None:
     def one_round() -> None:
         preview.wish(pb.PROFILE_LOW_BW)
         preview.running(revision=preview.revision)
+        record(preview.port, 0.0)
+        preview.wish(pb.PROFILE_BALANCED)
         preview.wish(None)
         preview.disabled()
 
