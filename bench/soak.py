@@ -1,0 +1,112 @@
+"""Half an hour of enable, join, switch, leave, disable: what the preview service keeps of it.
+
+Not part of a run without names: `scripts/bench soak`; `python -m bench.soak --minutes 8` is a shorter one.
+Memory and descriptors are read while the preview is off. libsrt keeps closed sockets for some seconds, so
+the lowest figure of several rounds speaks: a leak raises that one, too.
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
+
+from rich.console import Console
+
+from bench import report
+from bench.processes import resident_mib
+from bench.rows import Row
+from bench.video import product
+from bench.video.camera import camera
+from bench.video.progress import tell
+from bench.video.viewing import PATIENCE_S
+from console.client import PreviewProfile
+
+MINUTES = 30.0
+WARM_UP_ROUNDS = 20
+"""Until everything that is allocated once is there."""
+WINDOW_ROUNDS = 10
+LATENCY_MS = 20
+_TELL_EVERY_ROUNDS = 25
+_PROFILES = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Of the service while the preview is off."""
+
+    resident_mib: float
+    descriptors: int
+
+
+def run(names: list[str], minutes: float = MINUTES) -> list[Row]:
+    with (
+        tempfile.TemporaryDirectory() as workdir,
+        camera(Path(workdir)) as source,
+        product.robot(Path(workdir), source, LATENCY_MS) as robot,
+    ):
+        readings = _live(robot, minutes * 60)
+    rows = _rows(readings, minutes)
+    return [row for row in rows if not names or row.name in names]
+
+
+def _live(robot: product.Robot, seconds: float) -> list[Reading]:
+    """Rounds until the time is over; at least as many as a judgement needs."""
+    until_s = time.monotonic() + seconds
+    readings: list[Reading] = []
+    profiles = cycle(_PROFILES)
+    while time.monotonic() < until_s or len(readings) < WARM_UP_ROUNDS + 2 * WINDOW_ROUNDS:
+        _round(robot, next(profiles), next(profiles))
+        readings.append(_read(robot.service.pid))
+        if len(readings) % _TELL_EVERY_ROUNDS == 0:
+            mib, descriptors = readings[-1].resident_mib, readings[-1].descriptors
+            tell(f"soak: round {len(readings)}, {mib:.1f} MiB, {descriptors} descriptors")
+    return readings
+
+
+def _round(robot: product.Robot, first: PreviewProfile, second: PreviewProfile) -> None:
+    """One viewer stays from the beginning to the end, another one comes and goes after a switch."""
+    with robot.preview(first), robot.viewer() as staying:
+        staying.next_frame(PATIENCE_S)
+        robot.client.enable_preview(second)
+        with robot.viewer() as passing:
+            passing.next_frame(PATIENCE_S)
+        staying.next_frame(PATIENCE_S)
+
+
+def _read(pid: int) -> Reading:
+    return Reading(resident_mib(pid), len(list(Path(f"/proc/{pid}/fd").iterdir())))
+
+
+def _rows(readings: list[Reading], minutes: float) -> list[Row]:
+    early = readings[WARM_UP_ROUNDS : WARM_UP_ROUNDS + WINDOW_ROUNDS]
+    late = readings[-WINDOW_ROUNDS:]
+    what = f"over {len(readings)} rounds in {minutes:g} min of enable, join, switch, leave, disable"
+    grown_mib = min(r.resident_mib for r in late) - min(r.resident_mib for r in early)
+    more = min(r.descriptors for r in late) - min(r.descriptors for r in early)
+    return [
+        Row(
+            "soak.rss_growth_mib",
+            f"resident memory of the preview service, {what}",
+            "MiB",
+            grown_mib,
+            None,
+            5,
+        ),
+        Row("soak.fds_growth", f"its file descriptors, {what}", "", more, None, 0),
+    ]
+
+
+def main() -> int:
+    """Ends 0 when nothing grew, 1 when something did."""
+    parser = argparse.ArgumentParser(prog="python -m bench.soak", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=MINUTES)
+    rows = run([], parser.parse_args().minutes)
+    Console(width=200).print(report.table(rows))
+    return 0 if all(row.ok for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
