@@ -12,8 +12,8 @@ _BACKLOG_BYTES: Final = 16 * 2**20
 class FileBranch:
     """Appends what the source gives to a recording, packet by packet, without Python.
 
-    Neither a slow nor a full disk reaches the pictures: what can't be written waits in a queue of its own, and
-    an error in this branch ends the recording alone.
+    Neither a slow nor a full disk reaches the pictures: what can't be written waits in a queue of its own,
+    and an error in this branch ends the recording alone.
 
     Args:
         recording: the file, and whom to tell.

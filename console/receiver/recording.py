@@ -46,6 +46,13 @@ class Recording:
         """How often a part was left out because the disk was slower than the stream."""
         return self._gaps
 
+    def size_bytes(self) -> int:
+        """How much was kept so far; 0 where it can't be told."""
+        try:
+            return self.file.stat().st_size
+        except OSError:
+            return 0
+
     def is_writable(self) -> bool:
         """Whether a new connection may append to it: it has not failed, and the file can be opened still."""
         if self._trouble is None:

@@ -83,7 +83,7 @@ def _judged(facts: Facts, still_s: float | None) -> tuple[Phase, str, str]:
     if facts.gateway_trouble:
         return Phase.UNREACHABLE, *_words(facts.gateway_trouble)
     if facts.preview and not _wanted(facts.preview):
-        return Phase.OFF, "", "Switch the preview on"
+        return Phase.OFF, "", "Press P to switch it on"
     if facts.preview and facts.preview.state is PreviewState.FAULTED:
         return Phase.FAULTED, facts.preview.last_error or "the robot gives no reason", ""
     if facts.blocked:

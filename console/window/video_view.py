@@ -64,7 +64,7 @@ class VideoView(QWidget):
         self._said = session.state()
         self._news = News()
         self._news.arrived.connect(self.update)
-        session.watch_pictures(self._make_ready)
+        session.watch_pictures(self.make_ready)
         self._ticks = QTimer(self, interval=_TICK_MS)
         self._ticks.timeout.connect(self._look)
         self._ticks.start()
@@ -135,8 +135,8 @@ class VideoView(QWidget):
             self._said = state
             self.update()
 
-    def _make_ready(self, frame: Frame) -> None:
-        """In the session's thread."""
+    def make_ready(self, frame: Frame) -> None:
+        """Takes a new picture; called in the session's thread, where the copying is done."""
         memory = frame.plane(0)
         row_bytes = frame.planes[0].stride
         image = QImage(memory, frame.width, frame.height, row_bytes, QImage.Format.Format_RGB32)

@@ -72,6 +72,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+        ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window")),
         ("console/monitor/", (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window")),
     ],
 )

@@ -1,0 +1,117 @@
+"""robotctl view: the robot's video, in a window or without one."""
+
+import importlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Final
+
+import typer
+
+from common.errors import ExitCode, UserError
+from console.cli.json_form import json_form
+from console.cli.options import JsonOption, TargetOption, session_of
+from console.client import parse_target
+from console.receiver.recording import Recording
+from console.viewer.account import Account
+from console.viewer.headless import watch_headless
+
+_GSTREAMER: Final = (
+    "Type: sudo apt-get install gir1.2-gst-plugins-base-1.0 gstreamer1.0-plugins-good"
+    " gstreamer1.0-plugins-bad gstreamer1.0-libav python3-gi"
+)
+
+RecordOption = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Keep the encoded stream (MPEG-TS) in a new file."),
+]
+HeadlessOption = Annotated[bool, typer.Option("--headless", help="Without a window.", show_default=False)]
+FramesOption = Annotated[
+    int | None,
+    typer.Option("--frames", min=1, help="With --headless: end after so many pictures.", show_default=False),
+]
+PatienceOption = Annotated[
+    float,
+    typer.Option(
+        "--patience",
+        min=0.5,
+        max=3600,
+        metavar="SECONDS",
+        help="With --headless: give up after so long without a picture.",
+    ),
+]
+
+
+def view(
+    context: typer.Context,
+    *,
+    record: RecordOption = None,
+    headless: HeadlessOption = False,
+    frames: FramesOption = None,
+    patience_s: PatienceOption = 15.0,
+    target: TargetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the live preview with what the robot detects. Everything needed comes from the robot.
+
+    Keys: p preview on or off, o boxes, f full screen, q quit.
+    """
+    session = session_of(context, target, as_json)
+    if frames and not headless:
+        raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
+    address = parse_target(session.target)
+    _need_gstreamer()
+    show = None if headless else _window()
+    recording = Recording(record) if record else None
+    if show:
+        account = show(address, recording)
+    else:
+        with _signals_set() as stop:
+            account = watch_headless(
+                address, frames=frames, patience_s=patience_s, recording=recording, stop=stop
+            )
+    if session.as_json:
+        session.print_json(json_form(account))
+    elif headless or recording:
+        session.out.print(account.line(), soft_wrap=True)
+    if recording and recording.trouble:
+        raise recording.trouble
+
+
+def _need_gstreamer() -> None:
+    try:
+        importlib.import_module("common.gst")
+    except UserError as error:
+        raise UserError(f"video needs GStreamer: {error.what}", _GSTREAMER) from error
+
+
+def _window() -> Callable[[str, Recording | None], Account]:
+    try:
+        from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
+    except ImportError as error:
+        if not (error.name or str(error)).startswith(("PySide6", "shiboken6", "lib")):
+            raise
+        raise UserError(
+            f"the window needs Qt, which can't be loaded ({error}); --headless works without",
+            "Type: pip install PySide6-Essentials && sudo apt-get install libegl1 libgl1 libxkbcommon-x11-0"
+            " libxcb-cursor0 libdbus-1-3",
+        ) from error
+    return run_view
+
+
+@contextmanager
+def _signals_set() -> Iterator[threading.Event]:
+    stop = threading.Event()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

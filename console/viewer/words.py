@@ -1,0 +1,27 @@
+"""The line below the picture. Pure text."""
+
+from console.cli.words import joined, plural
+from console.receiver.frame import Frame
+from console.receiver.recording import Recording
+
+_MIB = 1 << 20
+
+
+def figures_line(newest: Frame | None, fps: float, redials: int) -> str:
+    """What is received."""
+    again = f"called again {redials}x" if redials else ""
+    if newest is None:
+        return again
+    return joined(
+        f"{newest.width}x{newest.height} {newest.codec} by {newest.decoder}", f"{fps:.0f} fps", again
+    )
+
+
+def recording_line(recording: Recording | None) -> str:
+    """What is kept; empty when nothing is to be."""
+    if recording is None:
+        return ""
+    if recording.trouble:
+        return recording.trouble.what
+    gaps = f", {plural(recording.gaps, 'gap')}" if recording.gaps else ""
+    return f"recording {recording.file.name}: {recording.size_bytes() / _MIB:.1f} MiB{gaps}"

@@ -1,0 +1,68 @@
+"""Qt's side of a program with a window: display, look, signals, Qt's own complaints."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
+from PySide6.QtWidgets import QApplication
+
+from common.errors import ExitCode, UserError
+
+
+@contextmanager
+def application(title: str) -> Iterator[QApplication]:
+    """The program's one QApplication; SIGINT and SIGTERM close its windows.
+
+    Python sees a signal only when Qt calls some Python: every window of ours has a timer that does.
+
+    Args:
+        title: what stands in window titles behind the window's own.
+
+    Raises:
+        UserError: there is no display.
+    """
+    _check_display()
+    qInstallMessageHandler(_on_qt_message)
+    app = QApplication([sys.argv[0]])
+    app.setApplicationDisplayName(title)
+    app.setQuitOnLastWindowClosed(True)
+    # One style everywhere, in the desktop's light or dark colours.
+    app.setStyle("Fusion")
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        app.closeAllWindows()
+        app.quit()
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield app
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _check_display() -> None:
+    on_x11_or_wayland = sys.platform.startswith("linux") and "QT_QPA_PLATFORM" not in os.environ
+    if on_x11_or_wayland and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise UserError(
+            "there is no display for a window here",
+            "Run it on a desktop or over ssh -X; without a window: robotctl watch, robotctl view --headless",
+        )
+
+
+def _on_qt_message(kind: QtMsgType, _context: QMessageLogContext, text: str) -> None:
+    """Qt's words go to standard error; before it would abort, the program ends with one line."""
+    if kind is QtMsgType.QtFatalMsg:
+        _end_at_once(UserError(f"Qt can't show a window: {text}", "Check DISPLAY and Qt's libraries"))
+    if kind in (QtMsgType.QtCriticalMsg, QtMsgType.QtSystemMsg):
+        print(f"Qt: {text}", file=sys.stderr)
+
+
+def _end_at_once(error: UserError) -> NoReturn:
+    print(f"error: {error}", file=sys.stderr, flush=True)
+    os._exit(int(ExitCode.FAILED))

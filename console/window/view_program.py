@@ -1,0 +1,63 @@
+"""`robotctl view` from its start to its end."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from console.monitor.video import overlay_of, pass_on
+from console.monitor.worker import Worker
+from console.receiver.frame import Frame
+from console.receiver.recording import Recording
+from console.viewer.account import Account, Bookkeeper
+from console.viewer.session import VideoSession
+from console.window.application import application
+from console.window.video_view import VideoView
+from console.window.view_window import ViewWindow
+
+_HANG_UP_WITHIN_S = 0.8
+"""Each of the two that work in threads of their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Viewing:
+    """The window and all that works behind it."""
+
+    window: ViewWindow
+    session: VideoSession
+    worker: Worker
+
+
+def run_view(target: str, recording: Recording | None) -> Account:
+    """Shows the window until it is closed; returns what was seen.
+
+    Raises:
+        UserError: the target is no address, or there is no display.
+    """
+    books = Bookkeeper()
+    with application("Robot view") as app, viewing(target, recording, books) as now:
+        app.exec()
+        return books.account(now.session.figures().redials, recording)
+
+
+@contextmanager
+def viewing(target: str, recording: Recording | None, books: Bookkeeper) -> Iterator[Viewing]:
+    """At the end of the block everything has hung up."""
+    session = VideoSession(recording=recording)
+    worker = Worker(target, lambda: pass_on(worker.newest(), session))
+    video = VideoView(session, lambda: overlay_of(worker.newest()))
+
+    def on_picture(frame: Frame) -> None:
+        books.note(frame)
+        video.make_ready(frame)
+
+    session.watch_pictures(on_picture)
+    window = ViewWindow(worker, session, video, recording)
+    try:
+        session.start()
+        worker.start()
+        window.show()
+        yield Viewing(window, session, worker)
+    finally:
+        window.close()
+        worker.close(_HANG_UP_WITHIN_S)
+        session.close(_HANG_UP_WITHIN_S)
