@@ -71,7 +71,8 @@ def _read(path: Path) -> dict[str, Any]:
             "Name a readable file with --config",
             exit_code=ExitCode.USAGE,
         ) from error
-    except yaml.YAMLError as error:
+    # Beside its own errors, the parser lets through what dates that don't exist and endless nesting raise.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise UserError(f"configuration {path} is not YAML: {error}", exit_code=ExitCode.USAGE) from error
     if values is None:
         return {}
@@ -81,6 +82,13 @@ def _read(path: Path) -> dict[str, Any]:
             "Write keys and values, 'grpc:' for example",
             exit_code=ExitCode.USAGE,
         )
+    for key in values:
+        if not isinstance(key, str):
+            raise UserError(
+                f"configuration {path}: unknown key {key!r}",
+                "Keys are words, 'grpc:' for example",
+                exit_code=ExitCode.USAGE,
+            )
     return values
 
 

@@ -31,9 +31,9 @@ class UserError(Exception):
         self.exit_code = exit_code
 
     def __str__(self) -> str:
-        """One line, however many the parts had."""
+        """One printable line, whatever the parts quote."""
         text = f"{self.what}. {self.remedy}" if self.remedy else self.what
-        return " ".join(text.split())
+        return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 class DomainError(Exception):

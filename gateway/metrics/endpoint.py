@@ -66,7 +66,7 @@ class _Endpoint:
         try:
             if self._callers <= _MOST_CALLERS:
                 async with asyncio.timeout(_DEADLINE_S):
-                    writer.write(self._answer(await reader.readuntil(_END_OF_REQUEST)))
+                    writer.write(answer(await reader.readuntil(_END_OF_REQUEST), self._text))
                     await writer.drain()
         except (TimeoutError, OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as trouble:
             _log.debug("a caller of the metrics got no answer: %r", trouble)
@@ -77,15 +77,17 @@ class _Endpoint:
             with suppress(OSError):
                 await writer.wait_closed()
 
-    def _answer(self, request: bytes) -> bytes:
-        method, _, rest = request.partition(b"\r\n")[0].partition(b" ")
-        path = rest.partition(b" ")[0].partition(b"?")[0]
-        if path != b"/metrics":
-            return _http(HTTPStatus.NOT_FOUND, b"There is /metrics only.\n")
-        if method not in {b"GET", b"HEAD"}:
-            return _http(HTTPStatus.METHOD_NOT_ALLOWED, b"GET it.\n")
-        text = self._text()
-        return _http(HTTPStatus.OK, b"" if method == b"HEAD" else text, len(text))
+
+def answer(request: bytes, text: Callable[[], bytes]) -> bytes:
+    """The whole answer to a whole request, whatever that is."""
+    method, _, rest = request.partition(b"\r\n")[0].partition(b" ")
+    path = rest.partition(b" ")[0].partition(b"?")[0]
+    if path != b"/metrics":
+        return _http(HTTPStatus.NOT_FOUND, b"There is /metrics only.\n")
+    if method not in {b"GET", b"HEAD"}:
+        return _http(HTTPStatus.METHOD_NOT_ALLOWED, b"GET it.\n")
+    body = text()
+    return _http(HTTPStatus.OK, b"" if method == b"HEAD" else body, len(body))
 
 
 def _http(status: HTTPStatus, body: bytes, length: int | None = None) -> bytes:

@@ -1,0 +1,108 @@
+"""Fuzzes every parser of the project: `scripts/fuzz [--runs N] [--target NAME]`."""
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rich.console import Console
+from rich.table import Table
+
+_SHORT: Final = 20_000
+NAMES: Final = (
+    "operators_wish",
+    "gateways_wish",
+    "previews_truth",
+    "robots_answer",
+    "configuration",
+    "metrics_request",
+    "request_id",
+    "long_list",
+    "robots_message",
+)
+"""Of `targets.TARGETS`, which only a worker loads (a test compares)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of one target."""
+
+    inputs: int
+    seconds: float
+    peak_mib: int
+    defect: str
+    """Empty when there was none; else the worker's last words."""
+
+
+def main() -> int:
+    """Ends 0 when nothing was found, 1 when something was."""
+    arguments = _arguments()
+    if arguments.input:
+        return subprocess.run(_worker(arguments.target, str(arguments.input)), check=False).returncode
+    kept = Path(tempfile.mkdtemp(prefix="fuzz-"))
+    table = Table("target", "inputs", "seconds", "peak MiB", "found")
+    found = False
+    for name in [arguments.target] if arguments.target else NAMES:
+        outcome = _try(name, arguments.runs, kept)
+        found |= bool(outcome.defect)
+        table.add_row(
+            name,
+            f"{outcome.inputs:,}",
+            f"{outcome.seconds:.0f}",
+            str(outcome.peak_mib),
+            outcome.defect or "nothing",
+        )
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    if found:
+        print(f"The inputs are in {kept}. Type: scripts/fuzz --target NAME --input FILE")
+    return int(found)
+
+
+def _try(name: str, runs: int, kept: Path) -> Outcome:
+    corpus = kept / name / "corpus"
+    corpus.mkdir(parents=True)
+    began_s = time.monotonic()
+    ended = subprocess.run(
+        _worker(name, str(runs), str(corpus)), capture_output=True, text=True, errors="replace", check=False
+    )
+    seconds = time.monotonic() - began_s
+    # The exception is told on the one, the figures on the other.
+    said = ended.stdout + ended.stderr
+    defect = "" if ended.returncode == 0 else last_words(said)
+    return Outcome(_figure("number_of_executed_units", said), seconds, _figure("peak_rss_mb", said), defect)
+
+
+def _worker(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "fuzz.worker", *arguments]
+
+
+def _figure(name: str, said: str) -> int:
+    match = re.search(rf"stat::{name}:\s+(\d+)", said)
+    return int(match[1]) if match else 0
+
+
+def last_words(said: str) -> str:
+    """The exception, else libFuzzer's own line, else whatever came last."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    telling = [line for line in lines if re.match(r"^(\w+Error|\w+Exception|==\d+== ?ERROR)", line)]
+    return (telling or lines[-1:] or ["it ended without a word"])[0][:200]
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="scripts/fuzz", description=__doc__)
+    parser.add_argument("--runs", type=int, default=_SHORT, help="inputs for each target (%(default)s)")
+    parser.add_argument("--target", choices=NAMES, help="this one only")
+    parser.add_argument("--input", type=Path, help="try this one input again (with --target)")
+    arguments = parser.parse_args()
+    if arguments.input and not arguments.target:
+        parser.error("--input needs --target")
+    return arguments
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,85 @@
+"""Good inputs to begin with: a fuzzer that starts from nothing takes long to learn a format."""
+
+from typing import Any, Final
+
+from rclpy.serialization import serialize_message
+
+from fuzz.robot import SOURCES, type_of
+from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
+from omniseer.preview.v1 import preview_service_pb2 as preview_pb
+
+_STATUS: Final = system_status_pb2.SystemStatus(
+    gateway_name="lab",
+    preview=preview_pb2.PreviewStatus(state=states_pb2.PREVIEW_RUNNING, last_error="why"),
+    health=system_status_pb2.RobotHealth(ready=True, summary="robot healthy", odom_age_ms=12),
+    mission=system_status_pb2.MissionStatus(available=True, mode="exploring"),
+)
+_ACTUAL: Final = preview_pb.ActualState(
+    instance_id="a1",
+    applied_revision=7,
+    state=preview_pb.LIFECYCLE_STATE_RUNNING,
+    profile=preview_pb.PROFILE_BALANCED,
+    stream=preview_pb.Stream(width_px=1280, height_px=720, fps=30, codec=preview_pb.CODEC_H265),
+    measurement=preview_pb.Measurement(fps=29.5, viewer_count=2, worst_rtt_ms=4),
+)
+_WISH: Final = preview_pb.DesiredState(
+    revision=8, enabled=True, profile=preview_pb.PROFILE_LOW_BW, passphrase="0123456789"
+)
+
+
+_OVERLAY: Final = overlay_pb2.OverlaySnapshot(
+    status=_STATUS,
+    detections=overlay_pb2.DetectionOverlayStatus(
+        detections=[overlay_pb2.OverlayDetection(class_name="person", score=0.5)]
+    ),
+)
+_SEEDS: Final = {
+    "operators_wish": [
+        robot_gateway_pb2.SetPreviewModeRequest(
+            enabled=True, profile=preview_pb2.PREVIEW_PROFILE_LOW_BW
+        ).SerializeToString()
+    ],
+    "gateways_wish": [preview_pb.ApplyDesiredStateRequest(desired=_WISH).SerializeToString()],
+    "previews_truth": [_ACTUAL.SerializeToString()],
+    "robots_answer": [_STATUS.SerializeToString(), _OVERLAY.SerializeToString()],
+    "configuration": [
+        b"name: lab\ngrpc: {host: 127.0.0.1, port: 50051}\nsources: []\n",
+        b"srt: {port: 7100}\nsource: {kind: file, path: /a.mp4}\nencoders: {order: [x264]}\n",
+    ],
+    "metrics_request": [b"GET /metrics HTTP/1.1\r\nHost: robot\r\n\r\n"],
+    "request_id": [b"shift-7:42"],
+}
+
+
+def of(target: str) -> list[bytes]:
+    """For the target of this name."""
+    if target in {"long_list", "robots_message"}:
+        return [bytes([index]) + serialize_message(_message(source)) for index, source in enumerate(SOURCES)]
+    return _SEEDS[target]
+
+
+def _message(source: Any) -> Any:
+    message = type_of(source)()
+    for name in ("detections", "status"):
+        if hasattr(message, name):
+            item = _item(source.type)
+            setattr(message, name, [item, item])
+    if hasattr(message, "data"):
+        message.data = "exploring"
+    return message
+
+
+def _item(message_type: str) -> Any:
+    match message_type:
+        case "yolo_msgs/msg/DetectionArray":
+            from yolo_msgs.msg import Detection  # noqa: PLC0415  # whichever of them is asked for
+
+            return Detection(class_name="person", score=0.5)
+        case "vision_msgs/msg/Detection2DArray":
+            from vision_msgs.msg import Detection2D, ObjectHypothesisWithPose  # noqa: PLC0415
+
+            return Detection2D(results=[ObjectHypothesisWithPose()])
+        case _:
+            from diagnostic_msgs.msg import DiagnosticStatus  # noqa: PLC0415
+
+            return DiagnosticStatus(name="motor", message="hot", level=b"\x02")

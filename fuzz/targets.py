@@ -1,0 +1,137 @@
+"""What reads somebody else's bytes. A target takes bytes and returns; whatever it raises is a defect.
+
+What may come of bad input (a decoder's own error, one line for people) is caught here, and nothing else.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from types import MappingProxyType
+from typing import Final
+
+from google.protobuf.message import DecodeError, Message
+
+from common.config import load
+from common.errors import InvalidRequestError, UserError
+from common.request_id import begin, current
+from console.client.mapping.methods import METHODS
+from fuzz.robot import robots_message
+from gateway.config import load_settings
+from gateway.metrics.endpoint import answer
+from gateway.preview_link.wire import UnknownSpeechError, from_wire
+from gateway.ros.cutting import cut
+from gateway.rpc.mapping.enums import profile_from
+from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest
+from omniseer.preview.v1 import preview_service_pb2 as preview_pb
+from preview.config import PreviewSettings
+from preview.rpc.mapping import wish
+
+Target = Callable[[bytes], None]
+
+
+def operators_wish(data: bytes) -> None:
+    """SetPreviewMode, as the gateway takes it in."""
+    request = SetPreviewModeRequest()
+    if _parses(request, data):
+        with suppress(InvalidRequestError):
+            profile_from(request.profile)
+
+
+def gateways_wish(data: bytes) -> None:
+    """ApplyDesiredState, as the preview service takes it in."""
+    request = preview_pb.ApplyDesiredStateRequest()
+    if _parses(request, data):
+        with suppress(InvalidRequestError):
+            wish(request.desired)
+
+
+def previews_truth(data: bytes) -> None:
+    """What the preview service reports, as the gateway takes it in."""
+    state = preview_pb.ActualState()
+    if _parses(state, data):
+        with suppress(UnknownSpeechError):
+            from_wire(state)
+
+
+def robots_answer(data: bytes) -> None:
+    """Every answer of the contract, as the client library takes it in."""
+    for method in METHODS:
+        with suppress(DecodeError):
+            method.decode(data)
+
+
+def configuration(data: bytes) -> None:
+    """The configuration files of both programs. What is wrong with one is told in one line."""
+    with NamedTemporaryFile(suffix=".yaml") as file:
+        file.write(data)
+        file.flush()
+        for load_file in (load_settings, _load_previews_settings):
+            try:
+                load_file(Path(file.name))
+            except UserError as error:
+                _must_be_one_line(str(error))
+
+
+def metrics_request(data: bytes) -> None:
+    """An HTTP request to the metrics' port: always a whole answer."""
+    assert answer(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
+
+
+def request_id(data: bytes) -> None:
+    """A caller's own request id: nothing comes through that could fake a line of a log."""
+    begin(_Call(data.decode("utf-8", "replace")))
+    assert 0 < len(current()) <= 64
+    assert current().isascii()
+    assert current().isprintable()
+
+
+def long_list(data: bytes) -> None:
+    """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
+    shorter, left_out = cut(data, longest=100)
+    assert len(shorter) == len(data)
+    assert left_out >= 0
+
+
+TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
+    {
+        target.__name__: target
+        for target in (
+            operators_wish,
+            gateways_wish,
+            previews_truth,
+            robots_answer,
+            configuration,
+            metrics_request,
+            request_id,
+            long_list,
+            robots_message,
+        )
+    }
+)
+
+
+def _must_be_one_line(text: str) -> None:
+    assert text.isprintable(), text
+
+
+def _load_previews_settings(path: Path) -> PreviewSettings:
+    return load(PreviewSettings, path)
+
+
+class _Call:
+    """A call that brings its own id."""
+
+    def __init__(self, brought: str) -> None:
+        self._brought = brought
+
+    def invocation_metadata(self) -> list[tuple[str, str]]:
+        return [("x-request-id", self._brought)]
+
+
+def _parses(message: Message, data: bytes) -> bool:
+    try:
+        message.ParseFromString(data)
+    except DecodeError:
+        return False
+    return True
