@@ -16,6 +16,7 @@ GROUPS = {
     "status": "bench.status",
     "idle": "bench.idle",
     "video": "bench.video",
+    "monitor": "bench.monitor",
 }
 # Too long to be part of a run without names.
 ON_REQUEST = {"soak": "bench.soak"}

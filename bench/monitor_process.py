@@ -1,0 +1,54 @@
+"""The monitor window, to be measured: `python -m bench.monitor_process TARGET SECONDS WIDTH HEIGHT`.
+
+Without a screen, as Qt's "offscreen" platform paints it: into memory, with the CPU, as on a laptop without a
+graphics card. Prints one JSON object: the waits of the event loop and the pictures painted meanwhile.
+"""
+
+import json
+import os
+import sys
+import tempfile
+from typing import Any
+
+os.environ["QT_QPA_PLATFORM"] = "offscreen"
+os.environ["XDG_CONFIG_HOME"] = tempfile.mkdtemp()
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+
+from bench.loop_delay import LoopDelay
+from console.window.program import monitor
+
+_PICTURES_FIRST = 60
+"""Pictures painted before it counts: the window is laid out, the decoder has settled."""
+_GIVE_UP_AFTER_S = 60
+
+
+def main() -> None:
+    target, seconds, width, height = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
+    app = QApplication([sys.argv[0]])
+    app.setStyle("Fusion")
+    delay, painted = LoopDelay(), 0
+    found: dict[str, Any] = {}
+
+    def on_painted() -> None:
+        nonlocal painted
+        painted += 1
+        if painted == _PICTURES_FIRST:
+            delay.start()
+            QTimer.singleShot(round(seconds * 1000), finish)
+
+    def finish() -> None:
+        found.update(delays_ms=delay.stop(), pictures=painted - _PICTURES_FIRST)
+        app.quit()
+
+    with monitor(target) as window:
+        window.resize(width, height)
+        window.video.painted.connect(on_painted)
+        QTimer.singleShot(_GIVE_UP_AFTER_S * 1000, app.quit)
+        app.exec()
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main()
