@@ -4,17 +4,22 @@ import typer
 
 from common.errors import ExitCode
 from common.findings import exit_code, print_findings
-from console.cli.options import JsonOption, TargetOption, session_of
+from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.client import parse_target
 from console.doctor.examination import Examination
 
 
-def doctor(context: typer.Context, target: TargetOption = None, as_json: JsonOption = False) -> None:
+def doctor(
+    context: typer.Context,
+    target: TargetOption = None,
+    robot: RobotOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Find out what is wrong between this computer and the robot, and what to type.
 
     Ends 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
-    session = session_of(context, target, as_json)
+    session = session_of(context, target, as_json, robot)
     examination = Examination(parse_target(session.target))
     findings = list(examination.findings())
     print_findings(findings, as_json=session.as_json, out=session.out)

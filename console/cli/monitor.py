@@ -5,16 +5,16 @@ from collections.abc import Callable
 import typer
 
 from common.errors import UserError
-from console.cli.options import TargetOption, session_of
+from console.cli.options import RobotOption, TargetOption, session_of
 
 
-def monitor(context: typer.Context, target: TargetOption = None) -> None:
+def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOption = None) -> None:
     """Open a window: live video, status, faults, events, plots, preview controls.
 
     Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
     """
     run = _window()
-    run(session_of(context, target, False).target)
+    run(session_of(context, target, False, robot).target)
 
 
 def _window() -> Callable[[str], None]:

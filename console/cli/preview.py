@@ -7,7 +7,7 @@ import typer
 
 from common.errors import UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, TargetOption, session_of
+from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.cli.rows import preview_rows
 from console.cli.session import Session
 from console.cli.tables import rows_table
@@ -37,19 +37,21 @@ WaitOption = Annotated[
 @preview_app.command("on")
 def preview_on(
     context: typer.Context,
+    *,
     profile: ProfileOption = None,
     wait_s: WaitOption = 10.0,
     target: TargetOption = None,
+    robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Turn the preview on, or change its profile while it runs.
 
     Ends 0 when frames leave the robot, 1 when the preview can't start (with the robot's reason).
     """
-    session = session_of(context, target, as_json)
+    session = session_of(context, target, as_json, robot)
     wanted = PreviewProfile(profile.value) if profile else PreviewProfile.UNKNOWN
-    with session.connect() as robot:
-        change = robot.enable_preview(wanted, settle_within_s=wait_s)
+    with session.connect() as gateway:
+        change = gateway.enable_preview(wanted, settle_within_s=wait_s)
     _finish(session, change, PreviewState.RUNNING, wait_s)
 
 
@@ -58,12 +60,13 @@ def preview_off(
     context: typer.Context,
     wait_s: WaitOption = 10.0,
     target: TargetOption = None,
+    robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Turn the preview off. Ends 0 when it is off, whether it was on or not."""
-    session = session_of(context, target, as_json)
-    with session.connect() as robot:
-        change = robot.disable_preview(settle_within_s=wait_s)
+    session = session_of(context, target, as_json, robot)
+    with session.connect() as gateway:
+        change = gateway.disable_preview(settle_within_s=wait_s)
     _finish(session, change, PreviewState.DISABLED, wait_s)
 
 

@@ -10,7 +10,8 @@ from typing import Any
 from rich.console import Console
 
 from common.errors import ExitCode, UserError
-from console.client import DEFAULT_TARGET, GatewayClient, GatewayError
+from console.client import GatewayClient, GatewayError
+from console.robots import Robot, choose
 
 # Where nobody looks at columns, lines are left long rather than broken.
 _WIDTH_OF_A_FILE = 160
@@ -21,14 +22,19 @@ class Session:
     """One run of robotctl.
 
     Args:
-        target: the robot's gateway, HOST:PORT.
+        robot: how the robot is reached.
         as_json: print JSON instead of tables.
         out: standard output; without colours where it is no terminal or NO_COLOR is set.
     """
 
-    target: str
+    robot: Robot
     as_json: bool
     out: Console
+
+    @property
+    def target(self) -> str:
+        """The robot's gateway."""
+        return self.robot.target
 
     def connect(self) -> GatewayClient:
         """A client for this run, to be used in a `with` block."""
@@ -36,15 +42,28 @@ class Session:
 
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
         """One JSON document, out at once."""
-        text = json.dumps(value, indent=None if on_one_line else 2, allow_nan=False, ensure_ascii=False)
-        print(text, file=self.out.file, flush=True)
+        print_json(self.out, value, on_one_line=on_one_line)
 
 
-def open_session(target: str | None, as_json: bool) -> Session:
-    """A session on standard output."""
+def open_session(target: str | None, robot: str | None, as_json: bool) -> Session:
+    """A session on standard output with the robot that is meant.
+
+    Raises:
+        UserError: no robot has this name, or the file of known robots is wrong.
+    """
+    return Session(choose(target, robot, os.environ).robot, as_json, standard_output())
+
+
+def standard_output() -> Console:
+    """For people; without colours where it is no terminal or NO_COLOR is set."""
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    out = Console(highlight=False, markup=False, emoji=False, width=_WIDTH_OF_A_FILE if piped else None)
-    return Session(target or DEFAULT_TARGET, as_json, out)
+    return Console(highlight=False, markup=False, emoji=False, width=_WIDTH_OF_A_FILE if piped else None)
+
+
+def print_json(out: Console, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
+    """One JSON document, out at once."""
+    text = json.dumps(value, indent=None if on_one_line else 2, allow_nan=False, ensure_ascii=False)
+    print(text, file=out.file, flush=True)
 
 
 def error_as_json(error: UserError) -> dict[str, Any]:
