@@ -19,10 +19,15 @@ from gateway.preview_link.link import PreviewLink
 from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
+from gateway.rpc.controls import Controls
 from gateway.rpc.server import SERVICE, method_handlers
-from gateway.rpc.servicer import RobotGateway
+from gateway.rpc.servicer import RobotGateway, Streams
+from gateway.rpc.staying import Staying
+from gateway.rpc.subscribing import EventStreams
 from gateway.rpc.tally import Tally
+from gateway.rpc.watching import StatusWatch
 from gateway.status.board import Board, SourceKind
+from gateway.status.event import ModeChanged, News
 from gateway.status.events import EventLog
 from gateway.status.faults.fault import Condition, Fault, Severity
 from gateway.status.preview import (
@@ -65,11 +70,11 @@ def main() -> None:
 
 
 async def _serve() -> None:
-    board, events = Board(), EventLog()
+    board, events = Board(), EventLog("bench")
     reconciler, tally = Reconciler(1), Tally()
     link = PreviewLink(Path("/nonexistent"), reconciler)
     for number in range(8):
-        events.add(f"odometry received, for the {number}th time", time.monotonic())
+        events.add(_mode(f"odometry received, for the {number}th time"), time.monotonic())
 
     def snapshot() -> Snapshot:
         return take(
@@ -88,7 +93,9 @@ async def _serve() -> None:
         Answers(snapshot, lambda: link.view, time.monotonic),
         PreviewControl(link, 1.0),
         Callers(None),
+        Streams(StatusWatch(snapshot, time.monotonic), EventStreams(events), Staying(lambda _: None)),
         tally=tally,
+        controls=Controls(lambda _: None),
         configuration_json="{}",
     )
     server = new_server()
@@ -107,6 +114,10 @@ async def _serve() -> None:
     await asyncio.to_thread(sys.stdin.read)
     news.cancel()
     await server.stop(None)
+
+
+def _mode(words: str) -> News:
+    return News(Severity.INFO, "mission", words, ModeChanged(words), words)
 
 
 async def _empty(_request: bytes, _context: Context) -> bytes:

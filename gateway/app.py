@@ -23,9 +23,13 @@ from gateway.preview_link.link import PreviewLink
 from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
+from gateway.rpc.controls import Controls
 from gateway.rpc.server import SERVICE, serving
-from gateway.rpc.servicer import RobotGateway
+from gateway.rpc.servicer import RobotGateway, Streams
+from gateway.rpc.staying import Staying
+from gateway.rpc.subscribing import EventStreams
 from gateway.rpc.tally import Tally
+from gateway.rpc.watching import StatusWatch
 from gateway.shown_settings import shown_settings
 from gateway.status.board import Board
 from gateway.status.preview import PreviewView
@@ -51,12 +55,19 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
     tally = Tally()
     knowledge = Knowledge(settings, lambda: link.view, tally)
+    streams = Streams(
+        StatusWatch(knowledge.snapshot, time.monotonic),
+        EventStreams(knowledge.events),
+        Staying(knowledge.note),
+    )
     gateway = RobotGateway(
         knowledge.snapshot,
         Answers(knowledge.snapshot, lambda: link.view, time.monotonic),
         PreviewControl(link, settings.preview.settle_ms / 1000),
         Callers(settings.preview.advertised_host),
+        streams,
         tally=tally,
+        controls=Controls(knowledge.note),
         configuration_json=shown_settings(settings),
     )
     board, health = knowledge.board, Health(SERVICE)
@@ -68,7 +79,8 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
-                timers.create_task(_observe(knowledge, link), name="observer"),
+                timers.create_task(streams.watch.run(), name="status-watch"),
+                timers.create_task(_observe(knowledge, link, streams.staying), name="observer"),
                 timers.create_task(_tell_health(link, health), name="health"),
             ]
             await stop.wait()
@@ -117,11 +129,12 @@ async def _metrics(settings: MetricsSettings, knowledge: Knowledge) -> AsyncIter
             measuring.cancel()
 
 
-async def _observe(knowledge: Knowledge, link: PreviewLink) -> None:
+async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     while True:
         now = knowledge.snapshot()
         knowledge.observe(now)
+        staying.look()
         await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
 
 

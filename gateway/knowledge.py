@@ -1,13 +1,17 @@
 """Everything the gateway knows, in one place: what is written by the parts, and the snapshot made of it."""
 
+import logging
+import secrets
 import time
 from collections.abc import Callable
+from typing import Final
 
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
 from gateway.platform.boot import boot_id
 from gateway.rpc.tally import Tally
 from gateway.status.board import Board
+from gateway.status.event import News
 from gateway.status.events import EventLog
 from gateway.status.faults.book import FaultBook
 from gateway.status.faults.rules import FaultRules
@@ -15,6 +19,10 @@ from gateway.status.observer import Observer
 from gateway.status.preview import PreviewView
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+
+_log = logging.getLogger(__name__)
+
+_RUN_ID_BYTES: Final = 8
 
 
 class Knowledge:
@@ -38,7 +46,7 @@ class Knowledge:
         self._observer = Observer(
             self._book, FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000)
         )
-        self.board, self.events = Board(), EventLog()
+        self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
 
     def snapshot(self) -> Snapshot:
         """What is true now, from memory."""
@@ -54,12 +62,15 @@ class Knowledge:
             now_s=now_s,
         )
 
-    def observe(self, now: Snapshot) -> list[str]:
-        """Keeps the book of faults and notes what is news; returns the news."""
-        news = self._observer.observe(now)
-        for message in news:
-            self.events.add(message, now.at_s)
-        return news
+    def observe(self, now: Snapshot) -> None:
+        """Keeps the book of faults and notes what is news."""
+        for news in self._observer.observe(now):
+            self.note(news)
+
+    def note(self, news: News) -> None:
+        """Something has happened just now."""
+        _log.info("event: %s", news.sentence or news.message)
+        self.events.add(news, time.monotonic())
 
     def _runtime(self, now_s: float) -> Runtime:
         return Runtime(
@@ -69,6 +80,7 @@ class Knowledge:
             client_count=self._tally.client_count(),
             requests_served=self._tally.served,
             requests_refused=self._tally.refused,
+            run_id=self.events.run_id,
         )
 
 

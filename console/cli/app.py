@@ -105,6 +105,7 @@ def info(
 @app.command()
 def watch(
     context: typer.Context,
+    *,
     interval_s: Annotated[
         float,
         typer.Option("--interval", min=0.1, max=3600, metavar="SECONDS", help="Time between two looks."),

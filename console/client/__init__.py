@@ -12,6 +12,7 @@ frozen value of `console.client.results` or raises a `GatewayError` that says wh
 
 from console.client.aio import AsyncGatewayClient
 from console.client.blocking import GatewayClient
+from console.client.clock import Clock, Offset
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -24,8 +25,14 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
+from console.client.following import Outage
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    FaultSeverity,
     GatewayInfo,
     OverlaySnapshot,
     PreviewChange,
@@ -33,6 +40,7 @@ from console.client.results import (
     PreviewState,
     PreviewStatus,
     SystemStatus,
+    WatchedStatus,
 )
 from console.client.target import DEFAULT_TARGET, parse_target
 
@@ -41,14 +49,22 @@ __all__ = [
     "AsyncGatewayClient",
     "Backoff",
     "Cancelled",
+    "CaughtUp",
     "ClientOptions",
+    "Clock",
     "DeadlineExceeded",
+    "Event",
+    "EventGap",
+    "EventPosition",
+    "FaultSeverity",
     "GatewayClient",
     "GatewayError",
     "GatewayFailed",
     "GatewayInfo",
     "InvalidRequest",
     "NotAllowed",
+    "Offset",
+    "Outage",
     "OverlaySnapshot",
     "Overloaded",
     "PreviewChange",
@@ -59,5 +75,6 @@ __all__ = [
     "SystemStatus",
     "Unreachable",
     "Unsupported",
+    "WatchedStatus",
     "parse_target",
 ]

@@ -1,17 +1,34 @@
 """The client for asyncio: the same methods, to be awaited."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import grpc
 
+from console.client.aio_stream import follow
+from console.client.clock import Clock, Offset
 from console.client.error_table import error_from
 from console.client.errors import Cancelled, GatewayError
 from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
-from console.client.mapping.methods import METHODS, PreviewWish
+from console.client.feed import EventFeed
+from console.client.following import Following, Followings, Open, Outage
+from console.client.mapping.methods import METHODS, STREAMS, PreviewWish
 from console.client.options import ClientOptions
-from console.client.results import GatewayInfo, OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from console.client.results import (
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    FaultSeverity,
+    GatewayInfo,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    SystemStatus,
+    WatchedStatus,
+)
 from console.client.target import DEFAULT_TARGET, parse_target
 
 ResultT = TypeVar("ResultT")
@@ -39,6 +56,8 @@ class AsyncGatewayClient:
         options = options or ClientOptions()
         self.target = parse_target(target)
         self._exchanges = Exchanges(options)
+        self._followings = Followings(options)
+        self.clock = Clock()
         self._closed = asyncio.Event()
         self._channel = grpc.aio.insecure_channel(self.target, options=options.channel_options())
         self._calls = {
@@ -47,6 +66,17 @@ class AsyncGatewayClient:
             )
             for method in METHODS
         }
+        self._streams = {
+            method.name: self._channel.unary_stream(
+                method.path, request_serializer=method.encode, response_deserializer=method.decode
+            )
+            for method in STREAMS
+        }
+
+    @property
+    def reconnects(self) -> int:
+        """Connections that streams made after their first one, of all streams together."""
+        return self._followings.reconnects
 
     @property
     def retries(self) -> int:
@@ -75,6 +105,20 @@ class AsyncGatewayClient:
         """As `GatewayClient.disable_preview`."""
         return await self._run(self._exchanges.set_preview(PreviewWish(False), settle_within_s))
 
+    async def ping(self) -> Offset:
+        """Asks for the robot's time. `clock` learns from each call, so that a few of them make it better."""
+        return await self._run(self._exchanges.ping(self.clock))
+
+    def watch_status(self, min_interval_s: float = 0.1) -> AsyncIterator[WatchedStatus | Outage]:
+        """As `GatewayClient.watch_status`."""
+        return self._follow(self._followings.status(min_interval_s))
+
+    def events(
+        self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN
+    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        """As `GatewayClient.events`."""
+        return self._follow(self._followings.events(EventFeed(after, least)))
+
     async def close(self) -> None:
         """Ends the connection. Calls under way in other tasks end with `Cancelled`."""
         self._closed.set()
@@ -90,6 +134,12 @@ class AsyncGatewayClient:
         traceback: TracebackType | None,
     ) -> None:
         await self.close()
+
+    def _follow(self, following: Following) -> AsyncIterator[Any]:
+        return follow(following, self._begin, self.target, self._closed)
+
+    def _begin(self, step: Open) -> Any:
+        return self._streams[step.method.name](step.request)
 
     async def _run(self, exchange: Exchange[ResultT]) -> ResultT:
         step = advance(exchange, None)

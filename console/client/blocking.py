@@ -1,17 +1,34 @@
 """The client for ordinary code: every method returns when the answer is there."""
 
 import threading
+from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import grpc
 
+from console.client.blocking_stream import follow
+from console.client.clock import Clock, Offset
 from console.client.error_table import error_from
 from console.client.errors import Cancelled, GatewayError
 from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
-from console.client.mapping.methods import METHODS, PreviewWish
+from console.client.feed import EventFeed
+from console.client.following import Following, Followings, Open, Outage
+from console.client.mapping.methods import METHODS, STREAMS, PreviewWish
 from console.client.options import ClientOptions
-from console.client.results import GatewayInfo, OverlaySnapshot, PreviewChange, PreviewProfile, SystemStatus
+from console.client.results import (
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    FaultSeverity,
+    GatewayInfo,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    SystemStatus,
+    WatchedStatus,
+)
 from console.client.target import DEFAULT_TARGET, parse_target
 
 ResultT = TypeVar("ResultT")
@@ -40,6 +57,8 @@ class GatewayClient:
         options = options or ClientOptions()
         self.target = parse_target(target)
         self._exchanges = Exchanges(options)
+        self._followings = Followings(options)
+        self.clock = Clock()
         self._closed = threading.Event()
         self._channel = grpc.insecure_channel(self.target, options=options.channel_options())
         self._calls = {
@@ -48,6 +67,17 @@ class GatewayClient:
             )
             for method in METHODS
         }
+        self._streams = {
+            method.name: self._channel.unary_stream(
+                method.path, request_serializer=method.encode, response_deserializer=method.decode
+            )
+            for method in STREAMS
+        }
+
+    @property
+    def reconnects(self) -> int:
+        """Connections that streams made after their first one, of all streams together."""
+        return self._followings.reconnects
 
     @property
     def retries(self) -> int:
@@ -85,6 +115,41 @@ class GatewayClient:
         """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""
         return self._run(self._exchanges.set_preview(PreviewWish(False), settle_within_s))
 
+    def ping(self) -> Offset:
+        """Asks for the robot's time. `clock` learns from each call, so that a few of them make it better."""
+        return self._run(self._exchanges.ping(self.clock))
+
+    def watch_status(self, min_interval_s: float = 0.1) -> Iterator[WatchedStatus | Outage]:
+        """The status whenever something has changed and once a second: the first at once, then for ever.
+
+        Who takes its time gets the newest next. The connection is made again whenever it breaks; meanwhile
+        the `Outage`s are told, one per attempt. Ending the iteration ends the stream.
+
+        Args:
+            min_interval_s: the least time between two of them; the gateway looks 20 times a second.
+
+        Raises:
+            GatewayError: no gateway answers at the beginning, or it refuses; not for one that went away.
+        """
+        return self._follow(self._followings.status(min_interval_s))
+
+    def events(
+        self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN
+    ) -> Iterator[Event | EventGap | CaughtUp | Outage]:
+        """What happens, each event once and in order, for ever; what can't be had is told as an `EventGap`.
+
+        `CaughtUp` comes when everything that had happened before was told, and as a sign of life. Each item
+        but an `Outage` has the position to go on from, for another client or another run of this program.
+
+        Args:
+            after: the position of the last item that was received; None begins with what the gateway keeps.
+            least: events that matter less are left out; UNKNOWN leaves out nothing.
+
+        Raises:
+            GatewayError: as `watch_status`.
+        """
+        return self._follow(self._followings.events(EventFeed(after, least)))
+
     def close(self) -> None:
         """Ends the connection. Calls under way in other threads end with `Cancelled`."""
         self._closed.set()
@@ -100,6 +165,12 @@ class GatewayClient:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    def _follow(self, following: Following) -> Iterator[Any]:
+        return follow(following, self._begin, self.target, self._closed)
+
+    def _begin(self, step: Open) -> Any:
+        return self._streams[step.method.name](step.request)
 
     def _run(self, exchange: Exchange[ResultT]) -> ResultT:
         step = advance(exchange, None)

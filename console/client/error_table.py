@@ -85,6 +85,19 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
     return family(_sentence(family, coded.details() or code.name, target, timeout_s))
 
 
+def stream_error_from(error: GatewayError | None, target: str) -> GatewayError:
+    """Why a stream ended that nobody here has ended.
+
+    Args:
+        error: what its call ended with; None for an end in good order.
+        target: the robot's address, for the message.
+    """
+    if error is None or isinstance(error, Cancelled):
+        # A gateway that stops ends its streams, by a good end or by cancelling them.
+        return Unreachable(f"no robot gateway reached at {target}: it ended the stream")
+    return error
+
+
 def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: float) -> str:
     if family is Unreachable:
         return f"no robot gateway reached at {target}: {_in_plain_words(details)}"

@@ -10,11 +10,13 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from console.client.clock import Clock, Offset
 from console.client.errors import GatewayError, Unreachable
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
+    PING,
     SET_PREVIEW_MODE,
     Method,
     PreviewWish,
@@ -96,6 +98,16 @@ class Exchanges:
     def info(self) -> Exchange[GatewayInfo]:
         """One look at the gateway program."""
         return self.ask(GET_GATEWAY_INFO, None, self._options.answer_within_s)
+
+    def ping(self, clock: Clock) -> Exchange[Offset]:
+        """One look at the robot's clocks; `clock` learns from it."""
+        sent_s = self._clock()
+        time_there = yield from self.ask(PING, None, self._options.answer_within_s)
+        received_s = self._clock()
+        clock.note(sent_s, time_there, received_s)
+        offset = clock.offset(received_s)
+        assert offset is not None, "it has just learnt one"
+        return offset
 
     def set_preview(self, wish: PreviewWish, settle_within_s: float) -> Exchange[PreviewChange]:
         """Tells the wish; then watches until it is fulfilled or known to have failed, or time is up."""

@@ -1,5 +1,6 @@
 """How patient a client is: deadlines, retries, and how soon a dead link is noticed."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -37,6 +38,8 @@ class ClientOptions:
     connect_within_s: float = 1.0
     """Deadline of one attempt to connect, name look-up included separately with the same deadline."""
     backoff: Backoff = field(default_factory=Backoff)
+    stream_backoff: Backoff = field(default_factory=lambda: Backoff(longest_s=2.0, give_up_after_s=math.inf))
+    """Pauses between the connections of a stream, which is made again for as long as somebody reads it."""
     keepalive_every_s: float = 2.0
     """Pause between pings on a silent connection."""
     keepalive_within_s: float = 2.0

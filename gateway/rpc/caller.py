@@ -48,6 +48,13 @@ class Callers:
         return Caller(robot_host=host, may_watch=local)
 
 
+@lru_cache(maxsize=_REMEMBERED_CONNECTIONS)
+def address_of(peer: str) -> str:
+    """Where a call came from, for people: address and port of a connection, "local socket" for a Unix one."""
+    scheme, _, rest = unquote(peer).partition(":")
+    return rest if scheme in {"ipv4", "ipv6"} else "local socket"
+
+
 def _address(peer: str) -> str | None:
     """The peer's IP address; None for a Unix socket."""
     scheme, _, rest = unquote(peer).partition(":")

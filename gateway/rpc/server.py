@@ -7,36 +7,34 @@ from typing import Final
 
 import grpc
 from google.protobuf.message import Message
+from google.protobuf.message_factory import GetMessageClass
 
 from common.health import Health
 from common.listen import bind_tcp, bracketed
-from common.rpc import STOP_GRACE_S, Handler, Observe, new_server, unobserved
+from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
+from gateway.rpc.caller import address_of
 from gateway.rpc.servicer import RobotGateway
-from gateway.rpc.tally import Behavior
-from omniseer.gateway.v1.robot_gateway_pb2 import (
-    DESCRIPTOR,
-    GetGatewayInfoRequest,
-    GetOverlaySnapshotRequest,
-    GetSystemStatusRequest,
-    SetPreviewModeRequest,
-)
+from gateway.rpc.tally import Behavior, StreamBehavior
+from omniseer.gateway.v1.access_pb2 import ROLE_VIEWER, required_role
+from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
 
 _log = logging.getLogger(__name__)
 
-SERVICE: Final = DESCRIPTOR.services_by_name["RobotGateway"].full_name
+_CONTRACT: Final = DESCRIPTOR.services_by_name["RobotGateway"]
+_METHODS: Final = _CONTRACT.methods_by_name
+SERVICE: Final = _CONTRACT.full_name
 
 
 def method_handlers(gateway: RobotGateway) -> dict[str, Handler]:
     """The contract's method names and who answers them, counted. Total: a test compares with the schema."""
-    methods: dict[str, tuple[Behavior, type[Message]]] = {
-        "GetSystemStatus": (gateway.get_system_status, GetSystemStatusRequest),
-        "GetOverlaySnapshot": (gateway.get_overlay_snapshot, GetOverlaySnapshotRequest),
-        "SetPreviewMode": (gateway.set_preview_mode, SetPreviewModeRequest),
-        "GetGatewayInfo": (gateway.get_gateway_info, GetGatewayInfoRequest),
-    }
     return {
-        name: _unary(gateway.tally.counted(name, behavior), request)
-        for name, (behavior, request) in methods.items()
+        "GetSystemStatus": _unary(gateway, "GetSystemStatus", gateway.get_system_status),
+        "GetOverlaySnapshot": _unary(gateway, "GetOverlaySnapshot", gateway.get_overlay_snapshot),
+        "SetPreviewMode": _unary(gateway, "SetPreviewMode", gateway.set_preview_mode),
+        "GetGatewayInfo": _unary(gateway, "GetGatewayInfo", gateway.get_gateway_info),
+        "WatchSystemStatus": _stream(gateway, "WatchSystemStatus", gateway.watch_system_status),
+        "SubscribeEvents": _stream(gateway, "SubscribeEvents", gateway.subscribe_events),
+        "Ping": _unary(gateway, "Ping", gateway.ping),
     }
 
 
@@ -77,6 +75,36 @@ async def serving(
         await server.stop(STOP_GRACE_S)
 
 
-def _unary(behavior: Behavior, request: type[Message]) -> Handler:
+def _unary(gateway: RobotGateway, name: str, behavior: Behavior) -> Handler:
     """A handler whose replies are bytes already."""
-    return grpc.unary_unary_rpc_method_handler(behavior, request.FromString, None)
+    request, reply = _messages(name)
+    if changes_the_robot(name):
+        behavior = gateway.controls.told(name, behavior, reply)
+    return grpc.unary_unary_rpc_method_handler(
+        gateway.tally.counted(name, behavior), request.FromString, None
+    )
+
+
+def _stream(gateway: RobotGateway, name: str, behavior: StreamBehavior) -> Handler:
+    """The same for a stream of replies; whoever has one open stays."""
+    request, _ = _messages(name)
+    counted, staying = gateway.tally.counted_stream(name, behavior), gateway.streams.staying
+
+    async def call(message: Message, context: Context) -> AsyncIterator[bytes]:
+        with staying.stream(address_of(context.peer())):
+            async for reply in counted(message, context):
+                yield reply
+
+    return grpc.unary_stream_rpc_method_handler(call, request.FromString, None)
+
+
+def changes_the_robot(method: str) -> bool:
+    """Whether it takes more than a viewer to call it, by the schema."""
+    role = _METHODS[method].GetOptions().Extensions[required_role]
+    return role != ROLE_VIEWER
+
+
+def _messages(method: str) -> tuple[type[Message], type[Message]]:
+    """Of the request and the reply."""
+    found = _METHODS[method]
+    return GetMessageClass(found.input_type), GetMessageClass(found.output_type)

@@ -1,18 +1,45 @@
 """The contract's methods: receive, map, call, map, reply. Replies leave serialised."""
 
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
 
 from common.rpc import Context
 from gateway.preview_link.control import PreviewControl
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
-from gateway.rpc.mapping.enums import profile_from
+from gateway.rpc.controls import Controls
+from gateway.rpc.mapping.enums import least_severity_from, profile_from
+from gateway.rpc.mapping.events import position_from
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.preview import preview_status
+from gateway.rpc.staying import Staying
+from gateway.rpc.subscribing import EventStreams
 from gateway.rpc.tally import Tally
+from gateway.rpc.watching import StatusWatch
 from gateway.status.snapshot import Snapshot
-from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    PingResponse,
+    SetPreviewModeRequest,
+    SetPreviewModeResponse,
+    SubscribeEventsRequest,
+    WatchSystemStatusRequest,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Streams:
+    """What goes on while a caller stays.
+
+    Attributes:
+        watch: tells the status again and again.
+        events: tells what happens.
+        staying: notes who stays.
+    """
+
+    watch: StatusWatch
+    events: EventStreams
+    staying: Staying
 
 
 class RobotGateway:
@@ -23,7 +50,9 @@ class RobotGateway:
         answers: the ready answers made of such snapshots.
         preview: switches the preview.
         callers: tells who asks.
+        streams: what goes on while a caller stays.
         tally: counts what is asked.
+        controls: tells of control actions.
         configuration_json: as operators may see it.
     """
 
@@ -33,8 +62,10 @@ class RobotGateway:
         answers: Answers,
         preview: PreviewControl,
         callers: Callers,
+        streams: Streams,
         *,
         tally: Tally,
+        controls: Controls,
         configuration_json: str,
     ) -> None:
         self._take = take
@@ -42,7 +73,9 @@ class RobotGateway:
         self._preview = preview
         self._callers = callers
         self._configuration_json = configuration_json
+        self.streams = streams
         self.tally = tally
+        self.controls = controls
 
     async def get_system_status(self, _request: object, context: Context) -> bytes:
         """From memory."""
@@ -53,7 +86,7 @@ class RobotGateway:
         return self._answers.overlay_snapshot(self._callers.of(context.peer()))
 
     async def get_gateway_info(self, _request: object, _context: Context) -> bytes:
-        """From memory; the only answer that tells the calendar clock."""
+        """From memory; besides `ping` the only answer that tells the calendar clock."""
         wall_clock_unix_ms = time.time_ns() // 1_000_000
         info = gateway_info(self._take(), self.tally.methods, wall_clock_unix_ms, self._configuration_json)
         return info.SerializeToString()
@@ -68,3 +101,23 @@ class RobotGateway:
         caller = self._callers.of(context.peer())
         preview = preview_status(now.preview, now.preview_measured, caller)
         return SetPreviewModeResponse(accepted=True, message=message, preview=preview).SerializeToString()
+
+    def watch_system_status(
+        self, request: WatchSystemStatusRequest, context: Context
+    ) -> AsyncIterator[bytes]:
+        """From memory, until the caller leaves."""
+        return self.streams.watch.statuses(request.min_interval_ms, self._callers.of(context.peer()))
+
+    def subscribe_events(self, request: SubscribeEventsRequest, _context: Context) -> AsyncIterator[bytes]:
+        """From memory, until the caller leaves."""
+        after = position_from(request.after) if request.HasField("after") else None
+        return self.streams.events.events(after, least_severity_from(request.min_severity))
+
+    async def ping(self, _request: object, _context: Context) -> bytes:
+        """The clocks, read as close together as Python can."""
+        monotonic_ns, wall_clock_unix_ns = time.monotonic_ns(), time.time_ns()
+        return PingResponse(
+            monotonic_ns=monotonic_ns,
+            wall_clock_unix_ns=wall_clock_unix_ns,
+            boot_id=self._take().gateway.boot_id,
+        ).SerializeToString()

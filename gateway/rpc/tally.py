@@ -1,7 +1,7 @@
 """Counts what is asked, and who asks."""
 
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -9,11 +9,12 @@ from common.errors import DomainError
 from common.rpc import Context
 
 RECENT_S: Final = 10.0
-"""A connection that asked for something this recently counts as a client."""
+"""A connection that asked for something, or was told something, this recently counts as a client."""
 _MOST_REMEMBERED: Final = 1024
 """Connections; of more than that, the quietest are forgotten."""
 
 Behavior: TypeAlias = Callable[[Any, Context], Awaitable[bytes]]
+StreamBehavior: TypeAlias = Callable[[Any, Context], AsyncIterator[bytes]]
 
 
 @dataclass(slots=True)
@@ -74,6 +75,29 @@ class Tally:
                 raise
             counts.served += 1
             return reply
+
+        return call
+
+    def counted_stream(self, method: str, behavior: StreamBehavior) -> StreamBehavior:
+        """The same behavior, counted under the method's name: a stream is served when it begins."""
+        counts = self.methods.setdefault(method, Counts())
+
+        async def call(request: Any, context: Context) -> AsyncIterator[bytes]:
+            peer, begun = context.peer(), False
+            self._note(peer)
+            try:
+                async for reply in behavior(request, context):
+                    if not begun:
+                        begun = True
+                        counts.served += 1
+                    self._note(peer)
+                    yield reply
+            except DomainError:
+                counts.refused += 1
+                raise
+            except Exception:
+                counts.failed += 1
+                raise
 
         return call
 

@@ -11,6 +11,7 @@ class Runtime:
     Attributes:
         revision: of the source it was built from; empty when unknown.
         boot_id: another one after each start of the computer; empty when unknown.
+        run_id: another one after each start of the gateway program; it numbers the events.
         client_count: connections that asked for something lately.
         requests_served: calls answered since the start.
         requests_refused: calls refused since the start.
@@ -22,6 +23,7 @@ class Runtime:
     client_count: int
     requests_served: int
     requests_refused: int
+    run_id: str = ""
 
 
 UNKNOWN: Final = Runtime("", "", 0, 0, 0, 0)

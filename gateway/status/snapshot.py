@@ -6,7 +6,7 @@ from typing import Final
 
 from gateway.status.board import Board, SourceKind
 from gateway.status.command import Command, effective_command
-from gateway.status.events import Event
+from gateway.status.events import OperatorEvent
 from gateway.status.faults.fault import Fault
 from gateway.status.freshness import Freshness, Sample, sample
 from gateway.status.health import Health, assess
@@ -86,7 +86,7 @@ class Snapshot:
     preview: PreviewView
     preview_measured: Sample[Measurement]
     sources: tuple[SourceView, ...]
-    events: tuple[Event, ...]
+    events: tuple[OperatorEvent, ...]
     faults: tuple[Fault, ...]
 
 
@@ -96,7 +96,7 @@ def take(
     rules: Rules,
     board: Board,
     preview: PreviewView,
-    events: tuple[Event, ...],
+    events: tuple[OperatorEvent, ...],
     now_s: float,
     faults: tuple[Fault, ...] = (),
     gateway: Runtime = UNKNOWN,

@@ -8,9 +8,18 @@ from google.protobuf.message import Message
 from common.findings import findings_json, good
 from console.cli.info import info_json
 from console.cli.json_form import json_form
-from console.client.mapping.methods import GET_GATEWAY_INFO, GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STATUS
+from console.cli.session import error_as_json
+from console.client import Unreachable
+from console.client.mapping.events import event
+from console.client.mapping.methods import (
+    GET_GATEWAY_INFO,
+    GET_OVERLAY_SNAPSHOT,
+    GET_SYSTEM_STATUS,
+    SUBSCRIBE_EVENTS,
+)
+from omniseer.gateway.v1.event_pb2 import Event, EventGap
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
-from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse
+from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse, SubscribeEventsResponse
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.filled import fill
 from tests.support.robotctl_docs import Type, documented, holds, leaves, spelt_out
@@ -28,6 +37,22 @@ def info() -> GetGatewayInfoResponse:
     return answer
 
 
+def events_document() -> dict[str, Any]:
+    """An event with every part, as no gateway sends it; a gap; an outage."""
+    parts: dict[str, Any] = {}
+    for field in Event.DESCRIPTOR.oneofs_by_name["payload"].fields:
+        message = Event()
+        fill(getattr(message, field.name))
+        form = json_form(event(message))
+        parts |= {key: value for key, value in form.items() if value is not None}
+    gap = SUBSCRIBE_EVENTS.decode(SubscribeEventsResponse(gap=EventGap()).SerializeToString())
+    return {
+        "event": parts,
+        "gap": json_form(gap),
+        "error": error_as_json(Unreachable("gone")),
+    }
+
+
 @pytest.mark.parametrize(
     ("heading", "document"),
     [
@@ -40,6 +65,7 @@ def info() -> GetGatewayInfoResponse:
         pytest.param(
             "info --json", info_json(GET_GATEWAY_INFO.decode(info().SerializeToString())), id="info"
         ),
+        pytest.param("events --json", events_document(), id="events"),
         pytest.param("doctor --json", findings_json([good("tcp", "answers")]), id="doctor"),
     ],
 )

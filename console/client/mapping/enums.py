@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from typing import Final
 
 from console.client.results import (
+    ControlResult,
     FaultSeverity,
+    GapReason,
     HealthState,
     PreviewProfile,
     PreviewState,
@@ -14,6 +16,7 @@ from console.client.results import (
     TeleopState,
     VideoCodec,
 )
+from omniseer.gateway.v1 import event_pb2 as events
 from omniseer.gateway.v1 import fault_pb2 as faults
 from omniseer.gateway.v1 import preview_pb2 as preview
 from omniseer.gateway.v1 import source_pb2 as sources
@@ -66,6 +69,18 @@ _SOURCE_STATES: Final[Mapping[int, SourceState]] = {
     sources.SOURCE_STATE_WRONG_TYPE: SourceState.WRONG_TYPE,
     sources.SOURCE_STATE_TYPE_MISSING: SourceState.TYPE_MISSING,
 }
+_CONTROL_RESULTS: Final[Mapping[int, ControlResult]] = {
+    events.CONTROL_RESULT_UNSPECIFIED: ControlResult.UNKNOWN,
+    events.CONTROL_RESULT_ACCEPTED: ControlResult.ACCEPTED,
+    events.CONTROL_RESULT_REFUSED: ControlResult.REFUSED,
+    events.CONTROL_RESULT_FAILED: ControlResult.FAILED,
+}
+_GAP_REASONS: Final[Mapping[int, GapReason]] = {
+    events.EVENT_GAP_REASON_UNSPECIFIED: GapReason.UNKNOWN,
+    events.EVENT_GAP_REASON_NO_LONGER_KEPT: GapReason.NO_LONGER_KEPT,
+    events.EVENT_GAP_REASON_NEW_RUN: GapReason.NEW_RUN,
+}
+_SEVERITY_NUMBERS: Final = {word: number for number, word in _SEVERITIES.items()}
 # Both directions are needed: answers carry a profile, and so do requests.
 _PROFILE_NUMBERS: Final[Mapping[PreviewProfile, preview.PreviewProfile.ValueType]] = {
     PreviewProfile.UNKNOWN: preview.PREVIEW_PROFILE_UNSPECIFIED,
@@ -109,6 +124,21 @@ def stream_container(number: int) -> StreamContainer:
 def fault_severity(number: int) -> FaultSeverity:
     """How much a fault matters."""
     return _SEVERITIES.get(number, FaultSeverity.UNKNOWN)
+
+
+def severity_number(severity: FaultSeverity) -> faults.FaultSeverity.ValueType:
+    """The severity in a request."""
+    return faults.FaultSeverity.ValueType(_SEVERITY_NUMBERS[severity])
+
+
+def control_result(number: int) -> ControlResult:
+    """What became of a control action."""
+    return _CONTROL_RESULTS.get(number, ControlResult.UNKNOWN)
+
+
+def gap_reason(number: int) -> GapReason:
+    """Why events are missing."""
+    return _GAP_REASONS.get(number, GapReason.UNKNOWN)
 
 
 def source_state(number: int) -> SourceState:

@@ -20,6 +20,7 @@ def gateway_facts(message: wire.GatewayFacts, *, told: bool) -> GatewayFacts:
         client_count=when(told, message.client_count),
         requests_served=when(told, message.requests_served),
         requests_refused=when(told, message.requests_refused),
+        run_id=message.run_id or None,
     )
 
 

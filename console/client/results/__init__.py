@@ -4,6 +4,19 @@ None means "not known". Enumerations have a member `UNKNOWN`: the gateway did no
 this client and said something this client has no word for.
 """
 
+from console.client.results.clock import RobotTime, WatchedStatus
+from console.client.results.event import (
+    CaughtUp,
+    ControlAction,
+    ControlResult,
+    EncoderFallback,
+    Event,
+    EventGap,
+    EventKind,
+    EventPosition,
+    GapReason,
+    PreviewEvent,
+)
 from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.info import GatewayFacts, GatewayInfo, MethodCounts
 from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
@@ -39,14 +52,23 @@ from console.client.results.status import (
 
 __all__ = [
     "Battery",
+    "CaughtUp",
     "Compute",
+    "ControlAction",
+    "ControlResult",
     "Detection",
     "Detections",
     "EffectiveCommand",
     "Encoder",
+    "EncoderFallback",
+    "Event",
+    "EventGap",
+    "EventKind",
+    "EventPosition",
     "Fault",
     "FaultSeverity",
     "Freshness",
+    "GapReason",
     "GatewayFacts",
     "GatewayInfo",
     "Health",
@@ -61,10 +83,12 @@ __all__ = [
     "Power",
     "PreviewChange",
     "PreviewCounters",
+    "PreviewEvent",
     "PreviewMeasurement",
     "PreviewProfile",
     "PreviewState",
     "PreviewStatus",
+    "RobotTime",
     "Sample",
     "Source",
     "SourceState",
@@ -78,4 +102,5 @@ __all__ = [
     "VideoCodec",
     "VideoFormat",
     "Vision",
+    "WatchedStatus",
 ]

@@ -16,6 +16,8 @@ class GatewayFacts:
     """Connections that asked for something during the last 10 s."""
     requests_served: int | None
     requests_refused: int | None
+    run_id: str | None
+    """Another one after each start of the gateway program; it numbers the events."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,11 +4,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from common.errors import InvalidRequestError
+from gateway.status.event import ControlResult
+from gateway.status.events import GapReason
 from gateway.status.faults.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile
 from gateway.status.sources import SourceState
-from omniseer.gateway.v1 import fault_pb2, preview_pb2, source_pb2, states_pb2
+from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2
 
 PREVIEW_STATES: Final[Mapping[PreviewState, states_pb2.PreviewState.ValueType]] = {
     PreviewState.DISABLED: states_pb2.PREVIEW_DISABLED,
@@ -46,7 +48,24 @@ SOURCE_STATES: Final[Mapping[SourceState, source_pb2.SourceState.ValueType]] = {
     SourceState.WRONG_TYPE: source_pb2.SOURCE_STATE_WRONG_TYPE,
     SourceState.TYPE_MISSING: source_pb2.SOURCE_STATE_TYPE_MISSING,
 }
+CONTROL_RESULTS: Final[Mapping[ControlResult, event_pb2.ControlResult.ValueType]] = {
+    ControlResult.ACCEPTED: event_pb2.CONTROL_RESULT_ACCEPTED,
+    ControlResult.REFUSED: event_pb2.CONTROL_RESULT_REFUSED,
+    ControlResult.FAILED: event_pb2.CONTROL_RESULT_FAILED,
+}
+GAP_REASONS: Final[Mapping[GapReason, event_pb2.EventGapReason.ValueType]] = {
+    GapReason.NO_LONGER_KEPT: event_pb2.EVENT_GAP_REASON_NO_LONGER_KEPT,
+    GapReason.NEW_RUN: event_pb2.EVENT_GAP_REASON_NEW_RUN,
+}
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
+
+
+_SEVERITY_OF: Final[Mapping[int, Severity]] = {number: severity for severity, number in SEVERITIES.items()}
+
+
+def least_severity_from(number: int) -> Severity:
+    """The least severity a client wants to hear of; the schema's rules let no unknown number through."""
+    return _SEVERITY_OF.get(number, Severity.INFO)
 
 
 def profile_from(number: int) -> Profile | None:

@@ -18,6 +18,7 @@ def gateway_facts(runtime: Runtime) -> pb.GatewayFacts:
         client_count=runtime.client_count,
         requests_served=runtime.requests_served,
         requests_refused=runtime.requests_refused,
+        run_id=runtime.run_id,
     )
 
 

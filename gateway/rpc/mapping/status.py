@@ -11,7 +11,7 @@ from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.sources import source_status
 from gateway.status.command import Command
-from gateway.status.events import Event
+from gateway.status.events import OperatorEvent
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
 from gateway.status.values import Detection, Detections, Mode, Odometry, Vision
@@ -139,6 +139,6 @@ def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
     )
 
 
-def _event(event: Event, now_s: float) -> overlay_pb2.OperatorEvent:
+def _event(event: OperatorEvent, now_s: float) -> overlay_pb2.OperatorEvent:
     age_ms = max(0, int((now_s - event.at_s) * 1000))
     return overlay_pb2.OperatorEvent(sequence=event.sequence, age_ms=age_ms, message=event.message)

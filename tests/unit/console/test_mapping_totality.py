@@ -7,9 +7,18 @@ import pytest
 from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor
 
 from console.client.mapping import enums
-from console.client.mapping.methods import METHODS, SET_PREVIEW_MODE, PreviewWish
-from console.client.results import PreviewProfile
+from console.client.mapping.methods import (
+    METHODS,
+    SET_PREVIEW_MODE,
+    STREAMS,
+    SUBSCRIBE_EVENTS,
+    WATCH_SYSTEM_STATUS,
+    EventsWanted,
+    PreviewWish,
+)
+from console.client.results import EventKind, EventPosition, FaultSeverity, PreviewProfile
 from omniseer.gateway.v1 import (
+    event_pb2,
     fault_pb2,
     gateway_info_pb2,
     overlay_pb2,
@@ -23,6 +32,7 @@ from omniseer.gateway.v1 import (
 from tests.support.filled import fill, value_of
 
 FILES = (
+    event_pb2,
     source_pb2,
     fault_pb2,
     gateway_info_pb2,
@@ -34,9 +44,11 @@ FILES = (
     system_status_pb2,
 )
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-DECODERS = {method.name: method.decode for method in METHODS}
+DECODERS = {method.name: method.decode for method in (*METHODS, *STREAMS)}
 
 ENUM_MAPPINGS = {
+    "ControlResult": enums.control_result,
+    "EventGapReason": enums.gap_reason,
     "PreviewState": enums.preview_state,
     "SourceState": enums.source_state,
     "FaultSeverity": enums.fault_severity,
@@ -101,6 +113,36 @@ def test_every_field_of_a_request_is_set_from_a_wish() -> None:
     assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
 
 
+def test_every_field_of_a_subscription_is_set() -> None:
+    request = robot_gateway_pb2.SubscribeEventsRequest.FromString(
+        SUBSCRIBE_EVENTS.encode(EventsWanted(EventPosition("run", 7), FaultSeverity.ERROR))
+    )
+    assert (request.after.run_id, request.after.sequence) == ("run", 7)
+    assert request.min_severity == fault_pb2.FAULT_SEVERITY_ERROR
+    assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
+
+
+def test_the_interval_of_a_watch_is_told_in_ms() -> None:
+    request = robot_gateway_pb2.WatchSystemStatusRequest.FromString(WATCH_SYSTEM_STATUS.encode(0.25))
+    assert request.min_interval_ms == 250
+    assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
+
+
+def test_every_kind_of_event_has_a_word() -> None:
+    payloads = event_pb2.Event.DESCRIPTOR.oneofs_by_name["payload"].fields
+    kinds = {SUBSCRIBE_EVENTS.decode(_event_with(field.name)).kind for field in payloads}
+    assert kinds == set(EventKind) - {EventKind.UNKNOWN}
+    assert len(kinds) == len(payloads)
+    without = robot_gateway_pb2.SubscribeEventsResponse(event=event_pb2.Event(message="of a newer gateway"))
+    assert SUBSCRIBE_EVENTS.decode(without.SerializeToString()).kind is EventKind.UNKNOWN
+
+
+def _event_with(payload: str) -> bytes:
+    response = robot_gateway_pb2.SubscribeEventsResponse()
+    getattr(response.event, payload).SetInParent()
+    return response.SerializeToString()
+
+
 def test_every_message_of_the_contract_is_a_request_or_below_an_answer() -> None:
     """A message that no method carries would escape the tests above."""
     seen = {method.input_type.full_name for method in SERVICE.methods}
@@ -112,7 +154,7 @@ def test_every_message_of_the_contract_is_a_request_or_below_an_answer() -> None
 
 def test_every_method_of_the_contract_is_known() -> None:
     assert sorted(DECODERS) == sorted(SERVICE.methods_by_name)
-    assert {method.path for method in METHODS} == {
+    assert {method.path for method in (*METHODS, *STREAMS)} == {
         f"/omniseer.gateway.v1.RobotGateway/{method.name}" for method in SERVICE.methods
     }
 

@@ -1,7 +1,8 @@
 from dataclasses import replace
 
 from gateway.status.board import Board, SourceKind
-from gateway.status.events import KEPT, EventLog
+from gateway.status.event import EncoderFallback, FaultRaised, News, PreviewChanged
+from gateway.status.faults.fault import Severity
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 from gateway.status.values import Mode, Odometry, Received
@@ -31,12 +32,9 @@ def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> 
     )
 
 
-def test_the_newest_events_are_kept_and_numbered_from_one() -> None:
-    log = EventLog()
-    for number in range(1, KEPT + 4):
-        log.add(f"event {number}", now_s=float(number))
-    assert [event.sequence for event in log.newest()] == list(range(4, KEPT + 4))
-    assert log.newest()[-1].message == f"event {KEPT + 3}"
+def sentences(news: list[News]) -> list[str]:
+    """What the overlay's short list tells."""
+    return [each.sentence for each in news if each.sentence is not None]
 
 
 def test_the_first_look_is_the_ground_and_no_news() -> None:
@@ -45,15 +43,15 @@ def test_the_first_look_is_the_ground_and_no_news() -> None:
 
 def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
     observer, board = new_observer(startup_grace_s=0.2), Board()
-    assert observer.observe(snapshot(board, now_s=99.0)) == []
+    assert sentences(observer.observe(snapshot(board, now_s=99.0))) == []
     missing = "no odometry since the gateway started, and nobody on the robot offers it"
-    assert observer.observe(snapshot(board, now_s=99.2)) == [f"error: {missing}"]
+    assert sentences(observer.observe(snapshot(board, now_s=99.2))) == [f"error: {missing}"]
     board.odometry = Received(Odometry(0, 0, 0), at_s=100.0)
-    assert observer.observe(snapshot(board, now_s=100.1)) == [f"over: {missing}"]
-    assert observer.observe(snapshot(board, now_s=100.2)) == []
-    assert observer.observe(snapshot(board, now_s=101.5)) == ["error: odometry stopped coming"]
+    assert sentences(observer.observe(snapshot(board, now_s=100.1))) == [f"over: {missing}"]
+    assert sentences(observer.observe(snapshot(board, now_s=100.2))) == []
+    assert sentences(observer.observe(snapshot(board, now_s=101.5))) == ["error: odometry stopped coming"]
     board.odometry = Received(Odometry(0, 0, 0), at_s=102.0)
-    assert observer.observe(snapshot(board, now_s=102.0)) == ["over: odometry stopped coming"]
+    assert sentences(observer.observe(snapshot(board, now_s=102.0))) == ["over: odometry stopped coming"]
 
 
 def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
@@ -62,12 +60,44 @@ def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
     faulted = replace(OFF, state=PreviewState.FAULTED, last_error="no camera")
     starting = replace(faulted, state=PreviewState.STARTING)
     message = "the preview does not work: no camera"
-    assert observer.observe(snapshot(Board(), faulted)) == [f"error: {message}"]
+    assert sentences(observer.observe(snapshot(Board(), faulted))) == [f"error: {message}"]
     for _ in range(3):
-        assert observer.observe(snapshot(Board(), starting)) == []
-        assert observer.observe(snapshot(Board(), faulted)) == []
+        assert sentences(observer.observe(snapshot(Board(), starting))) == []
+        assert sentences(observer.observe(snapshot(Board(), faulted))) == []
     running = replace(OFF, state=PreviewState.RUNNING)
-    assert observer.observe(snapshot(Board(), running)) == [f"over: {message}", "preview running, BALANCED"]
+    assert sentences(observer.observe(snapshot(Board(), running))) == [
+        f"over: {message}",
+        "preview running, BALANCED",
+    ]
+
+
+def test_each_settled_state_of_the_preview_is_an_event_of_its_own() -> None:
+    observer = new_observer(startup_grace_s=60)
+    observer.observe(snapshot(Board()))
+
+    def changes(state: PreviewState, profile: Profile, last_error: str = "") -> list[PreviewChanged]:
+        view = replace(OFF, state=state, profile=profile, last_error=last_error)
+        news = observer.observe(snapshot(Board(), view))
+        return [each.detail for each in news if isinstance(each.detail, PreviewChanged)]
+
+    running, low = PreviewState.RUNNING, Profile.LOW_BW
+    assert changes(PreviewState.STARTING, low) == []
+    assert changes(running, low) == [PreviewChanged(running, low, "")]
+    assert changes(running, Profile.BALANCED) == [PreviewChanged(running, Profile.BALANCED, "")]
+    faulted = PreviewChanged(PreviewState.FAULTED, Profile.BALANCED, "no camera")
+    assert changes(PreviewState.FAULTED, Profile.BALANCED, "no camera") == [faulted]
+    assert changes(running, Profile.BALANCED) == [PreviewChanged(running, Profile.BALANCED, "")]
+    assert changes(PreviewState.STOPPING, Profile.BALANCED) == []
+    off = PreviewChanged(PreviewState.DISABLED, Profile.BALANCED, "")
+    assert changes(PreviewState.DISABLED, Profile.BALANCED) == [off]
+    assert changes(PreviewState.DISABLED, low) == [], "the profile of the next preview is no news"
+
+
+def test_what_a_fault_tells_programs() -> None:
+    observer, board = new_observer(startup_grace_s=0.0), Board()
+    [news] = [each for each in observer.observe(snapshot(board)) if isinstance(each.detail, FaultRaised)]
+    assert (news.severity, news.component) == (Severity.ERROR, "odometry")
+    assert news.message == news.detail.fault.condition.message, "without the word that the severity says"
 
 
 def test_a_fallback_to_another_encoder_is_news() -> None:
@@ -75,19 +105,24 @@ def test_a_fallback_to_another_encoder_is_news() -> None:
     running = replace(OFF, state=PreviewState.RUNNING, encoder=Encoder("mpp-h265", True, "mpp-h265", ""))
     observer.observe(snapshot(Board(), running))
     fallen = replace(running, encoder=Encoder("x264", False, "mpp-h265", "no output for 2 s"))
-    assert observer.observe(snapshot(Board(), fallen)) == [
+    news = observer.observe(snapshot(Board(), fallen))
+    assert sentences(news) == [
         "warning: x264 encodes on the robot's own processor instead of mpp-h265: no output for 2 s"
     ]
+    details = [each.detail for each in news]
+    assert EncoderFallback("x264", "mpp-h265", "no output for 2 s") in details
+    assert sum(isinstance(each, FaultRaised) for each in details) == 1
+    assert observer.observe(snapshot(Board(), fallen)) == [], "told once"
 
 
 def test_another_mode_is_news() -> None:
     observer, board = new_observer(startup_grace_s=60), Board()
     board.mode = Received(Mode("idle"), at_s=99.0)
     observer.observe(snapshot(board))
-    assert observer.observe(snapshot(board)) == []
+    assert sentences(observer.observe(snapshot(board))) == []
     board.mode = Received(Mode("exploring"), at_s=100.0)
-    assert observer.observe(snapshot(board)) == ["robot mode: exploring"]
-    assert observer.observe(snapshot(board, now_s=5000.0))[1:] == []
+    assert sentences(observer.observe(snapshot(board))) == ["robot mode: exploring"]
+    assert sentences(observer.observe(snapshot(board, now_s=5000.0)))[1:] == []
 
 
 def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> None:
@@ -97,7 +132,7 @@ def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> No
     message = "the preview service does not answer: there can be no video"
 
     def news(preview: PreviewView) -> list[str]:
-        told = observer.observe(snapshot(Board(), preview))
+        told = sentences(observer.observe(snapshot(Board(), preview)))
         return [each for each in told if "preview service" in each]
 
     assert news(gone) == [f"warning: {message}"]

@@ -12,13 +12,14 @@ from google.protobuf.message import Message
 from common.errors import InvalidRequestError
 from gateway.preview_link import wire
 from gateway.rpc.caller import Caller
+from gateway.rpc.controls import Controls
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.server import SERVICE, method_handlers
+from gateway.rpc.server import SERVICE, changes_the_robot, method_handlers
 from gateway.rpc.tally import Counts, Tally
 from gateway.status.board import Board, SourceKind
-from gateway.status.events import Event
+from gateway.status.events import OperatorEvent
 from gateway.status.faults.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import (
@@ -105,13 +106,22 @@ def test_every_method_of_the_contract_has_a_handler() -> None:
     assert service.full_name == SERVICE
     handlers = method_handlers(_AnyGateway())  # type: ignore[arg-type]  # only bound, never called
     assert set(handlers) == {method.name for method in service.methods}
+    for method in service.methods:
+        assert handlers[method.name].response_streaming is method.server_streaming
+
+
+def test_who_may_only_look_changes_nothing() -> None:
+    methods = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods_by_name
+    assert {name for name in methods if changes_the_robot(name)} == {"SetPreviewMode"}
 
 
 class _AnyGateway:
-    tally = Tally()
+    """Has whatever it is asked for."""
 
-    def __getattr__(self, name: str) -> object:
-        return name
+    tally, controls = Tally(), Controls(lambda _: None)
+
+    def __getattr__(self, name: str) -> Any:
+        return _AnyGateway()
 
 
 def everything() -> Snapshot:
@@ -149,8 +159,8 @@ def everything() -> Snapshot:
         ),
         board=board,
         preview=preview,
-        events=(Event(1, at_s, "something happened"),),
-        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2),
+        events=(OperatorEvent(1, at_s, "something happened"),),
+        gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2, "run"),
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
     )

@@ -106,9 +106,10 @@ class Life(RuleBasedStateMachine):
 
     def look(self) -> Snapshot:
         now = self.snapshot()
-        for message in self.observer.observe(now):
-            self.raised += message.startswith(("error: ", "warning: "))
-            self.cleared += message.startswith("over: ")
+        for news in self.observer.observe(now):
+            told = news.sentence or ""
+            self.raised += told.startswith(("error: ", "warning: "))
+            self.cleared += told.startswith("over: ")
         return now
 
     def snapshot(self) -> Snapshot:

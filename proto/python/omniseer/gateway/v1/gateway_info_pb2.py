@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n&omniseer/gateway/v1/gateway_info.proto\x12\x13omniseer.gateway.v1\"\x8d\x01\n\x0cGatewayFacts\x12\x10\n\x08revision\x18\x01 \x01(\t\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\t\x12\x11\n\tuptime_ms\x18\x03 \x01(\x04\x12\x14\n\x0c\x63lient_count\x18\x04 \x01(\r\x12\x17\n\x0frequests_served\x18\x05 \x01(\x04\x12\x18\n\x10requests_refused\x18\x06 \x01(\x04\"O\n\x0cMethodCounts\x12\x0e\n\x06method\x18\x01 \x01(\t\x12\x0e\n\x06served\x18\x02 \x01(\x04\x12\x0f\n\x07refused\x18\x03 \x01(\x04\x12\x0e\n\x06\x66\x61iled\x18\x04 \x01(\x04\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n&omniseer/gateway/v1/gateway_info.proto\x12\x13omniseer.gateway.v1\"\x9d\x01\n\x0cGatewayFacts\x12\x10\n\x08revision\x18\x01 \x01(\t\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\t\x12\x11\n\tuptime_ms\x18\x03 \x01(\x04\x12\x14\n\x0c\x63lient_count\x18\x04 \x01(\r\x12\x17\n\x0frequests_served\x18\x05 \x01(\x04\x12\x18\n\x10requests_refused\x18\x06 \x01(\x04\x12\x0e\n\x06run_id\x18\x07 \x01(\t\"O\n\x0cMethodCounts\x12\x0e\n\x06method\x18\x01 \x01(\t\x12\x0e\n\x06served\x18\x02 \x01(\x04\x12\x0f\n\x07refused\x18\x03 \x01(\x04\x12\x0e\n\x06\x66\x61iled\x18\x04 \x01(\x04\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -32,7 +32,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.gateway
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_GATEWAYFACTS']._serialized_start=64
-  _globals['_GATEWAYFACTS']._serialized_end=205
-  _globals['_METHODCOUNTS']._serialized_start=207
-  _globals['_METHODCOUNTS']._serialized_end=286
+  _globals['_GATEWAYFACTS']._serialized_end=221
+  _globals['_METHODCOUNTS']._serialized_start=223
+  _globals['_METHODCOUNTS']._serialized_end=302
 # @@protoc_insertion_point(module_scope)

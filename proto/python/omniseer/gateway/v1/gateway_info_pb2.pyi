@@ -28,6 +28,7 @@ class GatewayFacts(_message.Message):
     CLIENT_COUNT_FIELD_NUMBER: _builtins.int
     REQUESTS_SERVED_FIELD_NUMBER: _builtins.int
     REQUESTS_REFUSED_FIELD_NUMBER: _builtins.int
+    RUN_ID_FIELD_NUMBER: _builtins.int
     revision: _builtins.str
     """The git revision the gateway was built from (40 hexadecimal digits). Empty when the build does
     not tell.
@@ -46,6 +47,8 @@ class GatewayFacts(_message.Message):
     """Calls answered with a refusal since then: the request made no sense or came at the wrong time.
     Calls turned away because too many were under way are not counted.
     """
+    run_id: _builtins.str
+    """Another one after each start of the gateway program; numbers the events (see EventPosition)."""
     def __init__(
         self,
         *,
@@ -55,10 +58,11 @@ class GatewayFacts(_message.Message):
         client_count: _builtins.int = ...,
         requests_served: _builtins.int = ...,
         requests_refused: _builtins.int = ...,
+        run_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["boot_id", b"boot_id", "client_count", b"client_count", "requests_refused", b"requests_refused", "requests_served", b"requests_served", "revision", b"revision", "uptime_ms", b"uptime_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["boot_id", b"boot_id", "client_count", b"client_count", "requests_refused", b"requests_refused", "requests_served", b"requests_served", "revision", b"revision", "run_id", b"run_id", "uptime_ms", b"uptime_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -7,8 +7,11 @@ from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
+from omniseer.gateway.v1 import event_pb2 as _event_pb2
+from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
+from omniseer.gateway.v1 import system_status_pb2 as _system_status_pb2
 import builtins as _builtins
 import sys
 import typing as _typing
@@ -180,3 +183,176 @@ class SetPreviewModeResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___SetPreviewModeResponse: _TypeAlias = SetPreviewModeResponse  # noqa: Y015
+
+@_typing.final
+class WatchSystemStatusRequest(_message.Message):
+    """Asks to be told of the status."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    MIN_INTERVAL_MS_FIELD_NUMBER: _builtins.int
+    min_interval_ms: _builtins.int
+    """The least time between two answers, in ms. At most a minute. The gateway itself looks 20 times
+    a second: the interval is rounded up to a multiple of 50 ms, and 0 is the same as 50.
+    """
+    def __init__(
+        self,
+        *,
+        min_interval_ms: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["min_interval_ms", b"min_interval_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___WatchSystemStatusRequest: _TypeAlias = WatchSystemStatusRequest  # noqa: Y015
+
+@_typing.final
+class WatchSystemStatusResponse(_message.Message):
+    """The status at one instant."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STATUS_FIELD_NUMBER: _builtins.int
+    MONOTONIC_NS_FIELD_NUMBER: _builtins.int
+    monotonic_ns: _builtins.int
+    """The instant, on the monotonic clock that Ping tells, in ns. An answer that was held up on the
+    way shows by it.
+    """
+    @_builtins.property
+    def status(self) -> _system_status_pb2.SystemStatus:
+        """As GetSystemStatus answers."""
+
+    def __init__(
+        self,
+        *,
+        status: _system_status_pb2.SystemStatus | None = ...,
+        monotonic_ns: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["status", b"status"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["monotonic_ns", b"monotonic_ns", "status", b"status"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___WatchSystemStatusResponse: _TypeAlias = WatchSystemStatusResponse  # noqa: Y015
+
+@_typing.final
+class SubscribeEventsRequest(_message.Message):
+    """Asks to be told of events."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    AFTER_FIELD_NUMBER: _builtins.int
+    MIN_SEVERITY_FIELD_NUMBER: _builtins.int
+    min_severity: _fault_pb2.FaultSeverity.ValueType
+    """Events that matter less are left out. UNSPECIFIED: none is."""
+    @_builtins.property
+    def after(self) -> _event_pb2.EventPosition:
+        """Where to go on: the position of the last event, gap or caught_up that was received. Unset:
+        from the oldest event that the gateway keeps, without a gap.
+        """
+
+    def __init__(
+        self,
+        *,
+        after: _event_pb2.EventPosition | None = ...,
+        min_severity: _fault_pb2.FaultSeverity.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["after", b"after"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["after", b"after", "min_severity", b"min_severity"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SubscribeEventsRequest: _TypeAlias = SubscribeEventsRequest  # noqa: Y015
+
+@_typing.final
+class SubscribeEventsResponse(_message.Message):
+    """The next thing to know."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    EVENT_FIELD_NUMBER: _builtins.int
+    GAP_FIELD_NUMBER: _builtins.int
+    CAUGHT_UP_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def event(self) -> _event_pb2.Event:
+        """It happened."""
+
+    @_builtins.property
+    def gap(self) -> _event_pb2.EventGap:
+        """Events are missing here."""
+
+    @_builtins.property
+    def caught_up(self) -> _event_pb2.EventPosition:
+        """The client has everything up to here. Sent when all events that the gateway had kept are
+        told, and every 5 s in which nothing else is.
+        """
+
+    def __init__(
+        self,
+        *,
+        event: _event_pb2.Event | None = ...,
+        gap: _event_pb2.EventGap | None = ...,
+        caught_up: _event_pb2.EventPosition | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["caught_up", b"caught_up", "event", b"event", "gap", b"gap", "item", b"item"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["caught_up", b"caught_up", "event", b"event", "gap", b"gap", "item", b"item"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType_item: _TypeAlias = _typing.Literal["event", "gap", "caught_up"]  # noqa: Y015
+    _WhichOneofArgType_item: _TypeAlias = _typing.Literal["item", b"item"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType_item) -> _WhichOneofReturnType_item | None: ...
+
+Global___SubscribeEventsResponse: _TypeAlias = SubscribeEventsResponse  # noqa: Y015
+
+@_typing.final
+class PingRequest(_message.Message):
+    """Asks for the time."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PingRequest: _TypeAlias = PingRequest  # noqa: Y015
+
+@_typing.final
+class PingResponse(_message.Message):
+    """The robot's clocks, read together."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    MONOTONIC_NS_FIELD_NUMBER: _builtins.int
+    WALL_CLOCK_UNIX_NS_FIELD_NUMBER: _builtins.int
+    BOOT_ID_FIELD_NUMBER: _builtins.int
+    monotonic_ns: _builtins.int
+    """The monotonic clock of the robot's computer, in ns since some instant before its start. Never
+    set, never turned back; comparable while boot_id stays.
+    """
+    wall_clock_unix_ns: _builtins.int
+    """The calendar clock, in ns since 1970-01-01 UTC. May be set at any time."""
+    boot_id: _builtins.str
+    """As in GatewayFacts: another one after each start of the robot's computer."""
+    def __init__(
+        self,
+        *,
+        monotonic_ns: _builtins.int = ...,
+        wall_clock_unix_ns: _builtins.int = ...,
+        boot_id: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["boot_id", b"boot_id", "monotonic_ns", b"monotonic_ns", "wall_clock_unix_ns", b"wall_clock_unix_ns"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PingResponse: _TypeAlias = PingResponse  # noqa: Y015

@@ -57,6 +57,21 @@ class RobotGatewayStub:
                 request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.SerializeToString,
                 response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.FromString,
                 _registered_method=True)
+        self.WatchSystemStatus = channel.unary_stream(
+                '/omniseer.gateway.v1.RobotGateway/WatchSystemStatus',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusResponse.FromString,
+                _registered_method=True)
+        self.SubscribeEvents = channel.unary_stream(
+                '/omniseer.gateway.v1.RobotGateway/SubscribeEvents',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsResponse.FromString,
+                _registered_method=True)
+        self.Ping = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/Ping',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.FromString,
+                _registered_method=True)
 
 
 class RobotGatewayServicer:
@@ -97,6 +112,36 @@ class RobotGatewayServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def WatchSystemStatus(self, request, context):
+        """The whole status again and again: the first at once, then when something has changed, and once
+        a second (or at the asked interval, when that is longer) even when nothing has, so that ages
+        stay true. Ages that grow, the uptime and the counts of calls are no change.
+
+        Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def SubscribeEvents(self, request, context):
+        """What happens, as it happens, each event once and in order.
+
+        A client that lost its connection asks again with the position of the last thing it received:
+        it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+        INVALID_ARGUMENT: a position in this run that has not been reached.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def Ping(self, request, context):
+        """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
+        and by the time they took, how far off it may be.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RobotGatewayServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -119,6 +164,21 @@ def add_RobotGatewayServicer_to_server(servicer, server):
                     servicer.GetGatewayInfo,
                     request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.FromString,
                     response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.SerializeToString,
+            ),
+            'WatchSystemStatus': grpc.unary_stream_rpc_method_handler(
+                    servicer.WatchSystemStatus,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusResponse.SerializeToString,
+            ),
+            'SubscribeEvents': grpc.unary_stream_rpc_method_handler(
+                    servicer.SubscribeEvents,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsResponse.SerializeToString,
+            ),
+            'Ping': grpc.unary_unary_rpc_method_handler(
+                    servicer.Ping,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -230,6 +290,87 @@ class RobotGateway:
             '/omniseer.gateway.v1.RobotGateway/GetGatewayInfo',
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoRequest.SerializeToString,
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.GetGatewayInfoResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def WatchSystemStatus(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/WatchSystemStatus',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.WatchSystemStatusResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SubscribeEvents(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/SubscribeEvents',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SubscribeEventsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Ping(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/Ping',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.FromString,
             options,
             channel_credentials,
             insecure,

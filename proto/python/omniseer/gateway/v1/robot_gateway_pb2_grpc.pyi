@@ -51,6 +51,24 @@ class RobotGatewayStub:
     """What an operator's screen draws over the picture, with the whole status, in one answer."""
     GetGatewayInfo: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]
     """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+    WatchSystemStatus: _grpc.UnaryStreamMultiCallable[_robot_gateway_pb2.WatchSystemStatusRequest, _robot_gateway_pb2.WatchSystemStatusResponse]
+    """The whole status again and again: the first at once, then when something has changed, and once
+    a second (or at the asked interval, when that is longer) even when nothing has, so that ages
+    stay true. Ages that grow, the uptime and the counts of calls are no change.
+
+    Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+    """
+    SubscribeEvents: _grpc.UnaryStreamMultiCallable[_robot_gateway_pb2.SubscribeEventsRequest, _robot_gateway_pb2.SubscribeEventsResponse]
+    """What happens, as it happens, each event once and in order.
+
+    A client that lost its connection asks again with the position of the last thing it received:
+    it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+    INVALID_ARGUMENT: a position in this run that has not been reached.
+    """
+    Ping: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.PingRequest, _robot_gateway_pb2.PingResponse]
+    """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
+    and by the time they took, how far off it may be.
+    """
 
 @_typing.type_check_only
 class RobotGatewayAsyncStub(RobotGatewayStub):
@@ -73,6 +91,24 @@ class RobotGatewayAsyncStub(RobotGatewayStub):
     """What an operator's screen draws over the picture, with the whole status, in one answer."""
     GetGatewayInfo: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]  # type: ignore[assignment]
     """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+    WatchSystemStatus: _aio.UnaryStreamMultiCallable[_robot_gateway_pb2.WatchSystemStatusRequest, _robot_gateway_pb2.WatchSystemStatusResponse]  # type: ignore[assignment]
+    """The whole status again and again: the first at once, then when something has changed, and once
+    a second (or at the asked interval, when that is longer) even when nothing has, so that ages
+    stay true. Ages that grow, the uptime and the counts of calls are no change.
+
+    Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+    """
+    SubscribeEvents: _aio.UnaryStreamMultiCallable[_robot_gateway_pb2.SubscribeEventsRequest, _robot_gateway_pb2.SubscribeEventsResponse]  # type: ignore[assignment]
+    """What happens, as it happens, each event once and in order.
+
+    A client that lost its connection asks again with the position of the last thing it received:
+    it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+    INVALID_ARGUMENT: a position in this run that has not been reached.
+    """
+    Ping: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.PingRequest, _robot_gateway_pb2.PingResponse]  # type: ignore[assignment]
+    """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
+    and by the time they took, how far off it may be.
+    """
 
 class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
     """The one door between a robot and its operator."""
@@ -116,5 +152,41 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_robot_gateway_pb2.GetGatewayInfoResponse, _abc.Awaitable[_robot_gateway_pb2.GetGatewayInfoResponse]]:
         """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+
+    @_abc_1.abstractmethod
+    def WatchSystemStatus(
+        self,
+        request: _robot_gateway_pb2.WatchSystemStatusRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_robot_gateway_pb2.WatchSystemStatusResponse], _abc.AsyncIterator[_robot_gateway_pb2.WatchSystemStatusResponse]]:
+        """The whole status again and again: the first at once, then when something has changed, and once
+        a second (or at the asked interval, when that is longer) even when nothing has, so that ages
+        stay true. Ages that grow, the uptime and the counts of calls are no change.
+
+        Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+        """
+
+    @_abc_1.abstractmethod
+    def SubscribeEvents(
+        self,
+        request: _robot_gateway_pb2.SubscribeEventsRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_abc.Iterator[_robot_gateway_pb2.SubscribeEventsResponse], _abc.AsyncIterator[_robot_gateway_pb2.SubscribeEventsResponse]]:
+        """What happens, as it happens, each event once and in order.
+
+        A client that lost its connection asks again with the position of the last thing it received:
+        it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+        INVALID_ARGUMENT: a position in this run that has not been reached.
+        """
+
+    @_abc_1.abstractmethod
+    def Ping(
+        self,
+        request: _robot_gateway_pb2.PingRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.PingResponse, _abc.Awaitable[_robot_gateway_pb2.PingResponse]]:
+        """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
+        and by the time they took, how far off it may be.
+        """
 
 def add_RobotGatewayServicer_to_server(servicer: RobotGatewayServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -1,0 +1,50 @@
+"""Ctrl-C and SIGTERM as the ordinary end of a command that goes on until it is told to stop."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TypeVar
+
+from console.client import Cancelled
+
+ItemT = TypeVar("ItemT")
+
+
+class Stopped:
+    """Whether a signal has asked for the end."""
+
+    def __init__(self) -> None:
+        self.event = threading.Event()
+
+    def as_end_of(self, items: Iterable[ItemT]) -> Iterator[ItemT]:
+        """The items; a stream that was cut off by the signal has simply ended."""
+        try:
+            yield from items
+        except Cancelled:
+            if not self.event.is_set():
+                raise
+
+
+@contextmanager
+def until_stopped(cut_off: Callable[[], None]) -> Iterator[Stopped]:
+    """While the block lasts, SIGINT and SIGTERM call `cut_off` instead of ending the program.
+
+    Args:
+        cut_off: ends what the block waits for; called in a thread of its own, because a signal may come
+            while the same lock is held.
+    """
+    stopped = Stopped()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        if not stopped.event.is_set():
+            stopped.event.set()
+            threading.Thread(target=cut_off, name="stop").start()
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,98 @@
+"""Events, as the contract tells them."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
+from gateway.rpc.mapping.faults import fault_message
+from gateway.status.event import (
+    ClientJoined,
+    ClientLeft,
+    ControlAction,
+    EncoderFallback,
+    Event,
+    FaultCleared,
+    FaultRaised,
+    ModeChanged,
+    PreviewChanged,
+)
+from gateway.status.events import Gap, Position
+from omniseer.gateway.v1 import event_pb2 as pb
+
+_NS_PER_S: Final = 1_000_000_000
+
+
+def event_message(event: Event, run_id: str) -> pb.Event:
+    """One event of this run."""
+    news = event.news
+    field, payload = _PAYLOADS[type(news.detail)]
+    message = pb.Event(
+        run_id=run_id,
+        sequence=event.sequence,
+        monotonic_ns=int(event.at_s * _NS_PER_S),
+        wall_clock_unix_ms=event.unix_ms,
+        severity=SEVERITIES[news.severity],
+        component=news.component,
+        message=news.message,
+    )
+    getattr(message, field).CopyFrom(payload(news.detail, event.at_s))
+    return message
+
+
+def gap_message(gap: Gap) -> pb.EventGap:
+    """Events are missing."""
+    return pb.EventGap(
+        reason=GAP_REASONS[gap.reason], missed_count=gap.missed, position=position_message(gap.position)
+    )
+
+
+def position_message(position: Position) -> pb.EventPosition:
+    """A place in the order of events."""
+    return pb.EventPosition(run_id=position.run_id, sequence=position.sequence)
+
+
+def position_from(message: pb.EventPosition) -> Position:
+    """The place a client wants to go on from."""
+    return Position(message.run_id, message.sequence)
+
+
+def _raised(detail: FaultRaised, at_s: float) -> pb.FaultRaised:
+    return pb.FaultRaised(fault=fault_message(detail.fault, at_s))
+
+
+def _cleared(detail: FaultCleared, at_s: float) -> pb.FaultCleared:
+    return pb.FaultCleared(fault=fault_message(detail.fault, at_s))
+
+
+def _preview(detail: PreviewChanged, _at_s: float) -> pb.PreviewStateChanged:
+    return pb.PreviewStateChanged(
+        state=PREVIEW_STATES[detail.state], profile=PROFILES[detail.profile], last_error=detail.last_error
+    )
+
+
+def _fallback(detail: EncoderFallback, _at_s: float) -> pb.EncoderFallback:
+    return pb.EncoderFallback(running=detail.running, wanted=detail.wanted, reason=detail.reason)
+
+
+def _control(detail: ControlAction, _at_s: float) -> pb.ControlAction:
+    return pb.ControlAction(
+        who=detail.who,
+        address=detail.address,
+        method=detail.method,
+        request=detail.request,
+        result=CONTROL_RESULTS[detail.result],
+        answer=detail.answer,
+    )
+
+
+_PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
+    FaultRaised: ("fault_raised", _raised),
+    FaultCleared: ("fault_cleared", _cleared),
+    PreviewChanged: ("preview_state_changed", _preview),
+    EncoderFallback: ("encoder_fallback", _fallback),
+    ClientJoined: ("client_joined", lambda detail, _: pb.ClientJoined(address=detail.address)),
+    ClientLeft: ("client_left", lambda detail, _: pb.ClientLeft(address=detail.address)),
+    ControlAction: ("control_action", _control),
+    ModeChanged: ("robot_mode_changed", lambda detail, _: pb.RobotModeChanged(mode=detail.mode)),
+}
+"""Total: a test walks every kind of event, and every payload of the schema."""

@@ -1,0 +1,136 @@
+"""What can happen that an operator may want to know: one value per kind of event."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+from gateway.status.faults.fault import Fault, Severity
+from gateway.status.preview import PreviewState, Profile
+
+
+class ControlResult(Enum):
+    """What became of a control action."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"
+    FAILED = "failed"
+    """By an error of our own."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultRaised:
+    """A fault began, or grew worse."""
+
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True)
+class FaultCleared:
+    """A fault is over."""
+
+    fault: Fault
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewChanged:
+    """The preview came to rest in another state, or another profile is in force."""
+
+    state: PreviewState
+    profile: Profile | None
+    last_error: str
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderFallback:
+    """Another encoder than the first choice took over."""
+
+    running: str
+    wanted: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClientJoined:
+    """Somebody watches; `address` says from where."""
+
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClientLeft:
+    """Somebody who was told of watches no more."""
+
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class ControlAction:
+    """Somebody asked for something that changes the robot.
+
+    Attributes:
+        who: the caller's name where the gateway asks for one; else empty.
+        address: where the call came from.
+        method: of the contract.
+        request: what was asked for, for a person.
+        answer: what was answered, for a person.
+    """
+
+    who: str
+    address: str
+    method: str
+    request: str
+    result: ControlResult
+    answer: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModeChanged:
+    """The robot is about something else; empty when it tells no mode any more."""
+
+    mode: str
+
+
+Detail: TypeAlias = (
+    FaultRaised
+    | FaultCleared
+    | PreviewChanged
+    | EncoderFallback
+    | ClientJoined
+    | ClientLeft
+    | ControlAction
+    | ModeChanged
+)
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """Something that has just happened.
+
+    Attributes:
+        component: the part of the robot that it happened to, as operators call it.
+        message: what happened, for a person.
+        detail: the same for programs.
+        sentence: how the short list of the overlay tells it; None leaves it out there.
+    """
+
+    severity: Severity
+    component: str
+    message: str
+    detail: Detail
+    sentence: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """News in their order.
+
+    Attributes:
+        sequence: counts from 1 in this run of the gateway.
+        at_s: on the gateway's monotonic clock.
+        unix_ms: what the calendar clock showed.
+    """
+
+    sequence: int
+    at_s: float
+    unix_ms: int
+    news: News
