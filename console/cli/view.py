@@ -1,19 +1,16 @@
 """robotctl view: the robot's video, in a window or without one."""
 
 import importlib
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Final
 
 import typer
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, TargetOption, session_of
+from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.stopping import until_stopped
 from console.client import parse_target
 from console.receiver.recording import Recording
 from console.viewer.account import Account
@@ -53,13 +50,14 @@ def view(
     frames: FramesOption = None,
     patience_s: PatienceOption = 15.0,
     target: TargetOption = None,
+    robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show the live preview with what the robot detects. Everything needed comes from the robot.
 
     Keys: p preview on or off, o boxes, f full screen, q quit.
     """
-    session = session_of(context, target, as_json)
+    session = session_of(context, target, as_json, robot)
     if frames and not headless:
         raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
     address = parse_target(session.target)
@@ -69,9 +67,9 @@ def view(
     if show:
         account = show(address, recording)
     else:
-        with _signals_set() as stop:
+        with until_stopped(_nothing) as stopped:
             account = watch_headless(
-                address, frames=frames, patience_s=patience_s, recording=recording, stop=stop
+                address, frames=frames, patience_s=patience_s, recording=recording, stop=stopped.event
             )
     if session.as_json:
         session.print_json(json_form(account))
@@ -79,6 +77,10 @@ def view(
         session.out.print(account.line(), soft_wrap=True)
     if recording and recording.trouble:
         raise recording.trouble
+
+
+def _nothing() -> None:
+    """The watching looks for itself whether it shall end."""
 
 
 def _need_gstreamer() -> None:
@@ -100,18 +102,3 @@ def _window() -> Callable[[str, Recording | None], Account]:
             " libxcb-cursor0 libdbus-1-3",
         ) from error
     return run_view
-
-
-@contextmanager
-def _signals_set() -> Iterator[threading.Event]:
-    stop = threading.Event()
-
-    def on_signal(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
-
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -58,6 +58,7 @@ def on_picture(box: Box, source_width: float, source_height: float, picture: Box
     top = max(content.y + box.y * scale, content.y)
     right = min(content.x + box.right * scale, content.right)
     bottom = min(content.y + box.bottom * scale, content.bottom)
-    if right <= left or bottom <= top:
-        return None
-    return Box(left, top, right - left, bottom - top)
+    # Asked this way round, a box that is not a number is not seen either.
+    if right > left and bottom > top:
+        return Box(left, top, right - left, bottom - top)
+    return None

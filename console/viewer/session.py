@@ -115,6 +115,8 @@ class VideoSession:
                 self._changing.notify_all()
             if address != self._address:
                 self._address = address
+                if not unusable:
+                    self._facts = replace(self._facts, stream_trouble=None, blocked=False)
                 self._changing.notify_all()
             if preview.state is PreviewState.DISABLED:
                 self._forget_picture()

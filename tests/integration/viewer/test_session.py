@@ -1,0 +1,171 @@
+"""The viewer's session against the real gateway, preview service and SRT: what an operator lives through."""
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from console.client.results import PreviewState
+from console.receiver.address import StreamAddress
+from console.receiver.frame import PixelFormat
+from console.receiver.recording import Recording
+from console.viewer.session import VideoSession
+from console.viewer.state import Phase
+from tests.integration.viewer.conftest import following
+from tests.support.judges import decoded_pictures
+from tests.support.ports import free_udp_port
+from tests.support.streams import SrtSender, encode
+from tests.support.video_ground import VideoGround
+from tests.support.waiting import wait_until
+from tests.unit.viewer.previews import preview
+
+pytestmark = pytest.mark.gst
+
+FREEZE_SHOWN_WITHIN_S = 0.7
+BACK_WITHIN_S = 1.5
+
+
+def is_live(session: VideoSession) -> bool:
+    return session.state().phase is Phase.LIVE
+
+
+def becomes(session: VideoSession, phase: Phase) -> float:
+    """Waits for a phase and tells when it was seen."""
+    wait_until(lambda: session.state().phase is phase, f"{phase}; it is {session.state()}", 25)
+    return time.monotonic()
+
+
+def test_it_follows_the_preview_from_off_to_on_and_back(ground: VideoGround, session: VideoSession) -> None:
+    becomes(session, Phase.OFF)
+    ground.switch_on()
+    becomes(session, Phase.LIVE)
+    picture = session.latest()
+    assert picture is not None
+    assert (picture.width, picture.height, picture.codec) == (320, 240, "h264")
+    assert picture.pixel_format is PixelFormat.BGRX
+    assert session.figures().decoder == "avdec_h264"
+    ground.switch_off()
+    becomes(session, Phase.OFF)
+    assert session.latest() is None
+
+
+def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
+    ground: VideoGround, session: VideoSession
+) -> None:
+    ground.switch_on()
+    becomes(session, Phase.LIVE)
+    ground.kill_preview()
+    died_s = time.monotonic()
+    wait_until(lambda: not is_live(session), "the freeze shows")
+    assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
+    # The gateway says why a moment later; the picture that stands still stays marked as one.
+    becomes(session, Phase.FAULTED)
+    assert session.state().still_s is not None
+    assert "unreachable" in session.state().reason
+    wait_until(lambda: session.figures().redials >= 1, "called again")
+
+    ground.preview.start_again()
+    ground.preview.running()
+    returned_s = time.monotonic()
+    assert becomes(session, Phase.LIVE) - returned_s < BACK_WITHIN_S
+
+
+def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
+    ground: VideoGround, session: VideoSession
+) -> None:
+    ground.switch_on()
+    becomes(session, Phase.LIVE)
+    ground.preview.process.send_signal(signal.SIGSTOP)
+    stopped_s = time.monotonic()
+    wait_until(lambda: not is_live(session), "the freeze shows")
+    assert time.monotonic() - stopped_s < FREEZE_SHOWN_WITHIN_S
+    wait_until(lambda: session.figures().redials >= 1, "called again")
+    ground.preview.process.send_signal(signal.SIGCONT)
+    went_on_s = time.monotonic()
+    assert becomes(session, Phase.LIVE) - went_on_s < BACK_WITHIN_S
+
+
+def test_pictures_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
+    ground.switch_on()
+    becomes(session, Phase.LIVE)
+    ground.kill_gateway()
+    wait_until(lambda: session.state().reason, "the gateway is missed")
+    assert is_live(session)
+    ground.kill_preview()
+    becomes(session, Phase.UNREACHABLE)
+    ground.preview.start_again()
+    ground.start_gateway()
+    becomes(session, Phase.OFF)
+
+
+def test_the_codec_may_change_with_the_stream(
+    ground: VideoGround, session: VideoSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground.switch_on()
+    becomes(session, Phase.LIVE)
+    ground.kill_preview()
+    monkeypatch.setenv("PREVIEW__ENCODERS__ORDER", '["x265"]')
+    ground.preview.start_again()
+    wait_until(lambda: (picture := session.latest()) and picture.codec == "h265", "H.265 is shown", 30)
+    becomes(session, Phase.LIVE)
+
+
+def test_the_right_passphrase_comes_with_the_endpoint() -> None:
+    port, pieces = free_udp_port(), encode("h264", 30)
+    session = VideoSession()
+    session.start()
+    try:
+        with SrtSender(port, passphrase="the right one") as sender:
+            session.follow(preview(PreviewState.RUNNING, port=port, passphrase="a wrong passphrase"))
+            becomes(session, Phase.BLOCKED)
+            assert "did not accept the passphrase" in session.state().reason
+            session.follow(preview(PreviewState.RUNNING, port=port, passphrase="the right one"))
+            assert sender.viewer_joined.wait(20)
+            for piece in pieces:
+                sender.send(piece)
+            becomes(session, Phase.LIVE)
+    finally:
+        assert session.close()
+
+
+def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Path) -> None:
+    recording = Recording(tmp_path / "drive.ts")
+    with following(ground.target, recording=recording) as session:
+        ground.switch_on()
+        wait_until(lambda: session.figures().pictures >= 30, "pictures")
+        ground.kill_preview()
+        wait_until(lambda: session.figures().redials >= 1, "called again")
+        ground.preview.start_again()
+        before = session.figures().pictures
+        wait_until(lambda: session.figures().pictures >= before + 30, "pictures again", 30)
+        kept_while_live = recording.size_bytes()
+        seen = session.figures().pictures
+    assert recording.trouble is None
+    assert recording.gaps == 0
+    assert recording.size_bytes() >= kept_while_live > 0
+    assert recording.size_bytes() % 188 == 0
+    # A picture that waits in the session is dropped for a newer one; the file has them all.
+    assert decoded_pictures(recording.file) >= seen >= 60
+
+
+def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:
+    recording = Recording(Path("/dev/full"))
+    with following(ground.target, recording=recording) as session:
+        ground.switch_on()
+        wait_until(lambda: recording.trouble, "the disk is full")
+        before = session.figures().pictures
+        wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on")
+        assert session.figures().redials == 0
+    assert "ended early: No space left" in str(recording.trouble)
+
+
+def test_closing_takes_no_time_whatever_it_does() -> None:
+    nobody = StreamAddress("127.0.0.1", free_udp_port(), 20)
+    session = VideoSession()
+    session.start()
+    session.follow(preview(PreviewState.RUNNING, port=nobody.port))
+    wait_until(lambda: session.figures().redials >= 1, "nobody answers, it was called again")
+    begun_s = time.monotonic()
+    assert session.close()
+    assert time.monotonic() - begun_s < 1.5

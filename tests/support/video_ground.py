@@ -1,0 +1,110 @@
+"""A robot that has nothing but video: the real preview service behind the real gateway, each a process."""
+
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from console.client import GatewayClient, PreviewProfile, PreviewState
+from tests.support.ports import free_tcp_port
+from tests.support.running_preview import RunningPreview
+from tests.support.waiting import wait_until
+
+_ROOT = Path(__file__).parents[2]
+_UP_WITHIN_S = 20.0
+
+
+@dataclass
+class VideoGround:
+    """Two programs.
+
+    Args:
+        preview: makes the video.
+        directory: for the gateway's configuration and log.
+        settings: of the gateway, besides the test's own.
+    """
+
+    preview: RunningPreview
+    directory: Path
+    settings: Mapping[str, Any]
+    port: int = field(default_factory=free_tcp_port)
+    gateway: "subprocess.Popen[bytes] | None" = None
+
+    @property
+    def target(self) -> str:
+        """The gateway's address."""
+        return f"127.0.0.1:{self.port}"
+
+    def start_gateway(self) -> None:
+        """Up when this returns; at the same address every time."""
+        values = {
+            "grpc": {"port": self.port},
+            "sources": [],
+            **self.settings,
+            "preview": {"socket": str(self.preview.socket), **self.settings.get("preview", {})},
+        }
+        config = self.directory / "gateway.yaml"
+        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+        command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", config]
+        with (self.directory / "gateway.log").open("ab") as log:
+            self.gateway = subprocess.Popen(command, cwd=_ROOT, stderr=log)
+        wait_until(self._knows_the_preview, "the gateway is up", _UP_WITHIN_S)
+
+    def kill_gateway(self) -> None:
+        """As if somebody had pulled the plug."""
+        if self.gateway:
+            self.gateway.kill()
+            self.gateway.wait()
+
+    def switch_on(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> None:
+        """Frames leave when this returns."""
+        with GatewayClient(self.target) as client:
+            change = client.enable_preview(profile)
+        assert change.preview.state is PreviewState.RUNNING, change
+
+    def switch_off(self) -> None:
+        """The preview is off when this returns."""
+        with GatewayClient(self.target) as client:
+            assert client.disable_preview().preview.state is PreviewState.DISABLED
+
+    def kill_preview(self) -> None:
+        """The video's program dies without a word."""
+        self.preview.process.kill()
+        self.preview.process.wait()
+
+    def _knows_the_preview(self) -> bool:
+        with socket.socket() as probe, suppress(ConnectionRefusedError):
+            probe.connect(("127.0.0.1", self.port))
+            with GatewayClient(self.target) as client:
+                return client.status().preview.service_reachable
+        return False
+
+
+@contextmanager
+def video_ground(
+    directory: Path,
+    preview: Mapping[str, Any] | None = None,
+    gateway: Mapping[str, Any] | None = None,
+    *,
+    small: bool = True,
+) -> Iterator[VideoGround]:
+    """Up when the block begins; nothing is left when it ends.
+
+    Args:
+        directory: for everything both programs write.
+        preview: keys of its configuration.
+        gateway: keys of its configuration.
+        small: pictures of 320x240 instead of 1280x720.
+    """
+    with RunningPreview(directory, preview, small=small) as service:
+        ground = VideoGround(service, directory, gateway or {})
+        try:
+            ground.start_gateway()
+            yield ground
+        finally:
+            ground.kill_gateway()

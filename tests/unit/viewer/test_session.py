@@ -1,0 +1,174 @@
+"""The session with calls that the test plays; real streams are in tests/integration/viewer."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from console.client import Unreachable
+from console.client.results import PreviewState
+from console.receiver.address import StreamAddress
+from console.receiver.errors import UndecodableError, ended, from_srt
+from console.receiver.frame import Frame
+from console.receiver.inbox import Inbox
+from console.receiver.receiver import Receiver
+from console.receiver.setup import Setup
+from console.viewer.session import VideoSession
+from console.viewer.state import Phase
+from tests.support.waiting import wait_until
+from tests.unit.receiver.pictures import frame
+from tests.unit.viewer.previews import preview
+
+
+@dataclass
+class Exchange:
+    """Every call that was made; a test puts pictures and ends into the inboxes."""
+
+    refuse: bool = False
+    calls: list[tuple[StreamAddress, Inbox]] = field(default_factory=list)
+    open: int = 0
+
+    def connect(self, address: StreamAddress, _setup: Setup) -> Receiver:
+        return Receiver(address, queue_size=1, dial=self._dial)
+
+    def _dial(self, address: StreamAddress, inbox: Inbox) -> "Exchange":
+        self.calls.append((address, inbox))
+        self.open += 1
+        if self.refuse:
+            inbox.end(from_srt(address, "Incorrect passphrase", had_data=False))
+        return self
+
+    def close(self) -> None:
+        self.open -= 1
+
+    def show(self) -> Frame:
+        """A picture arrives over the newest call."""
+        picture = replace(frame(), arrival_s=time.monotonic())
+        self.calls[-1][1].put(picture)
+        return picture
+
+
+@pytest.fixture
+def exchange() -> Exchange:
+    return Exchange()
+
+
+@pytest.fixture
+def session(exchange: Exchange) -> Iterator[VideoSession]:
+    session = VideoSession(connect=exchange.connect)
+    session.start()
+    yield session
+    assert session.close()
+    assert exchange.open == 0
+
+
+def called(exchange: Exchange, times: int) -> None:
+    wait_until(lambda: len(exchange.calls) >= times, f"{times} calls")
+
+
+def test_nothing_is_called_until_the_gateway_names_a_stream(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    session.follow(preview(PreviewState.DISABLED))
+    assert session.state().phase is Phase.OFF
+    assert exchange.calls == []
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+
+
+def test_the_newest_picture_is_kept_and_told(session: VideoSession, exchange: Exchange) -> None:
+    told: list[Frame] = []
+    session.watch_pictures(told.append)
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    for number in (1, 2, 3):
+        picture = exchange.show()
+        wait_until(lambda picture=picture: session.latest() is picture, "the picture is kept")  # type: ignore[misc]
+        assert session.figures().pictures == len(told) == number
+    assert session.state().phase is Phase.LIVE
+
+
+def test_a_lost_call_is_made_again_and_counted(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    for number in (1, 2, 3):
+        called(exchange, number)
+        address, inbox = exchange.calls[-1]
+        inbox.end(ended(address, "lost"))
+    called(exchange, 4)
+    assert session.figures().redials == session.state().redials == 3
+
+
+def test_silence_is_a_loss(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    exchange.show()
+    called(exchange, 2)
+    state = session.state()
+    assert state.phase is Phase.FROZEN
+    assert state.still_s is not None
+    assert state.still_s >= 1
+    assert "fell silent" in state.reason
+
+
+def test_another_address_is_called_at_once(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    session.follow(preview(PreviewState.RUNNING, port=7200))
+    called(exchange, 2)
+    assert [address.port for address, _ in exchange.calls] == [7100, 7200]
+    assert session.figures().redials == 0
+
+
+def test_the_gateway_may_be_away_while_pictures_come(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    session.lost(Unreachable("nobody there"))
+    exchange.show()
+    wait_until(session.latest, "a picture")
+    assert session.state().phase is Phase.LIVE
+    assert len(exchange.calls) == 1
+
+
+def test_an_old_picture_does_not_outlive_its_preview(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    exchange.show()
+    wait_until(session.latest, "a picture")
+    session.follow(preview(PreviewState.DISABLED))
+    assert session.latest() is None
+    wait_until(lambda: exchange.open == 0, "hung up")
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 2)
+    assert session.state().phase is Phase.CONNECTING
+
+
+def test_a_wrong_passphrase_blocks_until_there_is_another(session: VideoSession, exchange: Exchange) -> None:
+    exchange.refuse = True
+    session.follow(preview(PreviewState.RUNNING, passphrase="not the right one"))
+    wait_until(lambda: session.state().phase is Phase.BLOCKED, "blocked")
+    assert "passphrase" in session.state().reason
+    assert "right one" not in session.state().reason
+    exchange.refuse = False
+    session.follow(preview(PreviewState.RUNNING, passphrase="the right one"))
+    called(exchange, 2)
+    exchange.show()
+    wait_until(lambda: session.state().phase is Phase.LIVE, "live")
+
+
+def test_an_address_that_cannot_be_used_blocks(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING, passphrase="short"))
+    assert session.state().phase is Phase.BLOCKED
+    assert exchange.calls == []
+
+
+def test_what_cannot_be_decoded_blocks(session: VideoSession, exchange: Exchange) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    exchange.calls[-1][1].end(UndecodableError("it sends video/mpeg", "Look at the port", final=True))
+    wait_until(lambda: session.state().phase is Phase.BLOCKED, "blocked")
+    assert session.state().remedy == "Look at the port"
+
+
+def test_a_session_that_never_began_can_be_closed() -> None:
+    assert VideoSession().close()
