@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import grpc
 
 from common import request_id
-from common.errors import DomainError, InvalidRequestError, NotNowError
+from common.error_details import metadata_of, metadata_of_defect
+from common.errors import (
+    DomainError,
+    InvalidRequestError,
+    NotNowError,
+    TooMuchError,
+    UnknownServiceError,
+)
 
 if TYPE_CHECKING:
     Handler: TypeAlias = grpc.RpcMethodHandler[Any, Any]
@@ -28,6 +35,8 @@ _log = logging.getLogger(__name__)
 STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
     NotNowError: grpc.StatusCode.FAILED_PRECONDITION,
+    TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    UnknownServiceError: grpc.StatusCode.NOT_FOUND,
 }
 """Total: a test walks the subclasses of DomainError. Every other exception is a defect, so INTERNAL."""
 
@@ -40,6 +49,11 @@ _SERVER_OPTIONS: Final = (
     # Requests are small; nobody fills the robot's memory through this door.
     ("grpc.max_receive_message_length", 256 * 1024),
     ("grpc.max_send_message_length", 4 * 1024 * 1024),
+    # Of one connection at once. A client of ours waits then; one that begins calls and takes them back at once
+    # would crowd out the others (1000 calls that wait to be looked at, and gRPC turns away whatever comes next).
+    ("grpc.max_concurrent_streams", 256),
+    # From the connection to the first whole word.
+    ("grpc.server_handshake_timeout_ms", 5_000),
     # A peer that left without a word is noticed after 10 + 5 s.
     ("grpc.keepalive_time_ms", 10_000),
     ("grpc.keepalive_timeout_ms", 5_000),
@@ -47,11 +61,12 @@ _SERVER_OPTIONS: Final = (
     # Clients may look more often themselves (ours every 2 s) without being sent away.
     ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
 )
+_DEFECT: Final = "internal error; the robot's log says more"
 _LEFT: Final = grpc.StatusCode.CANCELLED
 """How a call ends whose caller leaves before the answer."""
 _MAX_CONCURRENT_CALLS: Final = 256
-"""More at once are refused with RESOURCE_EXHAUSTED. (HTTP/2's own limit per connection resets streams, which
-callers see as UNAVAILABLE, as if the robot were gone.)"""
+"""More at once, of all connections, are refused with RESOURCE_EXHAUSTED. (Beyond a connection's own limit
+HTTP/2 resets streams, which a flooding caller may see as UNAVAILABLE.)"""
 
 
 def unobserved(_method: str, _code: grpc.StatusCode, _seconds: float) -> None:
@@ -166,8 +181,8 @@ async def _end(context: Context, error: Exception, method: str) -> None:
     if isinstance(error, grpc.aio.AbortError):
         raise error
     code = _code_of(error, context)
-    if code is grpc.StatusCode.INTERNAL:
-        _log.error("%s failed", method, exc_info=error)
-        await context.abort(grpc.StatusCode.INTERNAL, "internal error; the robot's log says more")
+    if isinstance(error, DomainError) and code is not grpc.StatusCode.INTERNAL:
+        await context.abort(code, str(error), trailing_metadata=metadata_of(error, code))
     else:
-        await context.abort(code, str(error))
+        _log.error("%s failed", method, exc_info=error)
+        await context.abort(code, _DEFECT, trailing_metadata=metadata_of_defect(_DEFECT))

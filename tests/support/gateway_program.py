@@ -1,0 +1,60 @@
+"""`robot-gateway serve` as a process of its own, with an operator that is connected to it."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from omniseer.gateway.v1.robot_gateway_pb2 import GetOverlaySnapshotRequest, GetSystemStatusRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.running_gateway import free_tcp_port
+
+_ROOT = Path(__file__).parents[2]
+_UP_WITHIN_S = 20.0
+
+
+@dataclass
+class GatewayProgram:
+    """A gateway in another process."""
+
+    process: subprocess.Popen[bytes]
+    port: int
+    stub: Any
+
+    def status(self) -> Any:
+        return self.stub.GetSystemStatus(GetSystemStatusRequest(), timeout=5)
+
+    def overlay(self) -> Any:
+        return self.stub.GetOverlaySnapshot(GetOverlaySnapshotRequest(), timeout=5)
+
+    def source(self, name: str) -> Any:
+        """What the status tells of one source."""
+        return next(each for each in self.status().sources if each.name == name)
+
+
+@contextmanager
+def gateway_program(directory: Path, **settings: Any) -> Iterator[GatewayProgram]:
+    """Up when the block begins, gone when it ends; its log is in `directory`."""
+    port = free_tcp_port()
+    config = directory / "gateway.yaml"
+    values = {"grpc": {"port": port}, "preview": {"socket": str(directory / "preview.sock")}, **settings}
+    config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+    command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", str(config)]
+    with (directory / "gateway.log").open("wb") as log:
+        process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
+    try:
+        with grpc.insecure_channel(f"127.0.0.1:{port}") as channel:
+            grpc.channel_ready_future(channel).result(timeout=_UP_WITHIN_S)
+            yield GatewayProgram(process, port, RobotGatewayStub(channel))
+    finally:
+        process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(5)
+        process.kill()
+        process.wait()
