@@ -49,8 +49,8 @@ _SERVER_OPTIONS: Final = (
     # Requests are small; nobody fills the robot's memory through this door.
     ("grpc.max_receive_message_length", 256 * 1024),
     ("grpc.max_send_message_length", 4 * 1024 * 1024),
-    # Of one connection at once. A client of ours waits then; one that begins calls and takes them back at once
-    # would crowd out the others (1000 calls that wait to be looked at, and gRPC turns away whatever comes next).
+    # On one connection at once. Without a limit, one that begins calls and takes them back at once crowds out
+    # the others: when 1000 calls wait to be looked at, gRPC turns away whatever comes next.
     ("grpc.max_concurrent_streams", 256),
     # From the connection to the first whole word.
     ("grpc.server_handshake_timeout_ms", 5_000),
@@ -117,19 +117,29 @@ class ErrorInterceptor(grpc.aio.ServerInterceptor):
 
 
 def _guarded(handler: Handler, method: str, observe: Observe) -> Handler:
+    return rewrapped(
+        handler,
+        lambda behavior: _guarded_unary(behavior, method, observe),
+        lambda behavior: _guarded_stream(behavior, method, observe),
+    )
+
+
+def rewrapped(handler: Handler, unary: Callable[[Any], Any], stream: Callable[[Any], Any]) -> Handler:
+    """The same handler with another behavior.
+
+    Args:
+        handler: of any method that has one request, or (reflection) streams both ways.
+        unary: makes the new behavior of one with a single response.
+        stream: the same for one whose responses are a stream.
+    """
+    serializers = handler.request_deserializer, handler.response_serializer
     if handler.unary_unary:
-        return grpc.unary_unary_rpc_method_handler(
-            _guarded_unary(handler.unary_unary, method, observe),
-            handler.request_deserializer,
-            handler.response_serializer,
-        )
+        return grpc.unary_unary_rpc_method_handler(unary(handler.unary_unary), *serializers)
     if handler.unary_stream:
-        return grpc.unary_stream_rpc_method_handler(
-            _guarded_stream(handler.unary_stream, method, observe),
-            handler.request_deserializer,
-            handler.response_serializer,
-        )
-    raise TypeError(f"{method}: a stream of requests has no guard yet")
+        return grpc.unary_stream_rpc_method_handler(stream(handler.unary_stream), *serializers)
+    if handler.stream_stream:
+        return grpc.stream_stream_rpc_method_handler(stream(handler.stream_stream), *serializers)
+    raise TypeError("no method has a stream of requests and one response")
 
 
 def _guarded_unary(behavior: Any, method: str, observe: Observe) -> Any:

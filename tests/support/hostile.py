@@ -103,7 +103,7 @@ CONVERSATIONS = {
 def converse(port: int, said: bytes) -> None:
     """Says it, as far as the other side listens, then hears the other side out for a moment."""
     with socket.create_connection(("127.0.0.1", port), PATIENCE_S) as caller:
-        caller.settimeout(0.5)
+        caller.settimeout(0.2)
         with suppress(ConnectionError, TimeoutError):
             caller.sendall(said)
             while caller.recv(65_536):

@@ -89,7 +89,7 @@ def unary(gateway: GatewayProgram, method: str, request: bytes, **options: Any) 
 def test_a_conversation_that_makes_no_sense(gateway: GatewayProgram, good: GoodCaller, said: bytes) -> None:
     converse(gateway.port, said)  # whatever happens only once
     small, few = resident_mib(gateway), descriptors(gateway)
-    for _ in range(5):
+    for _ in range(3):
         converse(gateway.port, said)
     good.still_served()
     wait_until(lambda: descriptors(gateway) <= few, "their connections are gone", PATIENCE_S)
