@@ -337,6 +337,7 @@ class Manager:
             choice=choice,
             profile=self._wish.profile,
             target=self._targets[self._wish.profile],
+            highest_kbps=max(target.bitrate_kbps for target in self._targets.values()),
             listener=self._listener(),
             key_frame_interval_s=self._settings.encoders.key_frame_interval_s,
         )

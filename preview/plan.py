@@ -41,6 +41,7 @@ class Plan:
         choice: the same for status, with what was wanted.
         profile: in force.
         target: what the profile means.
+        highest_kbps: the largest bit rate of all profiles.
         listener: how it ends.
         key_frame_interval_s: longest distance between key frames.
     """
@@ -50,6 +51,7 @@ class Plan:
     choice: EncoderChoice
     profile: Profile
     target: Target
+    highest_kbps: int
     listener: ListenerPlan
     key_frame_interval_s: float
 

@@ -42,6 +42,7 @@ class Spelling:
         gop: properties for the longest distance between key frames, in frames.
         fixed: low latency, no B-frames, headers with every key frame.
         vbv_ms: property for the size of the rate buffer in ms. Empty: the family has none in that unit.
+        vbv_options: property with options, of which `vbv-maxrate` and `vbv-bufsize` make the rate buffer.
         controls: V4L2 controls, packed into `extra-controls`: control -> "bitrate", "gop" or a number.
         input_caps: what is fed to the element.
         upload: an element that brings frames to where the encoder wants them.
@@ -54,6 +55,7 @@ class Spelling:
     gop: tuple[str, ...] = ("key-int-max",)
     fixed: Mapping[str, str] = field(default_factory=dict)
     vbv_ms: str = ""
+    vbv_options: str = ""
     controls: Mapping[str, str | int] = field(default_factory=dict)
     input_caps: str = "video/x-raw,format=NV12"
     upload: str = ""
@@ -137,12 +139,13 @@ _X264 = Spelling(
     input_caps="video/x-raw,format={ I420, NV12 }",
 )
 _X265 = Spelling(
-    # The element knows no VBV: it comes with the options, and so does all that delays a frame.
+    # The element knows no VBV: it comes with the options, and so does all that may delay a frame.
     fixed={
         "tune": "zerolatency",
         "speed-preset": "ultrafast",
         "option-string": "bframes=0:open-gop=0:repeat-headers=1",
     },
+    vbv_options="option-string",
     input_caps="video/x-raw,format=I420",
     live_bitrate=True,
 )

@@ -101,7 +101,8 @@ def build(encoder: Encoder, target: Target) -> Any:
     except GLib.Error as error:
         raise UserError(error.message) from error
     pipeline.get_by_name("size").set_property("caps", size_caps(encoder, target))
-    settings.configure(pipeline.get_by_name("encoder"), encoder, target.bitrate_kbps, target.fps)
+    kbps = target.bitrate_kbps
+    settings.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
 
 

@@ -11,11 +11,27 @@ _LARGEST_FRAME_KBIT: Final = 448
 receiver would have to wait for the next frame to know that this one has ended."""
 
 
-def configure(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
-    """Sets everything, before the element runs."""
-    for name, value in encoder.spelling.fixed.items():
-        _set(element, name, value)
+def configure(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int, highest_kbps: int) -> None:
+    """Sets everything, before the element runs.
+
+    Args:
+        element: the encoder.
+        encoder: its entry.
+        bitrate_kbps: to begin with.
+        gop_frames: the longest distance between key frames.
+        highest_kbps: what another profile may raise the bit rate to. Options can't be changed while the
+            element runs, and a bit rate above `vbv-maxrate` is cut down to it.
+    """
+    spelling = encoder.spelling
+    for name, value in spelling.fixed.items():
+        more = _vbv_options(highest_kbps) if name == spelling.vbv_options else ""
+        _set(element, name, value + more)
     set_figures(element, encoder, bitrate_kbps, gop_frames)
+
+
+def _vbv_options(highest_kbps: int) -> str:
+    size_kbit = highest_kbps * vbv_ms(highest_kbps) // 1000
+    return f":vbv-maxrate={highest_kbps}:vbv-bufsize={max(1, size_kbit)}"
 
 
 def set_gop(element: Any, encoder: Encoder, gop_frames: int) -> None:

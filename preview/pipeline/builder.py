@@ -17,6 +17,7 @@ from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import settings
 from preview.encoders.chain import chain, size_caps
+from preview.pipeline import square_pixels
 from preview.plan import ListenerPlan, Plan
 from preview.values import Target
 
@@ -80,7 +81,9 @@ def build(plan: Plan) -> Parts:
     if not source.link(body):
         raise UserError(f"{plan.source.label} does not end in raw video", plan.source.remedy)
     parts = _parts(pipeline, source, body)
-    settings.configure(parts.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
+    settings.configure(
+        parts.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, plan.highest_kbps
+    )
     _listen(parts.sink, plan.listener)
     apply_target(parts.dials, plan)
     return parts
@@ -111,6 +114,7 @@ def _source(plan: Plan) -> Any:
     for name, properties in plan.source.properties.items():
         for key, value in properties.items():
             source.get_by_name(name).set_property(key, value)
+    square_pixels.fill_in(source)
     return source
 
 

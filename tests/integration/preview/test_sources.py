@@ -3,6 +3,9 @@
 import importlib.util
 import os
 import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -47,6 +50,19 @@ def clip(seconds: float, path: Path, container: str = "matroskamux") -> Path:
     return path
 
 
+@contextmanager
+def shared_memory(socket: Path, caps: str) -> Iterator[Path]:
+    """A camera of another program, which hands over bytes and says nothing of their form."""
+    command = f"gst-launch-1.0 -q videotestsrc is-live=true ! {caps}"
+    command += f" ! shmsink socket-path={socket} shm-size=4000000 wait-for-connection=false"
+    with subprocess.Popen(command.split(), stdin=subprocess.DEVNULL) as process:
+        try:
+            wait_until(socket.exists, "the shared memory")
+            yield socket
+        finally:
+            process.kill()
+
+
 @pytest.mark.parametrize("container", ["matroskamux", "mp4mux", "mpegtsmux"])
 def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, container: str) -> None:
     film = clip(1.0, tmp_path / 'a film\'s "name".bin', container)
@@ -89,6 +105,29 @@ def test_a_faster_source_is_slowed_down(tmp_path: Path) -> None:
         preview.wish(pb.PROFILE_LOW_BW)
         preview.running()
         preview.wait_for(lambda a: 12 < a.measurement.fps < 18, "the profile's rate")
+
+
+@pytest.mark.parametrize(
+    "description_of",
+    [
+        "shmsrc socket-path={} is-live=true do-timestamp=true ! {}",
+        "shmsrc socket-path={} is-live=true do-timestamp=true ! queue ! {} ! videoflip method=rotate-180",
+        "shmsrc socket-path={} is-live=true do-timestamp=true ! {},pixel-aspect-ratio=4/3",
+    ],
+)
+def test_shared_memory_needs_no_more_words_than_for_gst_launch(tmp_path: Path, description_of: str) -> None:
+    caps = "video/x-raw,format=NV12,width=400,height=300,framerate=30/1"
+    with shared_memory(tmp_path / "camera", caps) as socket:
+        text = description_of.format(socket, caps)
+        few = text.replace("shmsrc", "shmsrc num-buffers=5").split()
+        foreign = ["gst-launch-1.0", "-q", *few, "!", "videoconvert", "!", "fakesink"]
+        subprocess.run(foreign, check=True, timeout=20)
+        with RunningPreview(tmp_path, description(text)) as preview:
+            preview.wish()
+            preview.running()
+            with Watcher(preview.port) as watcher:
+                watcher.wait_for_pictures(10)
+            assert preview.running().counters == pb.Counters(starts=1)
 
 
 @pytest.mark.parametrize(
