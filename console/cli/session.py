@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from common.errors import ExitCode, UserError
-from console.client import GatewayClient, GatewayError
+from console.client import AsyncGatewayClient, GatewayClient, GatewayError
 from console.robots import Robot, choose
 
 # Where nobody looks at columns, lines are left long rather than broken.
@@ -39,6 +39,10 @@ class Session:
     def connect(self) -> GatewayClient:
         """A client for this run, to be used in a `with` block."""
         return GatewayClient(self.target)
+
+    def connect_async(self) -> AsyncGatewayClient:
+        """As `connect`, for the running loop: to be used in an `async with` block."""
+        return AsyncGatewayClient(self.target)
 
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
         """One JSON document, out at once."""

@@ -11,7 +11,7 @@ from console.cli.rows import Row, Tone, status_rows
 from console.cli.words import age
 from console.client.results import Detections, Freshness, OverlaySnapshot, SystemStatus
 
-_STYLES: Final = {Tone.GOOD: "green", Tone.QUIET: "dim", Tone.WARNING: "bold yellow", Tone.BAD: "bold red"}
+STYLES: Final = {Tone.GOOD: "green", Tone.QUIET: "dim", Tone.WARNING: "bold yellow", Tone.BAD: "bold red"}
 
 
 def status_view(status: SystemStatus, target: str) -> RenderableType:
@@ -34,7 +34,7 @@ def rows_table(rows: Iterable[Row]) -> Table:
     table.add_column(justify="right", no_wrap=True, style="dim")
     for row in rows:
         body = "dim" if row.tone is Tone.WARNING and row.mark == "STALE" else ""
-        table.add_row(row.label, Text(row.mark, style=_STYLES[row.tone]), Text(row.text, style=body), row.age)
+        table.add_row(row.label, Text(row.mark, style=STYLES[row.tone]), Text(row.text, style=body), row.age)
     return table
 
 

@@ -5,46 +5,18 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from types import FrameType
-from typing import Any, Protocol
-
-from rich.console import Group, RenderableType
-from rich.live import Live
-from rich.text import Text
+from typing import Any
 
 from console.cli.json_form import json_form
-from console.cli.rows import status_rows
+from console.cli.live.program import watch_on_a_terminal
+from console.cli.look import Look
 from console.cli.session import Session, error_as_json
-from console.cli.tables import headline, rows_table
 from console.cli.watch_line import watch_line
-from console.cli.words import age
-from console.client import DeadlineExceeded, GatewayClient, GatewayError, SystemStatus, Unreachable
+from console.client import DeadlineExceeded, GatewayClient, GatewayError, Unreachable
 
 _MS_PER_S = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """One look at the robot.
-
-    Args:
-        status: the newest that was ever received.
-        trouble: why this look brought nothing new; None when it did.
-        silent_ms: since the newest status came.
-    """
-
-    status: SystemStatus
-    trouble: GatewayError | None
-    silent_ms: int
-
-
-class Screen(Protocol):
-    """Where looks are shown."""
-
-    def show(self, look: Look) -> None:
-        """Shows one look."""
 
 
 def watch_until_stopped(session: Session, interval_s: float, count: int | None) -> None:
@@ -53,8 +25,12 @@ def watch_until_stopped(session: Session, interval_s: float, count: int | None) 
     Raises:
         GatewayError: the very first look failed. Later the robot may come and go: that is shown.
     """
+    if session.out.is_terminal and not session.as_json:
+        watch_on_a_terminal(session, interval_s, count)
+        return
     stop = threading.Event()
-    with _signals_set(stop), session.connect() as robot, _screen(session, robot.target) as screen:
+    screen = _JsonLines(session) if session.as_json else _Lines(session)
+    with _signals_set(stop), session.connect() as robot:
         for number, look in enumerate(_looks(robot, interval_s, stop), start=1):
             screen.show(look)
             if number == count:
@@ -90,37 +66,6 @@ def _signals_set(stop: threading.Event) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def _screen(session: Session, target: str) -> Iterator[Screen]:
-    if session.as_json:
-        yield _JsonLines(session)
-    elif session.out.is_terminal:
-        with Live(console=session.out, auto_refresh=False, vertical_overflow="crop") as live:
-            yield _LiveTable(live, target)
-    else:
-        yield _Lines(session)
-
-
-class _LiveTable:
-    """Redraws one table in place."""
-
-    def __init__(self, live: Live, target: str) -> None:
-        self._live = live
-        self._target = target
-
-    def show(self, look: Look) -> None:
-        self._live.update(self._view(look), refresh=True)
-
-    def _view(self, look: Look) -> RenderableType:
-        head = headline(look.status, self._target)
-        if look.trouble is None:
-            note = Text("Ctrl-C ends", style="dim")
-        else:
-            old = f"NO ANSWER, the values below are {age(look.silent_ms)} old"
-            note = Text.assemble((old, "bold red"), f" - {look.trouble.what}")
-        return Group(head, note, Text(), rows_table(status_rows(look.status)))
 
 
 class _Lines:

@@ -10,9 +10,10 @@ ENDS_WITHIN_S = 60.0
 
 
 def environment(**extra: str) -> dict[str, str]:
-    """This one without what would change how robotctl behaves."""
-    dropped = {"ROBOTCTL_TARGET", "NO_COLOR", "FORCE_COLOR", "COLUMNS", "TERM"}
-    return {name: value for name, value in os.environ.items() if name not in dropped} | extra
+    """This one without settings and known robots that would change how robotctl behaves."""
+    dropped = {"ROBOTCTL_TARGET", "ROBOTCTL_ROBOT", "NO_COLOR", "FORCE_COLOR", "COLUMNS", "LINES", "TERM"}
+    kept = {name: value for name, value in os.environ.items() if name not in dropped}
+    return kept | {"XDG_CONFIG_HOME": "/nonexistent"} | extra
 
 
 def robotctl(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":

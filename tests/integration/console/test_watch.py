@@ -1,10 +1,7 @@
 """robotctl watch, on a terminal and in a pipe, while the robot comes and goes."""
 
 import json
-import os
-import pty
 import re
-import select
 import signal
 import subprocess
 import threading
@@ -18,7 +15,7 @@ import pytest
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment
-from tests.support.terminal import seen
+from tests.support.terminal import robotctl_on_terminal, seen
 from tests.support.waiting import wait_until
 
 SHOW_CURSOR, HIDE_CURSOR = "\x1b[?25h", "\x1b[?25l"
@@ -28,59 +25,6 @@ COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 @pytest.fixture
 def double() -> GatewayDouble:
     return GatewayDouble()
-
-
-class Terminal:
-    """robotctl on a terminal of 100 columns; everything it drew is kept."""
-
-    def __init__(self, *words: str, **extra: str) -> None:
-        self.drawn = ""
-        self._master, slave = pty.openpty()
-        os.set_blocking(self._master, False)
-        self.process = subprocess.Popen(
-            # setsid makes this its controlling terminal: Ctrl-C arrives as it does in a shell.
-            ["setsid", "--ctty", str(ROBOTCTL), *words],
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
-            env=environment(TERM="xterm-256color", COLUMNS="100", LINES="40", **extra),
-        )
-        os.close(slave)
-
-    def read(self) -> str:
-        """What it drew so far."""
-        while select.select([self._master], [], [], 0)[0]:
-            try:
-                data = os.read(self._master, 65536)
-            except OSError:  # the other end is closed
-                break
-            if not data:
-                break
-            self.drawn += data.decode()
-        return self.drawn
-
-    def wait_for(self, text: str) -> None:
-        """Waits until it drew this."""
-        wait_until(lambda: text in self.read(), f"{text!r} is on the screen", 30)
-
-    def press(self, keys: str) -> None:
-        """As typed."""
-        os.write(self._master, keys.encode())
-
-    def close(self) -> None:
-        """Ends it if it still runs."""
-        self.process.kill()
-        self.process.wait()
-        os.close(self._master)
-
-
-@contextmanager
-def terminal(*words: str, **extra: str) -> Iterator[Terminal]:
-    screen = Terminal(*words, **extra)
-    try:
-        yield screen
-    finally:
-        screen.close()
 
 
 class Lines:
@@ -128,7 +72,7 @@ def lines(*words: str) -> Iterator[Lines]:
 def test_a_terminal_is_redrawn_in_place(double: GatewayDouble) -> None:
     with (
         serving(double) as port,
-        terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
+        robotctl_on_terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
     ):
         screen.wait_for("robot healthy")
         double.status.health.measured_vx_mps = double.status.health.linear_speed_mps = 1.25
@@ -142,7 +86,7 @@ def test_a_terminal_is_redrawn_in_place(double: GatewayDouble) -> None:
 
 @pytest.mark.parametrize("how", ["ctrl-c", "SIGTERM"])
 def test_it_ends_0_and_leaves_the_terminal_as_it_was(double: GatewayDouble, how: str) -> None:
-    with serving(double) as port, terminal("watch", "--target", f"127.0.0.1:{port}") as screen:
+    with serving(double) as port, robotctl_on_terminal("watch", "--target", f"127.0.0.1:{port}") as screen:
         screen.wait_for("robot healthy")
         if how == "ctrl-c":
             screen.press("\x03")
@@ -157,7 +101,9 @@ def test_it_ends_0_and_leaves_the_terminal_as_it_was(double: GatewayDouble, how:
 def test_no_color_is_respected_on_a_terminal(double: GatewayDouble) -> None:
     with (
         serving(double) as port,
-        terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}", NO_COLOR="1") as screen,
+        robotctl_on_terminal(
+            "watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}", extra={"NO_COLOR": "1"}
+        ) as screen,
     ):
         double.status.vision.stale, double.status.vision.age_ms = True, 3400
         screen.wait_for("STALE")
@@ -170,14 +116,13 @@ def test_no_color_is_respected_on_a_terminal(double: GatewayDouble) -> None:
 def test_a_robot_that_goes_is_told_with_the_age_of_what_is_shown(double: GatewayDouble) -> None:
     with (
         serving(double) as port,
-        terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
+        robotctl_on_terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
     ):
         screen.wait_for("robot healthy")
         double.hold.clear()
         screen.wait_for("NO ANSWER, the values below are")
-        before = len(screen.drawn)
         double.hold.set()
-        wait_until(lambda: "Ctrl-C ends" in screen.read()[before:], "the robot is back", 30)
+        wait_until(lambda: not any("NO ANSWER" in line for line in screen.lines()), "the robot is back", 30)
 
 
 def test_a_pipe_gets_one_line_per_look(double: GatewayDouble) -> None:
