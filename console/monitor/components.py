@@ -54,11 +54,10 @@ def components(state: MonitorState, now_s: float) -> list[Component]:
         return []
     lines = _Lines(state.silent_ms(now_s), state.outdated(now_s))
     status = state.snapshot.status
-    named = {"odometry", "vision", "detections", "battery"}
     return [
         *lines.always(state.snapshot),
         *lines.where_there_is_something(status),
-        *(lines.source(source) for source in status.sources if _worth_a_line(source, named)),
+        *(lines.source(source) for source in status.sources if _worth_a_line(source)),
     ]
 
 
@@ -98,7 +97,9 @@ class _Lines:
 
     def source(self, source: Source) -> Component:
         tone = Tone.WARNING if source.required else Tone.QUIET
-        return Component(source.name.capitalize(), "no data", tone, source.detail, self._age(source))
+        return Component(
+            source.name.replace("_", " ").capitalize(), "no data", tone, source.detail, self._age(source)
+        )
 
     def _of(self, name: str, sample: Sample, values: str) -> Component:
         freshness = sample.freshness
@@ -116,10 +117,9 @@ def _unbroken(values: str) -> str:
     return ", ".join(part.replace(" ", "\u00a0") for part in values.split(", "))
 
 
-def _worth_a_line(source: Source, named: set[str]) -> bool:
-    quiet = source.state in (SourceState.RECEIVING, SourceState.STALE, SourceState.WAITING)
-    # What simply does not come is said by its own line; why it can't come is said by no other.
-    return not quiet or (source.required and source.state is SourceState.WAITING and source.name not in named)
+def _worth_a_line(source: Source) -> bool:
+    """Whether nothing can come of it, which no other line says; that nothing comes, the others do say."""
+    return source.state in (SourceState.QOS_MISMATCH, SourceState.WRONG_TYPE, SourceState.TYPE_MISSING)
 
 
 def _motion(odometry: Odometry) -> str:
@@ -151,7 +151,7 @@ def _command(command: EffectiveCommand) -> str:
     return joined(
         command.active_source or "unknown",
         f"{signed(command.vx_mps)} m/s",
-        f"turning {signed(command.wz_rad_s)} rad/s",
+        f"{signed(command.wz_rad_s)} rad/s",
     )
 
 

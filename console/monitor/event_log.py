@@ -1,28 +1,13 @@
-"""What is new among the events that each snapshot lists."""
+"""What is new among the events that each snapshot lists: for gateways that can't stream them."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from console.client import OverlaySnapshot
 from console.client.results import OperatorEvent
+from console.monitor.event_lines import EventLine
 
 _MS_PER_S = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class LoggedEvent:
-    """One line of the log.
-
-    Args:
-        at_s: when it happened, on this computer's calendar clock, in seconds since 1970.
-        message: what happened.
-        own: whether the monitor says so, not the robot.
-    """
-
-    at_s: float
-    message: str
-    own: bool = False
 
 
 class EventLog:
@@ -37,9 +22,9 @@ class EventLog:
         self._last = 0
         self._speaker: tuple[str | None, int] | None = None
 
-    def news(self, snapshot: OverlaySnapshot) -> list[LoggedEvent]:
+    def news(self, snapshot: OverlaySnapshot) -> list[EventLine]:
         """The lines that this snapshot adds, oldest first."""
-        lines: list[LoggedEvent] = []
+        lines: list[EventLine] = []
         if self._another_gateway(snapshot):
             self._last = 0
             lines.append(self._own("The gateway was started again: its events begin anew"))
@@ -65,8 +50,8 @@ class EventLog:
         # Numbers that run backwards tell it of a gateway that does not tell its uptime.
         return boot_id != gateway.boot_id or (gateway.uptime_ms or 0) < up_ms or newest < self._last
 
-    def _own(self, message: str) -> LoggedEvent:
-        return LoggedEvent(self._clock(), message, own=True)
+    def _own(self, message: str) -> EventLine:
+        return EventLine(self._clock(), message, own=True)
 
-    def _logged(self, event: OperatorEvent) -> LoggedEvent:
-        return LoggedEvent(self._clock() - event.age_ms / _MS_PER_S, event.message)
+    def _logged(self, event: OperatorEvent) -> EventLine:
+        return EventLine(self._clock() - event.age_ms / _MS_PER_S, event.message)

@@ -6,7 +6,16 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from console.client import OverlaySnapshot, PreviewChange, PreviewProfile
+from console.client import (
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    Outage,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+)
 
 _MS_PER_S = 1000
 
@@ -16,6 +25,11 @@ class Robot(Protocol):
 
     async def overlay(self) -> OverlaySnapshot:
         """Status, detections and the newest events."""
+
+    def events(
+        self, after: EventPosition | None = ...
+    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        """What happens, each event once."""
 
     async def enable_preview(
         self, profile: PreviewProfile = ..., *, settle_within_s: float = ...

@@ -32,7 +32,7 @@ class Metric:
 
 
 METRICS: Final = (
-    Metric("Video rate", "fps", 0, 30),
+    Metric("Video rate", "fps", 0, 40),
     Metric("Video bit rate", "kbit/s", 0, 1000),
     Metric("Video round trip", "ms", 0, 20, digits=1),
     Metric("CPU load", "%", 0, 100),
@@ -79,7 +79,7 @@ def top_of_scale(metric: Metric, series: Sequence[float | None]) -> float:
         return metric.top
     step = 1.0
     while True:
-        for digit in (1, 2, 2.5, 5):
+        for digit in (1, 1.5, 2, 3, 4, 5, 6, 8):
             if step * digit >= highest:
                 return step * digit
         step *= 10

@@ -98,7 +98,8 @@ def _summary(preview: PreviewStatus) -> str:
     encoder, video = preview.encoder, preview.video
     return joined(
         f"{video.width_px}x{video.height_px} at {video.fps:g} fps" if video else "",
-        f"{encoder.name} ({'hardware' if encoder.hardware else 'software'})" if encoder else "",
+        encoder.name if encoder else "",
+        "in hardware" if encoder and encoder.hardware else "",
     )
 
 

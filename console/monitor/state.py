@@ -1,8 +1,9 @@
 """Everything the window is drawn from, as one frozen value that a thread can hand to another."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from console.client import GatewayError, OverlaySnapshot, PreviewChange, PreviewProfile
+from console.monitor.event_lines import EventTrail
 from console.monitor.link import Link, Phase
 
 _MS_PER_S = 1000
@@ -47,12 +48,14 @@ class MonitorState:
         snapshot: the newest that came; None before the first.
         received_s: when it came, on the monotonic clock.
         request: the newest wish; None before the first.
+        events: what happened.
     """
 
     link: Link
     snapshot: OverlaySnapshot | None = None
     received_s: float = 0.0
     request: Request | None = None
+    events: EventTrail = field(default_factory=EventTrail)
 
     def silent_ms(self, now_s: float) -> int:
         """How long ago the snapshot came; to be added to the ages in it."""

@@ -12,10 +12,15 @@ from console.client import (
     AsyncGatewayClient,
     Backoff,
     ClientOptions,
+    EventPosition,
     GatewayError,
     GatewayFailed,
+    Outage,
+    Unsupported,
     parse_target,
 )
+from console.monitor.event_lines import line_of
+from console.monitor.event_log import EventLog
 from console.monitor.feed import Feed, PollingFeed, Reading, Robot, pause
 from console.monitor.link import Link, Phase
 from console.monitor.state import MonitorState, Request, Wish
@@ -56,6 +61,7 @@ class Worker:
         self._state = MonitorState(Link(phase=Phase.CONNECTING, since_s=time.monotonic()))
         self._thread = threading.Thread(target=self._run, name="gateway-worker", daemon=True)
         self._loop = asyncio.new_event_loop()
+        self._event_log: EventLog | None = None
         self._closing = asyncio.Event()
         self._retry_now = asyncio.Event()
         self._wished = asyncio.Event()
@@ -109,7 +115,12 @@ class Worker:
             feed = PollingFeed(robot, EVERY_S)
             tasks = [
                 asyncio.create_task(work)
-                for work in (self._follow(feed), self._serve(robot, feed), self._closing.wait())
+                for work in (
+                    self._follow(feed),
+                    self._serve(robot, feed),
+                    self._listen(robot),
+                    self._closing.wait(),
+                )
             ]
             try:
                 done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -138,7 +149,10 @@ class Worker:
         now_s, link = time.monotonic(), self._state.link
         since_s = link.since_s if link.phase is Phase.CONNECTED else now_s
         link = Link(phase=Phase.CONNECTED, since_s=since_s, answer_ms=reading.answer_ms)
-        self._tell(replace(self._state, link=link, snapshot=reading.snapshot, received_s=now_s))
+        heard = replace(self._state, link=link, snapshot=reading.snapshot, received_s=now_s)
+        if self._event_log:
+            heard = replace(heard, events=heard.events.with_lines(self._event_log.news(reading.snapshot)))
+        self._tell(heard)
 
     def _lost(self, trouble: GatewayError, pause_s: float) -> None:
         before = self._state.link
@@ -174,6 +188,25 @@ class Worker:
                 done = replace(request, outcome=outcome, ended_s=time.monotonic())
             self._tell(replace(self._state, request=done))
             feed.hurry()
+
+    async def _listen(self, robot: Robot) -> None:
+        position: EventPosition | None = None
+        pauses = self._retry.pauses()
+        while not self._closing.is_set():
+            try:
+                async for item in robot.events(position):
+                    if not isinstance(item, Outage):
+                        position, pauses = item.position, self._retry.pauses()
+                    line = line_of(item, time.time())
+                    if line:
+                        self._tell(replace(self._state, events=self._state.events.with_lines([line])))
+            except Unsupported:
+                # An older gateway: what happened is taken from the snapshots.
+                self._event_log = EventLog()
+                await self._closing.wait()
+            except GatewayError:
+                # Why there is no connection is told by who follows the robot; here it is only tried again.
+                await pause(next(pauses), self._closing)
 
     def _tell(self, state: MonitorState) -> None:
         self._state = state

@@ -6,12 +6,10 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
-from console.client import OverlaySnapshot
-from console.monitor.event_log import EventLog
+from console.cli.rows import Tone
+from console.monitor.event_lines import KEPT, EventLine, EventTrail
 
-KEPT: Final = 200
-"""Older lines go."""
-_LINES_SHOWN = 7
+_LINES_SHOWN: Final = 8
 
 
 class EventList(QListWidget):
@@ -19,28 +17,33 @@ class EventList(QListWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._log = EventLog()
+        self._shown = 0
         self.setWordWrap(True)
         self.setAccessibleName("Events")
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QListWidget.ScrollMode.ScrollPerPixel)
         self.setMinimumHeight(3 * self.fontMetrics().lineSpacing())
-        self.setMaximumHeight((_LINES_SHOWN + 1) * self.fontMetrics().lineSpacing())
+        self.setMaximumHeight(_LINES_SHOWN * self.fontMetrics().lineSpacing() + 2 * self.frameWidth())
 
     @property
     def lines(self) -> list[str]:
         """What is listed, newest first."""
         return [self.item(row).text() for row in range(self.count())]
 
-    def add(self, snapshot: OverlaySnapshot) -> None:
-        """Adds what is new in the snapshot."""
-        for event in self._log.news(snapshot):
-            at = datetime.fromtimestamp(event.at_s).astimezone().strftime("%H:%M:%S")
-            item = QListWidgetItem(f"{at}  {event.message}")
-            if event.own:
-                font = item.font()
-                font.setItalic(True)
-                item.setFont(font)
-            self.insertItem(0, item)
+    def show_trail(self, trail: EventTrail) -> None:
+        """Adds what it does not show yet."""
+        for event in trail.since(self._shown):
+            self.insertItem(0, _item(event))
+        self._shown = trail.count
         while self.count() > KEPT:
             self.takeItem(self.count() - 1)
+
+
+def _item(event: EventLine) -> QListWidgetItem:
+    at = datetime.fromtimestamp(event.at_s).astimezone().strftime("%H:%M:%S")
+    item = QListWidgetItem(f"{at}  {event.text}")
+    font = item.font()
+    font.setItalic(event.own)
+    font.setBold(event.tone in (Tone.WARNING, Tone.BAD))
+    item.setFont(font)
+    return item

@@ -19,10 +19,11 @@ from console.window.plot import Plots
 from console.window.preview_panel import PreviewPanel
 from console.window.remembered import Remembered
 from console.window.side_panel import SidePanel
+from console.window.video_view import VideoView
 
 _TICK_MS = 500
-_SMALLEST_PICTURE = (320, 180)
 _FIRST_SIZE = (1280, 800)
+_HANDLE_PX = 10
 _FIRST_DIVISION = (790, 490)
 
 
@@ -51,7 +52,7 @@ class MonitorWindow(QWidget):
         remembered: place and size.
     """
 
-    def __init__(self, robot: Robot, news: News, video: QWidget, remembered: Remembered) -> None:
+    def __init__(self, robot: Robot, news: News, video: VideoView, remembered: Remembered) -> None:
         super().__init__()
         self._robot = robot
         self._remembered = remembered
@@ -64,7 +65,6 @@ class MonitorWindow(QWidget):
         self._lay_out()
         self._connect(news)
         self.setWindowTitle(f"Robot {robot.target}")
-        video.setMinimumSize(*_SMALLEST_PICTURE)
         self.resize(*_FIRST_SIZE)
         remembered.restore(self, self.splitter)
         self.refresh()
@@ -94,6 +94,7 @@ class MonitorWindow(QWidget):
         self.splitter.addWidget(left)
         self.splitter.addWidget(self.side)
         self.splitter.setChildrenCollapsible(False)
+        self.splitter.setHandleWidth(_HANDLE_PX)
         # A larger window gives its room to the picture.
         self.splitter.setStretchFactor(0, 1)
         self.splitter.setStretchFactor(1, 0)

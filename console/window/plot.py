@@ -6,10 +6,10 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from console.cli.words import UNKNOWN
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
 from console.window.look import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
 
+NO_DATA = "no data"
 _MARGIN = 6
 _FILL = 0.18
 _SMALL = 0.85
@@ -33,7 +33,7 @@ class Plot(QWidget):
     def value_text(self) -> str:
         """The newest value, with its unit."""
         newest = self._series[-1] if self._series else None
-        return UNKNOWN if newest is None else f"{newest:.{self._metric.digits}f} {self._metric.unit}"
+        return NO_DATA if newest is None else f"{newest:.{self._metric.digits}f} {self._metric.unit}"
 
     def show_series(self, series: list[float | None]) -> None:
         """Shows these values, the newest last."""

@@ -1,7 +1,7 @@
 """The preview's controls below the picture: on and off, three profiles, what the robot answers."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QApplication, QButtonGroup, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from console.cli.rows import Tone
 from console.client import PreviewProfile
@@ -36,6 +36,7 @@ class NoteLine(TintedLine):
         self.show_tone(item.tone)
         self.marker.show_blank(not item.text)
         set_text(self.text, item.text)
+        self.text.setToolTip(item.text)
 
 
 class PreviewPanel(QWidget):
@@ -93,7 +94,6 @@ class PreviewPanel(QWidget):
         return button
 
     def _lay_out(self) -> None:
-        group = QButtonGroup(self)
         row = QHBoxLayout()
         row.setSpacing(6)
         row.addWidget(word_label("Preview"))
@@ -101,7 +101,6 @@ class PreviewPanel(QWidget):
         row.addWidget(self.switch)
         row.addSpacing(8)
         for button in self.profiles.values():
-            group.addButton(button)
             row.addWidget(button)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

@@ -30,9 +30,9 @@ class SidePanel(QWidget):
         self.events = EventList()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._scrolled(), 1)
+        layout.addWidget(self._scrolled(), 4)
         layout.addWidget(_heading("Events"))
-        layout.addWidget(self.events)
+        layout.addWidget(self.events, 1)
 
     def show_state(self, state: MonitorState, now_s: float) -> None:
         """Shows the newest."""
@@ -44,8 +44,7 @@ class SidePanel(QWidget):
             since = f", as heard {age(state.silent_ms(now_s))} ago"
         set_text(self.faults_title, f"Faults{since}")
         set_text(self.status_title, f"Status{since}")
-        if state.snapshot:
-            self.events.add(state.snapshot)
+        self.events.show_trail(state.events)
 
     def _scrolled(self) -> QScrollArea:
         inner = QWidget()

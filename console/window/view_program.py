@@ -36,7 +36,8 @@ def run_view(target: str, recording: Recording | None) -> Account:
     books = Bookkeeper()
     with application("Robot view") as app, viewing(target, recording, books) as now:
         app.exec()
-        return books.account(now.session.figures().redials, recording)
+    # Only now is the recording complete.
+    return books.account(now.session.figures().redials, recording)
 
 
 @contextmanager

@@ -1,0 +1,234 @@
+"""The window under an operator's hands: clicks, keys, refusals; behind it a gateway that the test plays."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
+
+from console.client import PreviewProfile
+from console.window.monitor_window import MonitorWindow
+from console.window.preview_panel import PreviewPanel
+from console.window.program import monitor
+from omniseer.gateway.v1 import preview_pb2
+from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.qt import keep_picture, let_pass, until
+
+LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
+CLOSES_WITHIN_S = 2.0
+
+
+@dataclass
+class Desk:
+    """The window, and the gateway it talks to."""
+
+    window: MonitorWindow
+    gateway: GatewayDouble
+
+    @property
+    def preview(self) -> PreviewPanel:
+        return self.window.preview
+
+    def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        QTest.keyClick(QApplication.focusWidget() or self.window, key, modifier)
+
+    def click(self, button: QPushButton) -> None:
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def free(self) -> None:
+        """Waits until the controls may be touched."""
+        until(self.preview.switch.isEnabled, "the controls may be touched")
+
+    def state_is(self, word: str) -> None:
+        until(lambda: self.preview.state.word.text() == word, f"the preview is shown as {word}")
+
+    def notes(self) -> list[str]:
+        return [line.text.text() for line in self.preview.notes.shown if line.text.text()]
+
+
+@pytest.fixture
+def desk_work(desk: None) -> Iterator[Desk]:
+    gateway = GatewayDouble()
+    with serving(gateway) as port, monitor(f"127.0.0.1:{port}") as window:
+        window.activateWindow()
+        made = Desk(window, gateway)
+        made.free()
+        yield made
+        gateway.hold.set()
+
+
+def test_a_click_turns_the_preview_on_and_off(desk_work: Desk) -> None:
+    desk_work.click(desk_work.preview.switch)
+    desk_work.state_is("RUNNING")
+    assert desk_work.preview.switch.text() == "&Stop preview"
+    desk_work.free()
+    desk_work.click(desk_work.preview.switch)
+    desk_work.state_is("DISABLED")
+    assert [wish.enabled for wish in desk_work.gateway.wishes] == [True, False]
+
+
+def test_keys_do_the_same(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_P)
+    desk_work.state_is("RUNNING")
+    for key, profile in (
+        (Qt.Key.Key_1, preview_pb2.PREVIEW_PROFILE_LOW_BW),
+        (Qt.Key.Key_3, preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY),
+        (Qt.Key.Key_2, preview_pb2.PREVIEW_PROFILE_BALANCED),
+    ):
+        desk_work.free()
+        desk_work.press(key)
+        until(
+            lambda wanted=profile: desk_work.gateway.wishes[-1].profile == wanted, "the profile is asked for"
+        )
+    desk_work.free()
+    desk_work.press(Qt.Key.Key_P)
+    desk_work.state_is("DISABLED")
+
+
+def test_while_it_is_off_a_profile_is_marked_and_taken_by_the_next_start(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_3)
+    until(desk_work.preview.profiles[HIGH].isChecked, "the mark is shown")
+    let_pass(0.5)
+    assert desk_work.preview.profiles[HIGH].isChecked(), "the robot's next answer takes the mark away"
+    assert not desk_work.gateway.wishes
+    desk_work.press(Qt.Key.Key_P)
+    desk_work.state_is("RUNNING")
+    assert desk_work.gateway.wishes[-1].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
+
+
+def test_a_refusal_is_shown_in_the_robots_words(desk_work: Desk) -> None:
+    desk_work.gateway.accept = False
+    desk_work.click(desk_work.preview.switch)
+    until(lambda: desk_work.notes() == ["The robot refused: the robot is being serviced"], "the refusal")
+    assert desk_work.preview.switch.isEnabled()
+    keep_picture(desk_work.window, "refused")
+
+
+def test_a_fault_is_shown_with_what_to_do(desk_work: Desk) -> None:
+    desk_work.gateway.works = False
+    desk_work.click(desk_work.preview.switch)
+    desk_work.state_is("FAULTED")
+    assert desk_work.notes() == ["no encoder works. Type: robot-preview encoders"]
+
+
+def test_while_the_robot_thinks_nothing_can_be_pressed_and_the_focus_comes_back(desk_work: Desk) -> None:
+    button = desk_work.preview.profiles[BALANCED]
+    desk_work.click(desk_work.preview.switch)
+    desk_work.state_is("RUNNING")
+    desk_work.free()
+    button.setFocus()
+    desk_work.gateway.hold.clear()
+    desk_work.press(Qt.Key.Key_Space)
+    until(lambda: not desk_work.preview.switch.isEnabled(), "the controls are locked")
+    assert not any(each.isEnabled() for each in desk_work.preview.profiles.values())
+    asked = len(desk_work.gateway.wishes)
+    QTest.keyClick(desk_work.window, Qt.Key.Key_P)
+    desk_work.gateway.hold.set()
+    desk_work.free()
+    assert button.hasFocus()
+    assert len(desk_work.gateway.wishes) <= asked + 1, "a key pressed meanwhile asks for nothing"
+
+
+def test_everything_is_reached_by_the_keyboard(desk_work: Desk) -> None:
+    reached: list[QWidget] = []
+    desk_work.preview.switch.setFocus()
+    for _ in range(20):
+        focus = QApplication.focusWidget()
+        assert focus
+        if focus in reached:
+            break
+        reached.append(focus)
+        desk_work.press(Qt.Key.Key_Tab)
+    buttons = [desk_work.preview.switch, *desk_work.preview.profiles.values()]
+    assert reached[: len(buttons)] == buttons
+    assert desk_work.window.side.events in reached
+
+
+def test_mnemonics_press_the_buttons(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_S, Qt.KeyboardModifier.AltModifier)
+    desk_work.state_is("RUNNING")
+    desk_work.free()
+    desk_work.press(Qt.Key.Key_L, Qt.KeyboardModifier.AltModifier)
+    until(
+        lambda: desk_work.gateway.wishes[-1].profile == preview_pb2.PREVIEW_PROFILE_LOW_BW,
+        "low bandwidth is asked",
+    )
+
+
+def test_full_screen_and_back(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_F11)
+    until(desk_work.window.isFullScreen, "the whole screen")
+    desk_work.press(Qt.Key.Key_Escape)
+    until(lambda: not desk_work.window.isFullScreen(), "a window again")
+    desk_work.press(Qt.Key.Key_F11)
+    until(desk_work.window.isFullScreen, "the whole screen again")
+    desk_work.press(Qt.Key.Key_F11)
+    until(lambda: not desk_work.window.isFullScreen(), "a window again")
+
+
+def test_q_closes(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_Q)
+    until(lambda: not desk_work.window.isVisible(), "the window is closed")
+
+
+def test_a_gateway_that_hangs_is_told_and_the_window_lives_on(desk_work: Desk) -> None:
+    desk_work.gateway.hold.clear()
+    until(lambda: desk_work.window.header.link.word.text() == "unreachable", "the silence is noticed")
+    assert desk_work.window.banner.isVisible()
+    assert not desk_work.preview.switch.isEnabled()
+    desk_work.press(Qt.Key.Key_F11)
+    until(desk_work.window.isFullScreen, "the window still does what it is told")
+    desk_work.gateway.hold.set()
+    desk_work.click(desk_work.window.banner.button)
+    desk_work.free()
+    assert not desk_work.window.banner.isVisible()
+
+
+def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
+    gateway = GatewayDouble()
+    with serving(gateway) as port:
+        with monitor(f"127.0.0.1:{port}") as window:
+            until(window.preview.switch.isEnabled, "it is connected")
+            gateway.hold.clear()
+            QTest.keyClick(window, Qt.Key.Key_P)
+            until(lambda: not window.preview.switch.isEnabled(), "a request is on its way")
+            window.close()
+            closed_s = time.monotonic()
+        assert time.monotonic() - closed_s < CLOSES_WITHIN_S
+        gateway.hold.set()
+
+
+def test_what_the_robot_says_is_never_markup(desk_work: Desk) -> None:
+    text = "<h1>low</h1><img src='x'>"
+    desk_work.gateway.status.faults.add(
+        id="x", severity=3, component="<b>battery</b>", message=text, remedy="<a href='x'>y</a>", active=True
+    )
+    faults = desk_work.window.side.faults
+    until(lambda: text in faults.shown[0].message.text(), "the fault")  # type: ignore[attr-defined]
+    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText  # type: ignore[attr-defined]
+
+
+def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:
+    before = desk_work.window.size()
+    for number in range(100):
+        desk_work.gateway.status.faults.add(
+            id=str(number),
+            severity=2,
+            component="lidar",
+            message="word " * 60,
+            remedy="do " * 60,
+            active=True,
+        )
+    desk_work.gateway.status.preview.state = states.PREVIEW_FAULTED
+    desk_work.gateway.status.preview.last_error = "reason " * 80
+    until(lambda: len(desk_work.window.side.faults.shown) == 100, "all of them")
+    let_pass(0.3)
+    assert desk_work.window.size() == before
+    assert desk_work.window.video.height() >= 180
+    keep_picture(desk_work.window, "hundred-faults")
+    del desk_work.gateway.status.faults[:]
+    until(lambda: len(desk_work.window.side.faults.shown) == 1, "they are over")

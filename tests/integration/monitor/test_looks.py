@@ -1,0 +1,162 @@
+"""Readable in light and dark, told apart without colours, as large as a small laptop's screen allows."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QColor, QImage, QPainter, QPalette
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
+
+from console.cli.rows import Tone
+from console.window.labels import ElidedLabel, WrappedLabel
+from console.window.lines import TintedLine
+from console.window.look import draw_shape
+from console.window.monitor_window import MonitorWindow
+from console.window.program import monitor
+from console.window.remembered import Remembered
+from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until
+from tests.support.snapshots import event
+
+READABLE = 4.5
+"""Contrast that the Web Content Accessibility Guidelines ask of text (level AA)."""
+SMALL_LAPTOP = (1366, 768)
+
+
+def troubled() -> GatewayDouble:
+    """Something of every tone."""
+    made = GatewayDouble()
+    made.status.vision.stale, made.status.vision.age_ms = True, 3400
+    made.status.faults.add(
+        id="a", severity=3, component="odometry", message="stopped", remedy="Look", active=True, age_ms=2000
+    )
+    made.status.faults.add(
+        id="b", severity=2, component="disk", message="nearly full", active=True, age_ms=2000
+    )
+    made.status.faults.add(id="c", component="battery", message="low", active=False, cleared_age_ms=5000)
+    made.status.preview.last_error = "the camera was busy"
+    made.overlay.events.append(event(1, "preview running, BALANCED"))
+    return made
+
+
+@pytest.fixture
+def window(desk: None) -> Iterator[MonitorWindow]:
+    with serving(troubled()) as port, monitor(f"127.0.0.1:{port}") as made:
+        until(lambda: len(made.side.faults.shown) == 3, "everything is shown")
+        yield made
+
+
+def brightness(colour: QColor) -> float:
+    """Relative luminance, as WCAG defines it."""
+    parts = [colour.redF(), colour.greenF(), colour.blueF()]
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one: QColor, other: QColor) -> float:
+    light, dark = sorted((brightness(one), brightness(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def ground_of(widget: QWidget) -> QColor:
+    """What is behind a label: its tinted line, or the window."""
+    parent = widget.parentWidget()
+    while parent and not isinstance(parent, TintedLine):
+        parent = parent.parentWidget()
+    return (parent or widget).palette().color(QPalette.ColorRole.Window)
+
+
+@pytest.mark.parametrize(("name", "ground"), [("light", LIGHT), ("dark", DARK)])
+def test_every_text_is_readable(window: MonitorWindow, name: str, ground: QColor) -> None:
+    in_colours(ground)
+    let_pass(0.3)
+    keep_picture(window, f"colours-{name}")
+    labels = [each for each in window.findChildren(QLabel) if each.text() and each.isVisible()]
+    assert len(labels) > 30
+    for label in labels:
+        ratio = contrast(label.palette().color(label.foregroundRole()), ground_of(label))
+        assert ratio >= READABLE, f"'{label.text()}' on {ground_of(label).name()}: {ratio:.1f}"
+
+
+def test_a_desktop_that_turns_dark_takes_the_window_along(window: MonitorWindow) -> None:
+    line = window.side.faults.shown[0]
+    assert isinstance(line, TintedLine)
+    bright = brightness(line.palette().color(QPalette.ColorRole.Window))
+    in_colours(DARK)
+    until(lambda: brightness(line.palette().color(QPalette.ColorRole.Window)) < bright / 4, "a dark line")
+
+
+def drawn(tone: Tone) -> QImage:
+    image = QImage(32, 32, QImage.Format.Format_RGB32)
+    image.fill(LIGHT)
+    painter = QPainter(image)
+    draw_shape(painter, QRectF(2, 2, 28, 28), tone, QApplication.palette())
+    painter.end()
+    return image.convertToFormat(QImage.Format.Format_Grayscale8)
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations(Tone, 2)))
+def test_shapes_differ_without_any_colour(desk: None, one: Tone, other: Tone) -> None:
+    first, second = drawn(one), drawn(other)
+    differing = sum(
+        abs(QColor(first.pixel(x, y)).red() - QColor(second.pixel(x, y)).red()) > 60
+        for x in range(32)
+        for y in range(32)
+    )
+    assert differing > 90, f"only {differing} of 1024 pixels tell {one} from {other}"
+
+
+def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) -> None:
+    smallest = window.minimumSizeHint()
+    assert smallest.width() <= SMALL_LAPTOP[0]
+    assert smallest.height() <= SMALL_LAPTOP[1]
+    window.resize(smallest)
+    let_pass(0.3)
+    keep_picture(window, "smallest")
+    for word in (*window.findChildren(QPushButton), *window.findChildren(QLabel)):
+        gives_way = isinstance(word, ElidedLabel | WrappedLabel)
+        if word.isVisible() and word.text() and not gives_way:
+            assert word.width() >= word.sizeHint().width(), f"'{word.text()}' is cut off"
+
+
+def open_and_close(change: tuple[int, int] | None = None) -> tuple[int, int, list[int]]:
+    with monitor("127.0.0.1:9") as window:
+        let_pass(0.1)
+        if change:
+            window.resize(*change)
+            window.splitter.setSizes([600, change[0] - 600])
+            let_pass(0.1)
+        return window.width(), window.height(), window.splitter.sizes()
+
+
+def test_it_opens_as_it_was_left(desk: None) -> None:
+    left = open_and_close((1400, 900))
+    assert left[:2] == (1400, 900)
+    assert open_and_close() == left
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xff\xfe\x00nonsense[[[",
+        b"[window]\ngeometry=@ByteArray(xyz)\ndivision=@ByteArray(\\0\\0\\0)\n",
+        b"[window]\ngeometry=7\ndivision=@Variant(\\0\\0\\0\\x7f)\n",
+        b"",
+    ],
+)
+def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, content: bytes) -> None:
+    file = Path(Remembered().file)
+    assert file.is_relative_to(own_settings)
+    file.parent.mkdir(parents=True)
+    file.write_bytes(content)
+    width, height, _ = open_and_close()
+    assert (width, height) == (1280, 800)
+    assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
+
+
+def test_a_settings_file_that_can_not_be_written_is_no_trouble(own_settings: Path, desk: None) -> None:
+    file = Path(Remembered().file)
+    file.mkdir(parents=True)
+    assert open_and_close()[:2] == (1280, 800)

@@ -1,0 +1,110 @@
+"""`robotctl monitor` as a program: what it says when it can't open, how it ends."""
+
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl
+from tests.support.waiting import wait_until
+
+ENDS_WITHIN_S = 2.0
+NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
+
+
+def test_without_a_display_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    ended = robotctl("monitor", **NO_DISPLAY)
+    assert ended.returncode == 1
+    assert "no display" in only_line(ended.stderr)
+    assert "robotctl watch" in ended.stderr
+
+
+def test_a_display_that_does_not_answer_is_one_line() -> None:
+    ended = robotctl("monitor", QT_QPA_PLATFORM="xcb", DISPLAY="127.0.0.1:98")
+    assert ended.returncode == 1
+    assert only_line(ended.stderr).startswith("error: Qt can't show a window")
+
+
+def test_without_qt_it_says_what_to_install(tmp_path: Path) -> None:
+    package = tmp_path / "PySide6"
+    package.mkdir()
+    (package / "__init__.py").write_text(
+        "raise ModuleNotFoundError('none', name='PySide6')", encoding="utf-8"
+    )
+    ended = robotctl("monitor", PYTHONPATH=str(tmp_path))
+    assert ended.returncode == 1
+    assert only_line(ended.stderr).endswith("Type: pip install PySide6-Essentials")
+
+
+def test_qt_without_a_library_of_the_system_says_what_to_install(tmp_path: Path) -> None:
+    package = tmp_path / "PySide6"
+    package.mkdir()
+    reason = "libEGL.so.1: cannot open shared object file"
+    (package / "__init__.py").write_text(f"raise ImportError('{reason}')", encoding="utf-8")
+    ended = robotctl("monitor", PYTHONPATH=str(tmp_path))
+    assert ended.returncode == 1
+    assert reason in only_line(ended.stderr)
+    assert "sudo apt install" in ended.stderr
+
+
+def test_an_address_that_is_none_is_a_wrong_command_line() -> None:
+    ended = robotctl("monitor", "--target", "http://robot/", QT_QPA_PLATFORM="offscreen")
+    assert ended.returncode == 2
+    assert "not the address" in only_line(ended.stderr)
+
+
+@contextmanager
+def opened(target: str, directory: Path) -> Iterator["subprocess.Popen[str]"]:
+    """The program with its window, without a screen."""
+    process = subprocess.Popen(
+        [ROBOTCTL, "monitor", "--target", target],
+        env=environment(QT_QPA_PLATFORM="offscreen", XDG_CONFIG_HOME=str(directory)),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        if process.stderr:
+            process.stderr.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_closes_it_in_the_middle_of_a_call(tmp_path: Path, number: signal.Signals) -> None:
+    gateway = GatewayDouble()
+    with serving(gateway) as port, opened(f"127.0.0.1:{port}", tmp_path) as process:
+        wait_until(lambda: len(gateway.calls) > 3 or process.poll() is not None, "it follows the robot", 30)
+        gateway.hold.clear()
+        asked = len(gateway.calls)
+        wait_until(lambda: len(gateway.calls) > asked, "a call hangs")
+        told_s = time.monotonic()
+        process.send_signal(number)
+        assert process.wait(20) == 0
+        assert time.monotonic() - told_s < ENDS_WITHIN_S
+        gateway.hold.set()
+        assert process.stderr
+        assert process.stderr.read() == ""
+    assert list(tmp_path.rglob("monitor.ini")), "it remembers where it was"
+
+
+def test_a_robot_that_takes_the_call_and_never_says_a_word_is_no_obstacle(tmp_path: Path) -> None:
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()
+        deaf.settimeout(30)
+        with opened(f"127.0.0.1:{deaf.getsockname()[1]}", tmp_path) as process:
+            connection, _ = deaf.accept()
+            with connection:
+                told_s = time.monotonic()
+                process.terminate()
+                assert process.wait(20) == 0
+                assert time.monotonic() - told_s < ENDS_WITHIN_S

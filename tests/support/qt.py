@@ -1,0 +1,69 @@
+"""Qt without a screen: one application for all tests of a run, waiting in its event loop, pictures kept."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+# Read when the first application is made.
+os.environ.setdefault("QT_QPA_PLATFORM", f"offscreen:configfile={Path(__file__).with_name('offscreen.json')}")
+
+from PySide6.QtCore import QEventLoop, QSettings, QTimer
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication, QWidget
+
+T = TypeVar("T")
+KEPT_IN = Path(__file__).parents[2] / "artifacts" / "monitor"
+"""Pictures of windows; git does not look there."""
+LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
+
+
+@pytest.fixture(scope="session")
+def application() -> QApplication:
+    """One for all: Qt allows no second one."""
+    app = QApplication.instance() or QApplication(["tests"])
+    assert isinstance(app, QApplication)
+    app.setStyle("Fusion")
+    # Windows come and go; the loop of the tests goes on.
+    app.setQuitOnLastWindowClosed(False)
+    return app
+
+
+@pytest.fixture
+def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A configuration directory of the test's own."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path))
+    return tmp_path
+
+
+def let_pass(seconds: float) -> None:
+    """The event loop runs for so long, as it does under a person's eyes; other threads run, too."""
+    loop = QEventLoop()
+    QTimer.singleShot(round(seconds * 1000), loop.quit)
+    loop.exec()
+
+
+def until(condition: Callable[[], T], what: str, within_s: float = 20.0) -> T:
+    """Runs the event loop until the condition is true, and gives what it gave; fails after `within_s`."""
+    deadline_s = time.monotonic() + within_s
+    while not (answer := condition()):
+        assert time.monotonic() < deadline_s, f"not within {within_s:g} s: {what}"
+        let_pass(0.01)
+    return answer
+
+
+def keep_picture(widget: QWidget, name: str) -> Path:
+    """A screenshot, as an artefact."""
+    KEPT_IN.mkdir(parents=True, exist_ok=True)
+    file = KEPT_IN / f"{name}.png"
+    assert widget.grab().save(str(file)), f"{file} can't be written"
+    return file
+
+
+def in_colours(ground: QColor) -> None:
+    """The desktop turns light or dark."""
+    QApplication.setPalette(QPalette(ground))

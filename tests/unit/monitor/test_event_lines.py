@@ -1,0 +1,71 @@
+"""Events as lines, and which of them are new."""
+
+from console.cli.rows import Tone
+from console.client import CaughtUp, DeadlineExceeded, Event, EventGap, EventPosition, FaultSeverity, Outage
+from console.client.results import EventKind, GapReason
+from console.monitor.event_lines import KEPT, EventLine, EventTrail, line_of
+
+HERE = EventPosition("run", 7)
+
+
+def happened(kind: EventKind, severity: FaultSeverity, component: str, message: str) -> Event:
+    return Event(
+        position=HERE,
+        monotonic_ns=0,
+        wall_clock_unix_ms=5_000_500,
+        severity=severity,
+        component=component,
+        message=message,
+        kind=kind,
+    )
+
+
+def test_a_fault_says_how_bad_it_is_and_who_has_it() -> None:
+    raised = happened(EventKind.FAULT_RAISED, FaultSeverity.ERROR, "lidar", "stopped turning")
+    assert line_of(raised, 0) == EventLine(5000.5, "error: lidar: stopped turning", Tone.BAD)
+
+
+def test_a_component_is_not_named_twice() -> None:
+    running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, BALANCED")
+    assert line_of(running, 0) == EventLine(5000.5, "preview running, BALANCED", Tone.QUIET)
+
+
+def test_a_fault_that_is_over_says_so() -> None:
+    over = happened(EventKind.FAULT_CLEARED, FaultSeverity.INFO, "lidar", "stopped turning")
+    line = line_of(over, 0)
+    assert line
+    assert line.text == "over: lidar: stopped turning"
+
+
+def test_what_is_missing_is_told() -> None:
+    gap = EventGap(reason=GapReason.NO_LONGER_KEPT, missed_count=3, position=HERE)
+    line = line_of(gap, 99.0)
+    assert line == EventLine(
+        99.0, "3 events missed: more came than the gateway keeps", Tone.WARNING, own=True
+    )
+    anew = line_of(EventGap(reason=GapReason.NEW_RUN, missed_count=0, position=HERE), 99.0)
+    assert anew
+    assert anew.text.startswith("The gateway was started again")
+
+
+def test_the_rest_is_no_event() -> None:
+    assert line_of(CaughtUp(position=HERE), 0) is None
+    assert line_of(Outage(DeadlineExceeded("silence"), 1), 0) is None
+
+
+def lines(first: int, count: int) -> list[EventLine]:
+    return [EventLine(0, str(number)) for number in range(first, first + count)]
+
+
+def test_what_was_not_shown_yet() -> None:
+    trail = EventTrail().with_lines(lines(0, 3))
+    assert [line.text for line in trail.since(0)] == ["0", "1", "2"]
+    assert [line.text for line in trail.with_lines(lines(3, 1)).since(3)] == ["3"]
+    assert trail.since(3) == ()
+
+
+def test_a_trail_is_bounded_and_still_knows_what_is_new() -> None:
+    trail = EventTrail().with_lines(lines(0, KEPT)).with_lines(lines(KEPT, 5))
+    assert len(trail.lines) == KEPT
+    assert [line.text for line in trail.since(KEPT + 3)] == [str(KEPT + 3), str(KEPT + 4)]
+    assert len(trail.since(0)) == KEPT

@@ -1,0 +1,263 @@
+"""The thread that talks to the gateway, with a robot that the test plays."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import replace
+
+import pytest
+
+from common.errors import UserError
+from console.client import (
+    Backoff,
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    FaultSeverity,
+    GatewayError,
+    Outage,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    Refused,
+    Unreachable,
+    Unsupported,
+)
+from console.client.results import EventKind
+from console.monitor.link import Phase
+from console.monitor.state import MonitorState, Wish
+from console.monitor.worker import Worker
+from tests.support.snapshots import event, snapshot
+from tests.support.waiting import wait_until
+
+NEVER = Backoff(first_s=1e6, longest_s=1e6)
+AT_ONCE = Backoff(first_s=0.0, longest_s=0.0)
+
+
+class PlayedRobot:
+    """Answers as it is told; what it is asked, it notes."""
+
+    def __init__(self) -> None:
+        self.trouble: GatewayError | None = None
+        self.hangs = False
+        self.looks = 0
+        self.lists = snapshot()
+        self.wishes: list[Wish] = []
+        self.wishes_hang = False
+        self.open = 0
+        self.streamed: list[Event | EventGap | CaughtUp | Outage | GatewayError] = []
+        self.asked_after: list[EventPosition | None] = []
+
+    @asynccontextmanager
+    async def connect(self, target: str) -> AsyncIterator["PlayedRobot"]:
+        self.open += 1
+        try:
+            yield self
+        finally:
+            self.open -= 1
+
+    async def overlay(self) -> OverlaySnapshot:
+        self.looks += 1
+        if self.hangs:
+            await asyncio.Event().wait()
+        if self.trouble:
+            raise self.trouble
+        return self.lists
+
+    async def enable_preview(
+        self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
+    ) -> PreviewChange:
+        return await self._take(Wish(True, profile))
+
+    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
+        return await self._take(Wish(False))
+
+    async def events(
+        self, after: EventPosition | None = None
+    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        self.asked_after.append(after)
+        for item in self.streamed:
+            if isinstance(item, GatewayError):
+                raise item
+            yield item
+        await asyncio.Event().wait()
+
+    async def _take(self, wish: Wish) -> PreviewChange:
+        self.wishes.append(wish)
+        if self.wishes_hang:
+            await asyncio.Event().wait()
+        if self.trouble:
+            raise self.trouble
+        return PreviewChange(accepted=True, message="done", preview=snapshot().status.preview)
+
+
+@pytest.fixture
+def robot() -> PlayedRobot:
+    return PlayedRobot()
+
+
+@contextmanager
+def following(
+    robot: PlayedRobot, on_news: Callable[[], None] = lambda: None, retry: Backoff = NEVER
+) -> Iterator[Worker]:
+    worker = Worker("robot", on_news, robot.connect, retry)
+    worker.start()
+    try:
+        yield worker
+    finally:
+        assert worker.close(10)
+        assert robot.open == 0
+
+
+def reached(worker: Worker, phase: Phase) -> MonitorState:
+    return wait_until(lambda: state if (state := worker.newest()).link.phase is phase else None, phase.value)
+
+
+def test_it_looks_again_and_again(robot: PlayedRobot) -> None:
+    news = threading.Semaphore(0)
+    with following(robot, news.release) as worker:
+        for _ in range(3):
+            assert news.acquire(timeout=10)
+        state = reached(worker, Phase.CONNECTED)
+        assert state.snapshot
+        assert state.link.answer_ms is not None
+
+
+def test_a_robot_that_is_gone_is_lost_since_it_was_heard_last(robot: PlayedRobot) -> None:
+    with following(robot) as worker:
+        reached(worker, Phase.CONNECTED)
+        robot.trouble = Unreachable("gone")
+        lost = reached(worker, Phase.LOST)
+        assert lost.link.trouble is robot.trouble
+        assert lost.link.since_s == lost.received_s
+        assert lost.snapshot, "what was known stays known"
+
+
+def test_it_tries_again_by_itself_and_counts(robot: PlayedRobot) -> None:
+    robot.trouble = Unreachable("gone")
+    with following(robot, retry=AT_ONCE) as worker:
+        wait_until(lambda: worker.newest().link.attempts >= 3, "three attempts")
+        began_s = worker.newest().link.since_s
+        robot.trouble = None
+        state = reached(worker, Phase.CONNECTED)
+        assert state.link.attempts == 0
+        assert state.link.since_s > began_s
+
+
+def test_the_operator_need_not_wait_for_the_next_attempt(robot: PlayedRobot) -> None:
+    robot.trouble = Unreachable("gone")
+    with following(robot, retry=NEVER) as worker:
+        reached(worker, Phase.LOST)
+        assert worker.newest().link.next_try_s
+        robot.trouble = None
+        worker.retry_now()
+        reached(worker, Phase.CONNECTED)
+
+
+def test_a_wish_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> None:
+    with following(robot) as worker:
+        worker.switch(Wish(True, PreviewProfile.LOW_BW))
+        request = wait_until(
+            lambda: found if (found := worker.newest().request) and not found.under_way else None,
+            "an outcome",
+        )
+        assert robot.wishes == [Wish(True, PreviewProfile.LOW_BW)]
+        assert isinstance(request.outcome, PreviewChange)
+        worker.switch(Wish(False))
+        wait_until(lambda: robot.wishes[-1] == Wish(False), "the next one")
+
+
+def test_one_wish_at_a_time(robot: PlayedRobot) -> None:
+    robot.wishes_hang = True
+    with following(robot) as worker:
+        worker.switch(Wish(True))
+        wait_until(lambda: robot.wishes, "the first")
+        worker.switch(Wish(False))
+        looks = robot.looks
+        wait_until(lambda: robot.looks > looks + 1, "it goes on looking meanwhile")
+        assert robot.wishes == [Wish(True)]
+
+
+def test_a_refusal_is_an_outcome(robot: PlayedRobot) -> None:
+    robot.trouble = Refused("not today")
+    with following(robot) as worker:
+        worker.switch(Wish(True))
+        wait_until(
+            lambda: (found := worker.newest().request) and found.outcome is robot.trouble, "the refusal"
+        )
+
+
+def happened(sequence: int) -> Event:
+    return Event(
+        position=EventPosition("run", sequence),
+        monotonic_ns=0,
+        wall_clock_unix_ms=5_000_000,
+        severity=FaultSeverity.ERROR,
+        component="odometry",
+        message=f"event {sequence}",
+        kind=EventKind.FAULT_RAISED,
+    )
+
+
+def told(worker: Worker) -> list[str]:
+    return [line.text for line in worker.newest().events.lines]
+
+
+def test_events_are_streamed_and_go_on_where_they_broke_off(robot: PlayedRobot) -> None:
+    robot.streamed = [happened(1), happened(2), Unreachable("gone")]
+    with following(robot, retry=AT_ONCE) as worker:
+        wait_until(lambda: len(robot.asked_after) > 1, "it asks again")
+        assert robot.asked_after[:2] == [None, EventPosition("run", 2)]
+        assert told(worker)[:2] == ["error: odometry: event 1", "error: odometry: event 2"]
+
+
+def test_a_gateway_that_streams_no_events_is_read_from_its_snapshots(robot: PlayedRobot) -> None:
+    robot.streamed = [Unsupported("an old gateway")]
+    robot.lists = snapshot(lambda made: made.events.append(event(7, "preview running")))
+    with following(robot) as worker:
+        wait_until(lambda: told(worker) == ["preview running"], "the event")
+        looks = robot.looks
+        wait_until(lambda: robot.looks > looks + 2, "it looks again")
+        assert told(worker) == ["preview running"]
+
+
+def test_it_ends_in_the_middle_of_a_call(robot: PlayedRobot) -> None:
+    robot.hangs = robot.wishes_hang = True
+    with following(robot) as worker:
+        worker.switch(Wish(True))
+        wait_until(lambda: robot.looks and robot.wishes, "both calls hang")
+
+
+def test_orders_after_the_end_do_nothing(robot: PlayedRobot) -> None:
+    with following(robot) as worker:
+        pass
+    worker.switch(Wish(True))
+    worker.retry_now()
+    assert worker.close()
+    assert not robot.wishes
+
+
+def test_never_started_is_closed_at_once(robot: PlayedRobot) -> None:
+    assert Worker("robot", lambda: None, robot.connect).close()
+
+
+def test_an_address_that_is_none_is_told_at_once() -> None:
+    with pytest.raises(UserError, match="not the address"):
+        Worker("http://robot/", lambda: None)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_fault_of_our_own_does_not_look_like_a_robot_that_stands_still() -> None:
+    @asynccontextmanager
+    async def broken(target: str) -> AsyncIterator[PlayedRobot]:
+        raise ZeroDivisionError("ours")
+        yield
+
+    worker = Worker("robot", lambda: None, broken)
+    worker.start()
+    state = reached(worker, Phase.LOST)
+    assert "ZeroDivisionError" in str(state.link.trouble)
+    assert worker.close(10)
+    assert replace(state) == worker.newest()
