@@ -43,7 +43,7 @@ def banner(state: ViewState) -> Banner | None:
     if state.redials and state.phase in (Phase.CONNECTING, Phase.FROZEN):
         calls = f"called again {state.redials} times" if state.redials > 1 else "called again once"
         detail = f"{detail} ({calls})" if detail else calls
-    return Banner(title, detail, tone)
+    return Banner(title, detail[:1].upper() + detail[1:], tone)
 
 
 def _seconds(duration_s: float) -> str:

@@ -53,10 +53,11 @@ def watch_headless(
                 raise recording.trouble
             with books.news:
                 books.news.wait_for(lambda: stop.is_set() or _enough(books, frames), _LOOK_S)
-        account = books.account(session.figures().redials, recording)
     finally:
         worker.close()
         session.close()
+    # Only now is the recording complete.
+    account = books.account(session.figures().redials, recording)
     if frames and account.pictures < frames:
         raise UserError(f"ended after {account.pictures} of {frames} pictures")
     return account

@@ -183,7 +183,7 @@ class VideoSession:
                 frame = receiver.next_frame(_LOOK_S)
             except NoPictureError as silence:
                 if time.monotonic() > self._patience.ends_s(called_s, picture_s):
-                    return StreamError(f"{address.uri} fell silent" if picture_s else silence.what, "")
+                    return _silent(address) if picture_s else silence
             else:
                 picture_s = frame.arrival_s
                 self._keep(frame)
@@ -215,3 +215,7 @@ class VideoSession:
     def _wait(self, unless: Callable[[], bool], seconds: float | None = None) -> None:
         with self._changing:
             self._changing.wait_for(lambda: self._closing or unless(), seconds)
+
+
+def _silent(address: StreamAddress) -> StreamError:
+    return StreamError(f"the stream from {address.uri} fell silent", "")

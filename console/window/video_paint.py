@@ -1,5 +1,6 @@
 """What is drawn over a picture: boxes with labels, and a banner."""
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -25,6 +26,7 @@ _MARGIN: Final = 16.0
 _WIDEST: Final = 640.0
 _STRIPE: Final = 5.0
 _GAP: Final = 6.0
+_STEP: Final = 40.0
 _TITLE_FACTOR: Final = 1.35
 
 
@@ -45,10 +47,13 @@ def draw_banner(painter: QPainter, whole: QRectF, words: Banner, *, over_picture
     title_font, font = QFont(painter.font()), QFont(painter.font())
     title_font.setBold(True)
     title_font.setPointSizeF(font.pointSizeF() * _TITLE_FACTOR)
-    width = min(whole.width() - 2 * _MARGIN, _WIDEST)
-    room = QRectF(0, 0, width - 2 * _MARGIN - _STRIPE, whole.height())
+    beside = 2 * _MARGIN + _STRIPE
+    room = QRectF(0, 0, min(whole.width() - 2 * _MARGIN, _WIDEST) - beside, whole.height())
     title = _extent(title_font, room, words.title)
     detail = _extent(font, room, words.detail)
+    # As wide as its words; the next second of "frozen for 9.9 s" does not change it.
+    room.setWidth(min(room.width(), _in_steps(max(title.width(), detail.width()))))
+    width = room.width() + beside
     height = title.height() + (detail.height() + _GAP if words.detail else 0) + 2 * _MARGIN
     top = whole.bottom() - _MARGIN - height if over_picture else whole.center().y() - height / 2
     card = QRectF(whole.center().x() - width / 2, max(whole.top(), top), width, height)
@@ -57,6 +62,10 @@ def draw_banner(painter: QPainter, whole: QRectF, words: Banner, *, over_picture
     _write(painter, title_font, _INK, room, words.title)
     room.translate(0, title.height() + _GAP)
     _write(painter, font, _DIM_INK, room, words.detail)
+
+
+def _in_steps(width: float) -> float:
+    return math.ceil(width / _STEP + 0.25) * _STEP
 
 
 def _draw_card(painter: QPainter, card: QRectF, colour: QColor) -> None:

@@ -71,16 +71,18 @@ def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
     assert becomes(session, Phase.LIVE) - returned_s < BACK_WITHIN_S
 
 
+@pytest.mark.parametrize("redials", [1, 3])
 def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
-    ground: VideoGround, session: VideoSession
+    ground: VideoGround, session: VideoSession, redials: int
 ) -> None:
+    """For a moment, and for longer than SRT itself keeps a connection."""
     ground.switch_on()
     becomes(session, Phase.LIVE)
     ground.preview.process.send_signal(signal.SIGSTOP)
     stopped_s = time.monotonic()
     wait_until(lambda: not is_live(session), "the freeze shows")
     assert time.monotonic() - stopped_s < FREEZE_SHOWN_WITHIN_S
-    wait_until(lambda: session.figures().redials >= 1, "called again")
+    wait_until(lambda: session.figures().redials >= redials, "called again")
     ground.preview.process.send_signal(signal.SIGCONT)
     went_on_s = time.monotonic()
     assert becomes(session, Phase.LIVE) - went_on_s < BACK_WITHIN_S

@@ -11,7 +11,7 @@ from tests.unit.viewer.previews import preview
 
 NOW_S = 1000.0
 GONE = Unreachable("no robot gateway at robot:50051")
-SILENT = UserError("srt://robot:7100 fell silent")
+SILENT = UserError("the stream from srt://robot:7100 fell silent")
 RUNNING = preview(PreviewState.RUNNING)
 FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it in")
 
@@ -65,16 +65,16 @@ def test_a_picture_is_live_for_its_time_and_then_frozen_for_ever_longer() -> Non
         (
             {"preview": RUNNING, "picture_s": NOW_S - 75, "stream_trouble": SILENT, "redials": 7},
             "Frozen for 1 min 15 s",
-            "srt://robot:7100 fell silent (called again 7 times)",
+            "The stream from srt://robot:7100 fell silent (called again 7 times)",
         ),
-        ({"preview": FAULTED}, "Preview faulted", "the camera is gone. Plug it in"),
+        ({"preview": FAULTED}, "Preview faulted", "The camera is gone. Plug it in"),
         (
             {"preview": FAULTED, "picture_s": NOW_S - 3},
             "Preview faulted - picture frozen for 3.0 s",
-            "the camera is gone. Plug it in",
+            "The camera is gone. Plug it in",
         ),
         ({"preview": preview(PreviewState.DISABLED)}, "Preview is off", "Press P to switch it on"),
-        ({"preview": RUNNING, "redials": 1}, "Connecting", "called again once"),
+        ({"preview": RUNNING, "redials": 1}, "Connecting", "Called again once"),
     ],
 )
 def test_the_banner_says_what_and_why(facts: dict[str, Any], title: str, detail: str) -> None:
@@ -88,4 +88,4 @@ def test_each_phase_but_live_has_words() -> None:
     trouble = banner(view_state(Facts(gateway_trouble=GONE), NOW_S))
     assert trouble is not None
     assert trouble.title == "Robot unreachable"
-    assert trouble.detail.startswith("no robot gateway at robot:50051. Check the address")
+    assert trouble.detail.startswith("No robot gateway at robot:50051. Check the address")

@@ -1,0 +1,257 @@
+"""The window as a person sees it: what is on the (virtual) screen, read back pixel by pixel."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from bench.viewer import extra_latency_ms, on_screen
+from console.receiver.recording import Recording
+from console.viewer.account import Bookkeeper
+from console.viewer.geometry import Box
+from console.viewer.state import Phase
+from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.ports import free_tcp_port
+from tests.support.qt import KEPT_IN, application, let_pass, until
+from tests.support.running_preview import RunningPreview
+from tests.support.video_ground import VideoGround
+
+from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
+from PySide6.QtGui import QColor, QImage  # isort: skip
+from PySide6.QtTest import QTest  # isort: skip
+from PySide6.QtWidgets import QWidget  # isort: skip
+
+from console.window.view_program import Viewing, viewing
+
+pytestmark = [pytest.mark.gst, pytest.mark.usefixtures("application")]
+__all__ = ["application"]
+
+FPS = 30
+FREEZE_SHOWN_WITHIN_S = 0.7
+BACK_WITHIN_S = 1.5
+BOX_YELLOW = QColor("#F0E442")
+
+
+@pytest.fixture
+def view(ground: VideoGround) -> Iterator[Viewing]:
+    """The window of `robotctl view`, following the robot."""
+    with viewing(ground.target, None, Bookkeeper()) as view:
+        yield view
+
+
+def shows(view: Viewing, phase: Phase, within_s: float = 25) -> float:
+    until(lambda: view.session.state().phase is phase, f"{phase}; it is {view.session.state()}", within_s)
+    return time.monotonic()
+
+
+def keep(widget: QWidget, name: str) -> None:
+    folder = KEPT_IN.parent / "view"
+    folder.mkdir(parents=True, exist_ok=True)
+    assert widget.grab().save(str(folder / f"{name}.png"))
+
+
+def banner_is_on_screen(view: Viewing) -> bool:
+    """Whether the card of a banner is painted over the lower part of the picture."""
+    video = on_screen(view.window.video)
+    colour = video.pixelColor(video.width() // 2, video.height() - 24)
+    return max(colour.red(), colour.green(), colour.blue()) < 60
+
+
+def test_the_window_adds_less_than_one_and_a_half_pictures_to_the_latency(tmp_path: Path) -> None:
+    assert extra_latency_ms(tmp_path, rounds=1) < 1.5 * 1000 / FPS
+
+
+def test_a_freeze_is_painted_at_once_and_gone_when_the_picture_is_back(
+    ground: VideoGround, view: Viewing
+) -> None:
+    ground.switch_on()
+    shows(view, Phase.LIVE)
+    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    ground.kill_preview()
+    died_s = time.monotonic()
+    until(lambda: banner_is_on_screen(view), "the banner")
+    assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
+    let_pass(0.8)
+    keep(view.window, "frozen")
+    shows(view, Phase.FAULTED)
+    let_pass(0.3)
+    keep(view.window, "faulted")
+    ground.preview.start_again()
+    ground.preview.running()
+    returned_s = time.monotonic()
+    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    assert time.monotonic() - returned_s < BACK_WITHIN_S
+
+
+def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: Viewing) -> None:
+    shows(view, Phase.OFF)
+    let_pass(0.6)
+    keep(view.window, "off")
+    QTest.keyClick(view.window, Qt.Key.Key_P)
+    shows(view, Phase.LIVE)
+    until(lambda: "320x240 h264 by avdec_h264" in view.window.figures.text(), "the figures")
+    assert view.window.windowTitle().endswith(ground.target)
+    QTest.keyClick(view.window, Qt.Key.Key_P)
+    shows(view, Phase.OFF)
+
+
+def test_a_person_turns_full_screen_on_and_off_and_quits(view: Viewing) -> None:
+    shows(view, Phase.OFF)
+    QTest.keyClick(view.window, Qt.Key.Key_F)
+    assert view.window.isFullScreen()
+    assert not view.window.figures.isVisible()
+    QTest.keyClick(view.window, Qt.Key.Key_Escape)
+    assert not view.window.isFullScreen()
+    assert view.window.figures.isVisible()
+    QTest.keyClick(view.window, Qt.Key.Key_Q)
+    assert not view.window.isVisible()
+
+
+def test_nobody_there_is_said(tmp_path: Path) -> None:
+    with viewing(f"127.0.0.1:{free_tcp_port()}", Recording(tmp_path / "a.ts"), Bookkeeper()) as view:
+        shows(view, Phase.UNREACHABLE)
+        let_pass(0.6)
+        keep(view.window, "unreachable")
+        assert view.window.recorded.text().startswith("recording a.ts: 0.0 MiB")
+
+
+def test_a_window_that_was_busy_paints_the_newest_picture_only(ground: VideoGround, view: Viewing) -> None:
+    ground.switch_on()
+    shows(view, Phase.LIVE)
+    painted: list[float] = []
+    before = view.session.figures().pictures
+    while view.session.figures().pictures < before + 20:
+        """The window's thread does nothing else."""
+    view.window.video.painted.connect(lambda: painted.append(time.monotonic()))
+    busy_until_s = time.monotonic()
+    until(lambda: painted, "painted")
+    assert [at_s for at_s in painted if at_s < busy_until_s + 0.02].__len__() <= 2
+
+
+@contextmanager
+def seeing(directory: Path, source: str, *boxes: Box, shape: tuple[int, int]) -> Iterator[Viewing]:
+    """A robot that shows `source` and detects `boxes` in a camera image of this shape."""
+    settings = {"source": {"kind": "gst", "description": source}}
+    double = GatewayDouble()
+    found = double.overlay.detections
+    found.available, found.source_width_px, found.source_height_px = True, *shape
+    found.detection_count = len(boxes)
+    for box in boxes:
+        found.detections.add(
+            class_name="box",
+            score=0.5,
+            bbox_center_x_px=box.x + box.width / 2,
+            bbox_center_y_px=box.y + box.height / 2,
+            bbox_width_px=box.width,
+            bbox_height_px=box.height,
+        )
+    with RunningPreview(directory, settings) as preview, serving(double) as port:
+        preview.wish()
+        preview.running()
+        shown = double.status.preview
+        shown.state = states.PREVIEW_RUNNING
+        shown.endpoint.host, shown.endpoint.port, shown.endpoint.latency_ms = "127.0.0.1", preview.port, 20
+        shown.endpoint.transport = shown.endpoint.container = 1
+        with viewing(f"127.0.0.1:{port}", None, Bookkeeper()) as view:
+            view.window.video.double = double  # type: ignore[attr-defined]
+            yield view
+
+
+def yellow(image: QImage) -> Box:
+    """What the yellow lines enclose: from the middle of one to the middle of the other."""
+    xs, ys = [], []
+    for y in range(image.height()):
+        for x in range(image.width()):
+            colour = image.pixelColor(x, y)
+            near = (abs(colour.red() - 240), abs(colour.green() - 228), abs(colour.blue() - 66))
+            if max(near) < 40:
+                xs.append(x)
+                ys.append(y)
+    assert xs, "no box is painted"
+    return Box(min(xs) + 1, min(ys) + 1, max(xs) - min(xs) - 1, max(ys) - min(ys) - 1)
+
+
+def is_about(found: Box, wanted: Box) -> bool:
+    return all(
+        abs(one - other) <= 2
+        for one, other in zip(
+            (found.x, found.y, found.right, found.bottom),
+            (wanted.x, wanted.y, wanted.right, wanted.bottom),
+            strict=True,
+        )
+    )
+
+
+BLACK_4_3 = "videotestsrc is-live=true pattern=black ! video/x-raw,width=640,height=480,framerate=30/1"
+
+
+@pytest.mark.parametrize(
+    ("window", "wanted"),
+    [
+        pytest.param((640, 480), Box(200, 200, 160, 120), id="scaled alone"),
+        pytest.param((900, 480), Box(330, 200, 160, 120), id="bars left and right"),
+        pytest.param((640, 700), Box(200, 310, 160, 120), id="bars above and below"),
+    ],
+)
+def test_boxes_are_painted_around_what_they_mean(
+    tmp_path: Path, window: tuple[int, int], wanted: Box
+) -> None:
+    """Boxes are in pixels of a 1280x960 camera; the picture is 320x240; the window is another size again."""
+    box = Box(400, 400, 320, 240)
+    with seeing(tmp_path, BLACK_4_3, box, shape=(1280, 960)) as view:
+        video = view.window.video
+        view.window.resize(window[0], window[1] + view.window.height() - video.height())
+        shows(view, Phase.LIVE)
+        until(lambda: (video.width(), video.height()) == window, "the size")
+        # The label's letters are yellow, too, and stand above the box: looked at is the box's own part.
+        let_pass(0.5)
+        image = on_screen(video).copy(0, 0, *window)
+        top = round(wanted.y) - 3
+        found = yellow(image.copy(0, top, window[0], window[1] - top))
+        assert is_about(Box(found.x, found.y + top, found.width, found.height), wanted), found
+        video.show_overlay(False)
+        let_pass(0.3)
+        with pytest.raises(AssertionError, match="no box"):
+            yellow(on_screen(video))
+
+
+def test_boxes_fit_a_camera_of_another_shape_than_the_picture(tmp_path: Path) -> None:
+    """The robot puts a 16:9 camera into a 4:3 picture with bars; the whole camera image is marked."""
+    source = "videotestsrc is-live=true pattern=white ! video/x-raw,width=640,height=360,framerate=30/1"
+    with seeing(tmp_path, source, Box(0, 0, 640, 360), shape=(640, 360)) as view:
+        video = view.window.video
+        view.window.resize(640, 480 + view.window.height() - video.height())
+        shows(view, Phase.LIVE)
+        video.show_overlay(False)
+        let_pass(0.5)
+        bare = on_screen(video)
+        white = [y for y in range(480) if bare.pixelColor(320, y).lightness() > 128]
+        assert white, "the camera's image is not to be seen"
+        video.show_overlay(True)
+        let_pass(0.5)
+        drawn = on_screen(video)
+        lines = [
+            y for y in range(480) if drawn.pixelColor(600, y).blue() < 120 < drawn.pixelColor(600, y).red()
+        ]
+        assert abs(min(lines) - min(white)) <= 2
+        assert abs(max(lines) - max(white)) <= 2
+
+
+def test_stale_boxes_are_not_painted(tmp_path: Path) -> None:
+    with seeing(tmp_path, BLACK_4_3, Box(400, 400, 320, 240), shape=(1280, 960)) as view:
+        video = view.window.video
+        shows(view, Phase.LIVE)
+        until(lambda: yellow_is_there(video), "the box")
+        video.double.overlay.detections.stale = True  # type: ignore[attr-defined]
+        until(lambda: not yellow_is_there(video), "no box")
+
+
+def yellow_is_there(widget: QWidget) -> bool:
+    try:
+        yellow(on_screen(widget))
+    except AssertionError:
+        return False
+    return True
