@@ -8,6 +8,7 @@ import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthServicer, add_HealthServicer_to_server
 
+from common.errors import UnknownServiceError
 from common.rpc import Context
 
 _State: TypeAlias = Literal[0, 1, 2, 3]
@@ -48,7 +49,7 @@ class Health(HealthServicer):
         """The state now."""
         state = self._states.get(request.service)
         if state is None:
-            await context.abort(grpc.StatusCode.NOT_FOUND, f"no service '{request.service}' is known here")
+            raise UnknownServiceError(f"no service '{request.service}' is known here")
         return HealthCheckResponse(status=state)
 
     async def Watch(  # noqa: N802  # the schema names it

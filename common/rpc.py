@@ -15,6 +15,8 @@ from common.error_details import metadata_of, metadata_of_defect
 from common.errors import (
     DomainError,
     InvalidRequestError,
+    NotAllowedError,
+    NotAuthenticatedError,
     NotNowError,
     TooMuchError,
     UnknownServiceError,
@@ -35,6 +37,8 @@ _log = logging.getLogger(__name__)
 STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
     NotNowError: grpc.StatusCode.FAILED_PRECONDITION,
+    NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
+    NotAllowedError: grpc.StatusCode.PERMISSION_DENIED,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
 }

@@ -11,7 +11,7 @@ from typing import Final
 
 from common.health import Health
 from common.rpc import Observe, unobserved
-from gateway.config import GatewaySettings, MetricsSettings, SourceSettings
+from gateway.config import GatewaySettings, LimitSettings, MetricsSettings, SourceSettings
 from gateway.knowledge import Knowledge
 from gateway.metrics.calls import Calls
 from gateway.metrics.collector import GatewayCollector
@@ -24,6 +24,7 @@ from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
+from gateway.rpc.limits import Limits
 from gateway.rpc.server import SERVICE, serving
 from gateway.rpc.servicer import RobotGateway, Streams
 from gateway.rpc.staying import Staying
@@ -74,7 +75,14 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
         async with (
             _metrics(settings.metrics, knowledge) as observe,
-            serving(gateway, settings.grpc.host, settings.grpc.port, health, observe),
+            serving(
+                gateway,
+                settings.grpc.host,
+                settings.grpc.port,
+                health,
+                observe=observe,
+                limits=_limits(settings.limits),
+            ),
             asyncio.TaskGroup() as timers,
         ):
             background = [
@@ -87,6 +95,16 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
             for task in background:
                 task.cancel()
     _log.info("stopped")
+
+
+def _limits(settings: LimitSettings) -> Limits:
+    return Limits(
+        connections=settings.connections,
+        streams_per_connection=settings.streams_per_connection,
+        requests_per_s=settings.requests_per_s,
+        burst=settings.burst,
+        request_bytes=settings.request_bytes,
+    )
 
 
 def _reconciler(encrypted: bool) -> Reconciler:

@@ -135,6 +135,20 @@ class MetricsSettings(Section):
     """None: no metrics. 0 takes any free one; the log tells which."""
 
 
+class LimitSettings(Section):
+    """What callers may have; who wants more is refused and told why."""
+
+    connections: int = Field(default=256, ge=1, le=10_000)
+    """How many may be served at once."""
+    streams_per_connection: int = Field(default=16, ge=1, le=1000)
+    requests_per_s: float = Field(default=500.0, gt=0)
+    """How often one connection may ask in the long run."""
+    burst: int = Field(default=1000, ge=1)
+    """How many requests it may save up."""
+    request_bytes: int = Field(default=131_072, ge=1024, le=262_144)
+    """The longest request that is taken."""
+
+
 class PreviewSettings(Section):
     """The way to the preview service, and from the viewers to its stream."""
 
@@ -170,6 +184,7 @@ class GatewaySettings(Settings):
     """For people, or one JSON object a line for programs."""
     grpc: GrpcSettings = GrpcSettings()
     security: SecuritySettings = SecuritySettings()
+    limits: LimitSettings = LimitSettings()
     preview: PreviewSettings = PreviewSettings()
     platform: PlatformSettings = PlatformSettings()
     faults: FaultSettings = FaultSettings()

@@ -1,11 +1,12 @@
-"""One total table: what each gRPC status code means to someone who asked a robot."""
+"""Two total tables: what each gRPC code, and each reason of a gateway, means to someone who asked a robot."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Final, Protocol, cast
+from typing import Any, Final, Protocol, cast
 
 import grpc
 
+from common.reasons import Reason
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -18,6 +19,7 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
+from console.client.refusal import refusal_in
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
     {
@@ -41,6 +43,20 @@ ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
         grpc.StatusCode.UNAUTHENTICATED: NotAllowed,
     }
 )
+
+REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
+    {
+        Reason.INVALID_REQUEST: InvalidRequest,
+        Reason.MESSAGE_TOO_LARGE: InvalidRequest,
+        Reason.NOT_NOW: Refused,
+        Reason.UNKNOWN_SERVICE: Refused,
+        Reason.TOO_MANY_CONNECTIONS: Overloaded,
+        Reason.TOO_MANY_STREAMS: Overloaded,
+        Reason.TOO_MANY_REQUESTS: Overloaded,
+        Reason.INTERNAL: GatewayFailed,
+    }
+)
+"""Total. What a gateway says counts more than the code; a word of a newer one leaves the code to speak."""
 
 # gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
 _PLAIN_WORDS: Final = (
@@ -70,6 +86,8 @@ class _Coded(Protocol):
 
     def details(self) -> str | None: ...
 
+    def trailing_metadata(self) -> Iterable[Any] | None: ...
+
 
 def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> GatewayError:
     """The family member for a failed call.
@@ -80,9 +98,11 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
         timeout_s: how long the call was allowed to take.
     """
     coded = cast("_Coded", failure)
-    code = coded.code()
-    family = ERRORS[code]
-    return family(_sentence(family, coded.details() or code.name, target, timeout_s))
+    code, refusal = coded.code(), refusal_in(coded.trailing_metadata())
+    family = REASONS.get(refusal.reason, ERRORS[code])
+    error = family(_sentence(family, coded.details() or code.name, target, timeout_s))
+    error.reason, error.fields, error.retry_after_s = refusal.reason, refusal.fields, refusal.retry_after_s
+    return error
 
 
 def stream_error_from(error: GatewayError | None, target: str) -> GatewayError:

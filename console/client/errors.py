@@ -25,6 +25,13 @@ class GatewayError(UserError):
     """How a program ends that can't go on without the answer."""
     advice: ClassVar[str] = "Look into the gateway's log on the robot"
 
+    reason: str = ""
+    """The gateway's own stable word for why it refused (docs/errors.md); empty where it told none."""
+    fields: tuple[str, ...] = ()
+    """The fields of the request that it refused."""
+    retry_after_s: float | None = None
+    """When to try again; None when nobody knows."""
+
     def __init__(self, what: str, remedy: str | None = None) -> None:
         super().__init__(what, self.advice if remedy is None else remedy, exit_code=self.ends_with)
 

@@ -8,11 +8,17 @@ from typing import Final
 import grpc
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
+from grpc_health.v1.health import SERVICE_NAME as HEALTH_SERVICE
+from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION_SERVICE
+from grpc_reflection.v1alpha.reflection import enable_server_reflection
 
 from common.health import Health
 from common.listen import bind_tcp, bracketed
 from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
 from gateway.rpc.caller import address_of
+from gateway.rpc.limiting import LimitInterceptor
+from gateway.rpc.limits import MOST_REQUEST_BYTES, Admission, Limits
+from gateway.rpc.requests import Requests, hold_to_rules
 from gateway.rpc.servicer import RobotGateway
 from gateway.rpc.tally import Behavior, StreamBehavior
 from omniseer.gateway.v1.access_pb2 import ROLE_VIEWER, required_role
@@ -25,16 +31,27 @@ _METHODS: Final = _CONTRACT.methods_by_name
 SERVICE: Final = _CONTRACT.full_name
 
 
-def method_handlers(gateway: RobotGateway) -> dict[str, Handler]:
-    """The contract's method names and who answers them, counted. Total: a test compares with the schema."""
+def method_handlers(gateway: RobotGateway, most_bytes: int = MOST_REQUEST_BYTES) -> dict[str, Handler]:
+    """The contract's method names and who answers them, counted. Total: a test compares with the schema.
+
+    Args:
+        gateway: answers them.
+        most_bytes: longer requests are refused.
+    """
+    unary: dict[str, Behavior] = {
+        "GetSystemStatus": gateway.get_system_status,
+        "GetOverlaySnapshot": gateway.get_overlay_snapshot,
+        "SetPreviewMode": gateway.set_preview_mode,
+        "GetGatewayInfo": gateway.get_gateway_info,
+        "Ping": gateway.ping,
+    }
+    streams: dict[str, StreamBehavior] = {
+        "WatchSystemStatus": gateway.watch_system_status,
+        "SubscribeEvents": gateway.subscribe_events,
+    }
     return {
-        "GetSystemStatus": _unary(gateway, "GetSystemStatus", gateway.get_system_status),
-        "GetOverlaySnapshot": _unary(gateway, "GetOverlaySnapshot", gateway.get_overlay_snapshot),
-        "SetPreviewMode": _unary(gateway, "SetPreviewMode", gateway.set_preview_mode),
-        "GetGatewayInfo": _unary(gateway, "GetGatewayInfo", gateway.get_gateway_info),
-        "WatchSystemStatus": _stream(gateway, "WatchSystemStatus", gateway.watch_system_status),
-        "SubscribeEvents": _stream(gateway, "SubscribeEvents", gateway.subscribe_events),
-        "Ping": _unary(gateway, "Ping", gateway.ping),
+        **{name: _unary(gateway, name, behavior, most_bytes) for name, behavior in unary.items()},
+        **{name: _stream(gateway, name, behavior, most_bytes) for name, behavior in streams.items()},
     }
 
 
@@ -44,7 +61,9 @@ async def serving(
     host: str,
     port: int,
     health: Health | None = None,
+    *,
     observe: Observe = unobserved,
+    limits: Limits | None = None,
 ) -> AsyncIterator[int]:
     """Serves until the block ends; calls that are running then get STOP_GRACE_S to finish.
 
@@ -54,6 +73,7 @@ async def serving(
         port: 0 takes any free one.
         health: answers the health service; by default one that knows the contract's service alone.
         observe: told of every call that ends.
+        limits: what callers may have; by default what the class says.
 
     Yields:
         The port.
@@ -61,11 +81,12 @@ async def serving(
     Raises:
         UserError: the address can't be bound.
     """
-    server = new_server(observe=observe)
-    server.add_generic_rpc_handlers(
-        (grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),)
-    )
+    limits = limits or Limits()
+    server = new_server([LimitInterceptor(Admission(limits))], observe)
+    handlers = method_handlers(gateway, limits.request_bytes)
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     (health or Health(SERVICE)).register(server)
+    enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)
     bound = bind_tcp(server, host, port)
     await server.start()
     _log.info("serving operators at %s:%d", bracketed(host), bound)
@@ -75,27 +96,38 @@ async def serving(
         await server.stop(STOP_GRACE_S)
 
 
-def _unary(gateway: RobotGateway, name: str, behavior: Behavior) -> Handler:
-    """A handler whose replies are bytes already."""
+def _unary(gateway: RobotGateway, name: str, behavior: Behavior, most_bytes: int) -> Handler:
+    """A handler whose requests and replies are bytes."""
     request, reply = _messages(name)
+    requests = Requests(request, most_bytes)
+
+    async def held_to_rules(message: Message, context: Context) -> bytes:
+        hold_to_rules(message)
+        return await behavior(message, context)
+
+    inner: Behavior = held_to_rules
     if changes_the_robot(name):
-        behavior = gateway.controls.told(name, behavior, reply)
-    return grpc.unary_unary_rpc_method_handler(
-        gateway.tally.counted(name, behavior), request.FromString, None
-    )
+        inner = gateway.controls.told(name, held_to_rules, reply)
+
+    async def call(data: bytes, context: Context) -> bytes:
+        return await inner(requests.read(data), context)
+
+    return grpc.unary_unary_rpc_method_handler(gateway.tally.counted(name, call), None, None)
 
 
-def _stream(gateway: RobotGateway, name: str, behavior: StreamBehavior) -> Handler:
+def _stream(gateway: RobotGateway, name: str, behavior: StreamBehavior, most_bytes: int) -> Handler:
     """The same for a stream of replies; whoever has one open stays."""
     request, _ = _messages(name)
-    counted, staying = gateway.tally.counted_stream(name, behavior), gateway.streams.staying
+    requests, staying = Requests(request, most_bytes), gateway.streams.staying
 
-    async def call(message: Message, context: Context) -> AsyncIterator[bytes]:
+    async def call(data: bytes, context: Context) -> AsyncIterator[bytes]:
+        message = requests.read(data)
+        hold_to_rules(message)
         with staying.stream(address_of(context.peer())):
-            async for reply in counted(message, context):
+            async for reply in behavior(message, context):
                 yield reply
 
-    return grpc.unary_stream_rpc_method_handler(call, request.FromString, None)
+    return grpc.unary_stream_rpc_method_handler(gateway.tally.counted_stream(name, call), None, None)
 
 
 def changes_the_robot(method: str) -> bool:

@@ -1,16 +1,29 @@
 """Each gRPC status code means one thing to people."""
 
+from pathlib import Path
+from typing import Any
+
 import grpc
 import pytest
 
-from common.errors import ExitCode
+from common.error_details import metadata_of, metadata_of_defect
+from common.errors import (
+    DomainError,
+    ExitCode,
+    FieldViolation,
+    InvalidRequestError,
+    TooMuchError,
+)
+from common.reasons import Reason
+from common.rpc import STATUS_CODES
 from console.client import errors
-from console.client.error_table import ERRORS, error_from
+from console.client.error_table import ERRORS, REASONS, error_from
 
 
 class Failure(grpc.RpcError):
-    def __init__(self, code: grpc.StatusCode, details: str | None) -> None:
+    def __init__(self, code: grpc.StatusCode, details: str | None, metadata: Any = ()) -> None:
         super().__init__()
+        self._metadata = metadata
         self._code = code
         self._details = details
 
@@ -19,6 +32,9 @@ class Failure(grpc.RpcError):
 
     def details(self) -> str | None:
         return self._details
+
+    def trailing_metadata(self) -> Any:
+        return self._metadata
 
 
 def said(code: grpc.StatusCode, details: str | None = "because") -> errors.GatewayError:
@@ -81,3 +97,72 @@ def test_the_robots_own_words_come_through() -> None:
 
 def test_without_details_the_code_speaks() -> None:
     assert "INTERNAL" in said(grpc.StatusCode.INTERNAL, None).what
+
+
+def refused(error: DomainError) -> errors.GatewayError:
+    """What a client makes of this error of a gateway."""
+    code = STATUS_CODES[type(error)]
+    return error_from(Failure(code, str(error), metadata_of(error, code)), "robot:50051", 2.0)
+
+
+def test_every_reason_has_its_place_in_the_family() -> None:
+    assert set(REASONS) == set(Reason)
+
+
+@pytest.mark.parametrize("reason", list(Reason))
+def test_a_reason_counts_more_than_the_code(reason: Reason) -> None:
+    error = refused(TooMuchError("too much", reason, 0.25))
+    assert type(error) is REASONS[reason]
+    assert (error.reason, error.retry_after_s) == (reason, 0.25)
+
+
+def test_the_fields_of_a_bad_request_are_named() -> None:
+    violations = (FieldViolation("min_interval_ms", "is too much"), FieldViolation("", "as a whole"))
+    error = refused(InvalidRequestError("two things", violations))
+    assert isinstance(error, errors.InvalidRequest)
+    assert error.fields == ("min_interval_ms", "")
+    assert error.retry_after_s is None
+
+
+def test_a_defect_has_a_reason_too() -> None:
+    failure = Failure(grpc.StatusCode.INTERNAL, "internal error", metadata_of_defect("internal error"))
+    assert error_from(failure, "robot:50051", 2.0).reason == Reason.INTERNAL
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [None, (), (("grpc-status-details-bin", b"\xff\xff"),), (("grpc-status-details-bin", b""),)],
+)
+def test_without_readable_details_the_code_speaks_alone(metadata: Any) -> None:
+    error = error_from(Failure(grpc.StatusCode.RESOURCE_EXHAUSTED, "no", metadata), "robot:50051", 2.0)
+    assert type(error) is errors.Overloaded
+    assert (error.reason, error.fields, error.retry_after_s) == ("", (), None)
+
+
+def test_a_word_of_a_newer_gateway_leaves_the_code_to_speak(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = TooMuchError("hm", Reason.NOT_NOW)
+    monkeypatch.setattr(error, "reason", _Newer())
+    code = grpc.StatusCode.RESOURCE_EXHAUSTED
+    seen = error_from(Failure(code, "hm", metadata_of(error, code)), "robot:50051", 2.0)
+    assert (type(seen), seen.reason) == (errors.Overloaded, "A_NEWER_WORD")
+
+
+class _Newer:
+    value = "A_NEWER_WORD"
+
+
+def test_the_page_gives_every_reason_its_code_and_exception() -> None:
+    page = (Path(__file__).parents[3] / "docs/errors.md").read_text(encoding="utf-8")
+    rows = [
+        [cell.strip(" `") for cell in line.strip("|").split("|")]
+        for line in page.splitlines()
+        if line.startswith("| `")
+    ]
+    assert [row[0] for row in rows] == list(dict.fromkeys(row[0] for row in rows)), "each once"
+    assert {row[0]: row[-1] for row in rows} == {
+        reason.value: family.__name__ for reason, family in REASONS.items()
+    }
+    fixed = {error.reason: code for error, code in STATUS_CODES.items() if hasattr(error, "reason")}
+    for row in rows:
+        code = fixed.get(Reason(row[0]))
+        assert code is None or row[1] == code.name

@@ -60,7 +60,7 @@ class Rule(_message.Message):
     message: _builtins.str
     """What is wrong when it doesn't hold, for a person."""
     expression: _builtins.str
-    """True when all is well."""
+    """True, or an empty text, when all is well. Any other text says what is wrong."""
     def __init__(
         self,
         *,

@@ -32,7 +32,7 @@ from omniseer.gateway.v1 import preview_pb2 as omniseer_dot_gateway_dot_v1_dot_p
 from omniseer.gateway.v1 import system_status_pb2 as omniseer_dot_gateway_dot_v1_dot_system__status__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/robot_gateway.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\x1a\x1fomniseer/gateway/v1/event.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a&omniseer/gateway/v1/gateway_info.proto\x1a!omniseer/gateway/v1/overlay.proto\x1a!omniseer/gateway/v1/preview.proto\x1a\'omniseer/gateway/v1/system_status.proto\"\x18\n\x16GetSystemStatusRequest\"\x1b\n\x19GetOverlaySnapshotRequest\"\x17\n\x15GetGatewayInfoRequest\"\xe7\x01\n\x16GetGatewayInfoResponse\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x32\n\x07gateway\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.GatewayFacts\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x32\n\x07methods\x18\x05 \x03(\x0b\x32!.omniseer.gateway.v1.MethodCounts\x12\x1a\n\x12\x63onfiguration_json\x18\x06 \x01(\t\"\xca\x01\n\x15SetPreviewModeRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile:j\xbaHg\x1a\x65\n\rprofile.known\x12%profile is none that this robot knows\x1a-!this.enabled || this.profile in [0, 1, 2, 3]\"p\n\x16SetPreviewModeResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\">\n\x18WatchSystemStatusRequest\x12\"\n\x0fmin_interval_ms\x18\x01 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\"d\n\x19WatchSystemStatusResponse\x12\x31\n\x06status\x18\x01 \x01(\x0b\x32!.omniseer.gateway.v1.SystemStatus\x12\x14\n\x0cmonotonic_ns\x18\x02 \x01(\x04\"\x8f\x01\n\x16SubscribeEventsRequest\x12\x31\n\x05\x61\x66ter\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\x12\x42\n\x0cmin_severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverityB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xb5\x01\n\x17SubscribeEventsResponse\x12+\n\x05\x65vent\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.EventH\x00\x12,\n\x03gap\x18\x02 \x01(\x0b\x32\x1d.omniseer.gateway.v1.EventGapH\x00\x12\x37\n\tcaught_up\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPositionH\x00\x42\x06\n\x04item\"\r\n\x0bPingRequest\"Q\n\x0cPingResponse\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ns\x18\x02 \x01(\x04\x12\x0f\n\x07\x62oot_id\x18\x03 \x01(\t2\x90\x06\n\x0cRobotGateway\x12g\n\x0fGetSystemStatus\x12+.omniseer.gateway.v1.GetSystemStatusRequest\x1a!.omniseer.gateway.v1.SystemStatus\"\x04\x98\xb8\x18\x01\x12o\n\x0eSetPreviewMode\x12*.omniseer.gateway.v1.SetPreviewModeRequest\x1a+.omniseer.gateway.v1.SetPreviewModeResponse\"\x04\x98\xb8\x18\x02\x12p\n\x12GetOverlaySnapshot\x12..omniseer.gateway.v1.GetOverlaySnapshotRequest\x1a$.omniseer.gateway.v1.OverlaySnapshot\"\x04\x98\xb8\x18\x01\x12o\n\x0eGetGatewayInfo\x12*.omniseer.gateway.v1.GetGatewayInfoRequest\x1a+.omniseer.gateway.v1.GetGatewayInfoResponse\"\x04\x98\xb8\x18\x01\x12z\n\x11WatchSystemStatus\x12-.omniseer.gateway.v1.WatchSystemStatusRequest\x1a..omniseer.gateway.v1.WatchSystemStatusResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12t\n\x0fSubscribeEvents\x12+.omniseer.gateway.v1.SubscribeEventsRequest\x1a,.omniseer.gateway.v1.SubscribeEventsResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12Q\n\x04Ping\x12 .omniseer.gateway.v1.PingRequest\x1a!.omniseer.gateway.v1.PingResponse\"\x04\x98\xb8\x18\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/robot_gateway.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\x1a\x1fomniseer/gateway/v1/event.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a&omniseer/gateway/v1/gateway_info.proto\x1a!omniseer/gateway/v1/overlay.proto\x1a!omniseer/gateway/v1/preview.proto\x1a\'omniseer/gateway/v1/system_status.proto\"\x18\n\x16GetSystemStatusRequest\"\x1b\n\x19GetOverlaySnapshotRequest\"\x17\n\x15GetGatewayInfoRequest\"\xe7\x01\n\x16GetGatewayInfoResponse\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x32\n\x07gateway\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.GatewayFacts\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x32\n\x07methods\x18\x05 \x03(\x0b\x32!.omniseer.gateway.v1.MethodCounts\x12\x1a\n\x12\x63onfiguration_json\x18\x06 \x01(\t\"\xaf\x02\n\x15SetPreviewModeRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile:\xce\x01\xbaH\xca\x01\x1a\xc7\x01\n\rprofile.known\x1a\xb5\x01!this.enabled || this.profile in [0, 1, 2, 3] ? \'\' : \'profile \' + string(this.profile) + \' does not exist; choose 1 LOW_BW, 2 BALANCED, 3 HIGH_QUALITY, or 0 to keep the present one\'\"p\n\x16SetPreviewModeResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\">\n\x18WatchSystemStatusRequest\x12\"\n\x0fmin_interval_ms\x18\x01 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\"d\n\x19WatchSystemStatusResponse\x12\x31\n\x06status\x18\x01 \x01(\x0b\x32!.omniseer.gateway.v1.SystemStatus\x12\x14\n\x0cmonotonic_ns\x18\x02 \x01(\x04\"\x8f\x01\n\x16SubscribeEventsRequest\x12\x31\n\x05\x61\x66ter\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\x12\x42\n\x0cmin_severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverityB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xb5\x01\n\x17SubscribeEventsResponse\x12+\n\x05\x65vent\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.EventH\x00\x12,\n\x03gap\x18\x02 \x01(\x0b\x32\x1d.omniseer.gateway.v1.EventGapH\x00\x12\x37\n\tcaught_up\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPositionH\x00\x42\x06\n\x04item\"\r\n\x0bPingRequest\"Q\n\x0cPingResponse\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ns\x18\x02 \x01(\x04\x12\x0f\n\x07\x62oot_id\x18\x03 \x01(\t2\x90\x06\n\x0cRobotGateway\x12g\n\x0fGetSystemStatus\x12+.omniseer.gateway.v1.GetSystemStatusRequest\x1a!.omniseer.gateway.v1.SystemStatus\"\x04\x98\xb8\x18\x01\x12o\n\x0eSetPreviewMode\x12*.omniseer.gateway.v1.SetPreviewModeRequest\x1a+.omniseer.gateway.v1.SetPreviewModeResponse\"\x04\x98\xb8\x18\x02\x12p\n\x12GetOverlaySnapshot\x12..omniseer.gateway.v1.GetOverlaySnapshotRequest\x1a$.omniseer.gateway.v1.OverlaySnapshot\"\x04\x98\xb8\x18\x01\x12o\n\x0eGetGatewayInfo\x12*.omniseer.gateway.v1.GetGatewayInfoRequest\x1a+.omniseer.gateway.v1.GetGatewayInfoResponse\"\x04\x98\xb8\x18\x01\x12z\n\x11WatchSystemStatus\x12-.omniseer.gateway.v1.WatchSystemStatusRequest\x1a..omniseer.gateway.v1.WatchSystemStatusResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12t\n\x0fSubscribeEvents\x12+.omniseer.gateway.v1.SubscribeEventsRequest\x1a,.omniseer.gateway.v1.SubscribeEventsResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12Q\n\x04Ping\x12 .omniseer.gateway.v1.PingRequest\x1a!.omniseer.gateway.v1.PingResponse\"\x04\x98\xb8\x18\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -40,7 +40,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.robot_g
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_SETPREVIEWMODEREQUEST']._loaded_options = None
-  _globals['_SETPREVIEWMODEREQUEST']._serialized_options = b'\272Hg\032e\n\rprofile.known\022%profile is none that this robot knows\032-!this.enabled || this.profile in [0, 1, 2, 3]'
+  _globals['_SETPREVIEWMODEREQUEST']._serialized_options = b'\272H\312\001\032\307\001\n\rprofile.known\032\265\001!this.enabled || this.profile in [0, 1, 2, 3] ? \'\' : \'profile \' + string(this.profile) + \' does not exist; choose 1 LOW_BW, 2 BALANCED, 3 HIGH_QUALITY, or 0 to keep the present one\''
   _globals['_WATCHSYSTEMSTATUSREQUEST'].fields_by_name['min_interval_ms']._loaded_options = None
   _globals['_WATCHSYSTEMSTATUSREQUEST'].fields_by_name['min_interval_ms']._serialized_options = b'\272H\006*\004\030\340\324\003'
   _globals['_SUBSCRIBEEVENTSREQUEST'].fields_by_name['min_severity']._loaded_options = None
@@ -68,21 +68,21 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_GETGATEWAYINFORESPONSE']._serialized_start=425
   _globals['_GETGATEWAYINFORESPONSE']._serialized_end=656
   _globals['_SETPREVIEWMODEREQUEST']._serialized_start=659
-  _globals['_SETPREVIEWMODEREQUEST']._serialized_end=861
-  _globals['_SETPREVIEWMODERESPONSE']._serialized_start=863
-  _globals['_SETPREVIEWMODERESPONSE']._serialized_end=975
-  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_start=977
-  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_end=1039
-  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_start=1041
-  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_end=1141
-  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_start=1144
-  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_end=1287
-  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_start=1290
-  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_end=1471
-  _globals['_PINGREQUEST']._serialized_start=1473
-  _globals['_PINGREQUEST']._serialized_end=1486
-  _globals['_PINGRESPONSE']._serialized_start=1488
-  _globals['_PINGRESPONSE']._serialized_end=1569
-  _globals['_ROBOTGATEWAY']._serialized_start=1572
-  _globals['_ROBOTGATEWAY']._serialized_end=2356
+  _globals['_SETPREVIEWMODEREQUEST']._serialized_end=962
+  _globals['_SETPREVIEWMODERESPONSE']._serialized_start=964
+  _globals['_SETPREVIEWMODERESPONSE']._serialized_end=1076
+  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_start=1078
+  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_end=1140
+  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_start=1142
+  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_end=1242
+  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_start=1245
+  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_end=1388
+  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_start=1391
+  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_end=1572
+  _globals['_PINGREQUEST']._serialized_start=1574
+  _globals['_PINGREQUEST']._serialized_end=1587
+  _globals['_PINGRESPONSE']._serialized_start=1589
+  _globals['_PINGRESPONSE']._serialized_end=1670
+  _globals['_ROBOTGATEWAY']._serialized_start=1673
+  _globals['_ROBOTGATEWAY']._serialized_end=2457
 # @@protoc_insertion_point(module_scope)

@@ -1,0 +1,49 @@
+"""What a refusing gateway told programs: its reason, the fields, when to try again (google.rpc.Status)."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from google.protobuf.message import DecodeError
+from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, RetryInfo
+from google.rpc.status_pb2 import Status
+
+DOMAIN: Final = "omniseer.gateway.v1"
+"""Whose reasons are known here; those of a proxy on the way are not."""
+_KEY: Final = "grpc-status-details-bin"
+_NS_PER_S: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Empty where the gateway told nothing: it is older, or gRPC itself refused."""
+
+    reason: str = ""
+    fields: tuple[str, ...] = ()
+    retry_after_s: float | None = None
+
+
+def refusal_in(metadata: Iterable[Any] | None) -> Refusal:
+    """What the trailing metadata of a failed call tells. What can't be read counts as not told."""
+    data = next((value for key, value in metadata or () if key == _KEY), b"")
+    status = Status()
+    try:
+        status.MergeFromString(data)
+        return _refusal(status)
+    except DecodeError:
+        return Refusal()
+
+
+def _refusal(status: Status) -> Refusal:
+    info, request, retry = ErrorInfo(), BadRequest(), RetryInfo()
+    retry_after_s: float | None = None
+    for detail in status.details:
+        if detail.Unpack(retry):
+            retry_after_s = retry.retry_delay.ToNanoseconds() / _NS_PER_S
+        elif not detail.Unpack(info):
+            detail.Unpack(request)
+    return Refusal(
+        reason=info.reason if info.domain == DOMAIN else "",
+        fields=tuple(violation.field for violation in request.field_violations),
+        retry_after_s=retry_after_s,
+    )

@@ -1,0 +1,117 @@
+"""Each connection's share: how many there may be, how many streams each, how often each may ask. Pure.
+
+A connection's requests are tokens: it has up to `burst` of them, gets `requests_per_s` new ones, and spends
+one per call. gRPC tells nobody here of connections that come and go, so one counts while it has a stream open
+or has asked lately; the quietest gives way to a new one.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import TooMuchError
+from common.reasons import Reason
+
+QUIET_AFTER_S: Final = 1.0
+"""A connection without streams that has not asked for so long gives way when room is needed."""
+MOST_REQUEST_BYTES: Final = 128 * 1024
+"""Far more than any request of the contract has; gRPC itself takes twice as much."""
+_SOON_S: Final = 1.0
+"""When to try again where nobody knows when there will be room."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a connection may have, and how many there may be."""
+
+    connections: int = 256
+    streams_per_connection: int = 16
+    requests_per_s: float = 500.0
+    burst: int = 1000
+    request_bytes: int = MOST_REQUEST_BYTES
+
+
+@dataclass(slots=True)
+class _Connection:
+    tokens: float
+    at_s: float
+    streams: int = 0
+
+
+class Admission:
+    """Belongs to one event loop.
+
+    Args:
+        limits: what is allowed.
+        clock: seconds, monotonic.
+    """
+
+    def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic) -> None:
+        self._limits = limits
+        self._clock = clock
+        self._connections: dict[str, _Connection] = {}
+        """By peer, the one that asked last at the end."""
+
+    @property
+    def connection_count(self) -> int:
+        """How many are remembered."""
+        return len(self._connections)
+
+    def request(self, peer: str) -> None:
+        """One call of this connection begins.
+
+        Raises:
+            TooMuchError: it may not; try again later.
+        """
+        limits, now_s = self._limits, self._clock()
+        connection = self._connections.pop(peer, None)
+        if connection is None:
+            self._make_room(now_s)
+            connection = _Connection(limits.burst, now_s)
+        self._connections[peer] = connection
+        tokens = min(limits.burst, connection.tokens + (now_s - connection.at_s) * limits.requests_per_s)
+        connection.at_s = now_s
+        if tokens >= 1:
+            connection.tokens = tokens - 1
+            return
+        connection.tokens = tokens
+        raise TooMuchError(
+            f"this connection asks more than {limits.requests_per_s:g} times a second; ask less often",
+            Reason.TOO_MANY_REQUESTS,
+            (1 - tokens) / limits.requests_per_s,
+        )
+
+    def open_stream(self, peer: str) -> Callable[[], None]:
+        """This connection has one more stream open, until what is returned is called; after `request`.
+
+        Raises:
+            TooMuchError: it has as many as it may have.
+        """
+        connection = self._connections[peer]
+        if connection.streams >= self._limits.streams_per_connection:
+            raise TooMuchError(
+                f"this connection has {connection.streams} streams open, and no more are allowed; "
+                "close one, or share it",
+                Reason.TOO_MANY_STREAMS,
+            )
+        connection.streams += 1
+
+        def close() -> None:
+            connection.streams -= 1
+
+        return close
+
+    def _make_room(self, now_s: float) -> None:
+        if len(self._connections) < self._limits.connections:
+            return
+        for peer, connection in self._connections.items():
+            if connection.streams == 0 and now_s - connection.at_s >= QUIET_AFTER_S:
+                del self._connections[peer]
+                return
+        raise TooMuchError(
+            f"this gateway serves {self._limits.connections} connections at once, and all are taken; "
+            "close one, or raise limits.connections",
+            Reason.TOO_MANY_CONNECTIONS,
+            _SOON_S,
+        )
