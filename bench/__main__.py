@@ -16,6 +16,7 @@ GROUPS = {
     "status": "bench.status",
     "idle": "bench.idle",
     "video": "bench.video",
+    "viewer": "bench.viewer",
     "monitor": "bench.monitor",
 }
 # Too long to be part of a run without names.
