@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from common.errors import UserError
+from common.private import alone_in, write_private
 from console.client import parse_target
 from console.robots.book import (
     FILE_KEYS,
@@ -20,7 +21,6 @@ from console.robots.book import (
     parse_book,
     read_book,
 )
-from console.robots.private import alone_in, write_private
 
 Lines: TypeAlias = list[str]
 Edit: TypeAlias = Callable[[Lines], Lines]

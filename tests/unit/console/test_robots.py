@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from common.errors import ExitCode, UserError
+from common.private import write_private
 from console.robots import Robot, RobotBook, choose, read_book, read_credentials
 from console.robots.book import book_path, parse_book
 from console.robots.choice import Choice
 from console.robots.credentials import credentials_directory, forget_credentials
 from console.robots.edit import drop_robot, put_robot, set_default
-from console.robots.private import write_private
 
 FULL = """\
 # mine
