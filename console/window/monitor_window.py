@@ -36,7 +36,7 @@ class Robot(Protocol):
         """What is known now."""
 
     def switch(self, wish: Wish) -> None:
-        """Asks for a preview, or for none."""
+        """Asks for a preview, or for none; the request is in the state at once."""
 
     def retry_now(self) -> None:
         """Ends the pause before the next attempt."""
@@ -138,6 +138,7 @@ class MonitorWindow(QWidget):
         now = self._controls(self._robot.newest(), time.monotonic())
         if now.enabled:
             self._robot.switch(now.switched())
+            self.refresh()
 
     def _choose(self, profile: PreviewProfile) -> None:
         now = self._controls(self._robot.newest(), time.monotonic())
@@ -147,7 +148,7 @@ class MonitorWindow(QWidget):
             self._robot.switch(wish)
         else:
             self._marked = profile
-            self.refresh()
+        self.refresh()
 
     def _toggle_full_screen(self) -> None:
         if self.isFullScreen():
