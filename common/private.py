@@ -26,7 +26,7 @@ def write_private(path: Path, content: bytes) -> None:
         UserError: it can't be written there.
     """
     try:
-        path.parent.mkdir(mode=PRIVATE_DIRECTORY, parents=True, exist_ok=True)
+        _make_directory(path.parent)
         # A link stays a link: what it points to is replaced. Temporary files are made with mode 0600.
         path = path.resolve()
         handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -54,7 +54,7 @@ def alone_in(directory: Path) -> Iterator[None]:
         UserError: it can't be made, or somebody is still at it after 5 s.
     """
     try:
-        directory.mkdir(mode=PRIVATE_DIRECTORY, parents=True, exist_ok=True)
+        _make_directory(directory)
         handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         raise _unwritable(directory, error) from error
@@ -64,6 +64,12 @@ def alone_in(directory: Path) -> Iterator[None]:
     finally:
         # Closing gives the lock back.
         os.close(handle)
+
+
+def _make_directory(directory: Path) -> None:
+    missing = [each for each in (directory, *directory.parents) if not each.exists()]
+    for each in reversed(missing):
+        each.mkdir(mode=PRIVATE_DIRECTORY, exist_ok=True)
 
 
 def _lock(handle: int, directory: Path) -> None:
