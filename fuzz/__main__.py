@@ -15,7 +15,7 @@ from rich.table import Table
 
 _SHORT: Final = 20_000
 NAMES: Final = (
-    "operators_wish",
+    "operators_request",
     "gateways_wish",
     "previews_truth",
     "robots_answer",

@@ -34,10 +34,11 @@ _OVERLAY: Final = overlay_pb2.OverlaySnapshot(
     ),
 )
 _SEEDS: Final = {
-    "operators_wish": [
+    "operators_request": [
         robot_gateway_pb2.SetPreviewModeRequest(
             enabled=True, profile=preview_pb2.PREVIEW_PROFILE_LOW_BW
-        ).SerializeToString()
+        ).SerializeToString(),
+        robot_gateway_pb2.WatchSystemStatusRequest(min_interval_ms=100).SerializeToString(),
     ],
     "gateways_wish": [preview_pb.ApplyDesiredStateRequest(desired=_WISH).SerializeToString()],
     "previews_truth": [_ACTUAL.SerializeToString()],

@@ -11,9 +11,10 @@ from types import MappingProxyType
 from typing import Final
 
 from google.protobuf.message import DecodeError, Message
+from google.protobuf.message_factory import GetMessageClass
 
 from common.config import load
-from common.errors import InvalidRequestError, UserError
+from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from console.client.mapping.methods import METHODS
 from fuzz.robot import robots_message
@@ -21,21 +22,26 @@ from gateway.config import load_settings
 from gateway.metrics.endpoint import answer
 from gateway.preview_link.wire import UnknownSpeechError, from_wire
 from gateway.ros.cutting import cut
-from gateway.rpc.mapping.enums import profile_from
-from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest
+from gateway.rpc.limits import MOST_REQUEST_BYTES
+from gateway.rpc.requests import Requests, hold_to_rules
+from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import wish
 
 Target = Callable[[bytes], None]
 
+_REQUESTS: Final = [
+    Requests(GetMessageClass(method.input_type), MOST_REQUEST_BYTES)
+    for method in DESCRIPTOR.services_by_name["RobotGateway"].methods
+]
 
-def operators_wish(data: bytes) -> None:
-    """SetPreviewMode, as the gateway takes it in."""
-    request = SetPreviewModeRequest()
-    if _parses(request, data):
-        with suppress(InvalidRequestError):
-            profile_from(request.profile)
+
+def operators_request(data: bytes) -> None:
+    """The request of every method, as the gateway reads it and holds it to the schema's rules."""
+    for requests in _REQUESTS:
+        with suppress(DomainError):
+            hold_to_rules(requests.read(data))
 
 
 def gateways_wish(data: bytes) -> None:
@@ -97,7 +103,7 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
     {
         target.__name__: target
         for target in (
-            operators_wish,
+            operators_request,
             gateways_wish,
             previews_truth,
             robots_answer,
