@@ -143,7 +143,9 @@ class Connection:
         error, detail = message.parse_error()
         if self._file and self._file.take_error(message.src, error.message):
             return
-        if error.matches(GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE):
+        if any(branch.is_mine(message.src) for branch in self._branches.values()) or error.matches(
+            GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE
+        ):
             self._inbox.end(_undecodable(self._address, error.message))
         else:
             self._inbox.end(from_srt(self._address, detail or error.message, had_data=self._had_data))

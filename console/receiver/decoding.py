@@ -150,6 +150,10 @@ class DecodingBranch:
             one.set_state(Gst.State.NULL)
             pipeline.remove(one)
 
+    def is_mine(self, element: Any) -> bool:
+        """Whether an element is one of this branch; those inside a decoder count as the decoder."""
+        return any(element is one or element.has_as_ancestor(one) for one in self._elements)
+
     def _on_sample(self, sink: Any) -> Any:
         arrival_s = time.monotonic()
         sample = sink.emit("pull-sample")

@@ -93,6 +93,7 @@ class VideoSession:
 
     def start(self) -> None:
         """Begins; the first call is made when an address is known."""
+        self._decoders.start()
         self._thread.start()
 
     def watch_pictures(self, on_picture: OnPicture) -> None:
@@ -170,7 +171,7 @@ class VideoSession:
             with self._connect(address, setup) as receiver:
                 return self._take_pictures(receiver, address)
         except UndecodableError as trouble:
-            return self._decoders.replaced_after(trouble)
+            return self._decoders.after_undecodable(trouble)
         except UserError as trouble:
             return trouble
 
@@ -183,7 +184,10 @@ class VideoSession:
                 frame = receiver.next_frame(_LOOK_S)
             except NoPictureError as silence:
                 if time.monotonic() > self._patience.ends_s(called_s, picture_s):
-                    return _silent(address) if picture_s else silence
+                    if picture_s:
+                        return _silent(address)
+                    self._decoders.after_nothing()
+                    return silence
             else:
                 picture_s = frame.arrival_s
                 self._keep(frame)

@@ -1,0 +1,107 @@
+"""Hardware decoders: only those that prove themselves are used, and one that fails later is replaced."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from console.receiver import clips
+from console.receiver.decoder_probe import objection
+from tests.support.robotctl import robotctl
+from tests.support.video_ground import VideoGround, video_ground
+
+pytestmark = pytest.mark.gst
+
+ROOT = Path(__file__).parents[3]
+DOUBLES = ROOT / "tests/support/decoder_doubles"
+
+
+def with_doubles(**faults: str) -> dict[str, str]:
+    """Environment of a computer with these decoders."""
+    path = os.pathsep.join([str(DOUBLES), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {"PYTHONPATH": path, "DECODER_DOUBLES": json.dumps(faults)}
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VideoGround]:
+    """The preview is on."""
+    with video_ground(tmp_path_factory.mktemp("ground")) as ground:
+        ground.switch_on()
+        yield ground
+
+
+def seen(ground: VideoGround, **faults: str) -> dict[str, Any]:
+    """What a viewer with these decoders saw."""
+    done = robotctl(
+        *("--target", ground.target, "--json", "view", "--headless", "--frames", "10"),
+        **with_doubles(**faults),
+    )
+    assert done.returncode == 0, done.stderr
+    document: dict[str, Any] = json.loads(done.stdout)
+    return document
+
+
+@pytest.mark.parametrize("codec", ["h264", "h265"])
+def test_software_decodes_the_clips_rightly(codec: str) -> None:
+    assert len(clips.units(codec)) == clips.PICTURES
+    assert objection(f"avdec_{codec}", codec) == ""
+
+
+@pytest.mark.parametrize(
+    ("fault", "why"),
+    [
+        ("ok", ""),
+        ("refuse", "the device can't be opened"),
+        ("silent", "it makes no picture"),
+        ("late", "pictures back"),
+        ("wrong", "its pictures are wrong"),
+        ("crash", "it crashed when tried (SIGSEGV)"),
+        ("error", "the driver reports a hardware fault"),
+        ("hang", "it makes no picture"),
+        ("stuck", "it hung: no result within 3 s"),
+    ],
+)
+def test_a_trial_finds_what_is_wrong(fault: str, why: str) -> None:
+    code = "from console.receiver.decoder_probe import objection; print(objection('vah264dec', 'h264', 3))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | with_doubles(vah264dec=fault),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    said = done.stdout.strip()
+    assert said == why or (why and why in said), done
+
+
+def test_a_proven_decoder_is_used(running: VideoGround) -> None:
+    assert seen(running, vah264dec="ok")["decoder"] == "vah264dec"
+
+
+def test_the_first_that_proves_itself_is_used(running: VideoGround) -> None:
+    assert seen(running, vah264dec="wrong", nvh264dec="ok")["decoder"] == "nvh264dec"
+
+
+def test_where_none_proves_itself_software_decodes(running: VideoGround) -> None:
+    assert seen(running, vah264dec="refuse", nvh264dec="late")["decoder"] == "avdec_h264"
+
+
+@pytest.mark.parametrize("fault", ["later error", "later silent", "later refuse"])
+def test_one_that_fails_with_the_real_stream_is_replaced_by_software(
+    running: VideoGround, fault: str
+) -> None:
+    document = seen(running, vah264dec=fault)
+    assert document["decoder"] == "avdec_h264"
+    assert document["redials"] >= 1
+
+
+def test_a_decoder_that_hangs_in_its_trial_does_not_keep_the_picture_waiting(running: VideoGround) -> None:
+    document = seen(running, vah264dec="stuck")
+    assert document["decoder"] == "avdec_h264"
+    assert document["first_picture_ms"] < 6000

@@ -1,0 +1,1 @@
+"""Hardware decoders to pretend, for programs under test."""
