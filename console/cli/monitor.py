@@ -19,7 +19,7 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
 
 def _window() -> Callable[[str], None]:
     try:
-        from console.window.program import run_monitor  # noqa: PLC0415 - Qt is needed here only
+        from console.window.monitor_program import run_monitor  # noqa: PLC0415 - Qt is needed here only
     except ModuleNotFoundError as error:
         if not (error.name or "").startswith(("PySide6", "shiboken6")):
             raise

@@ -75,10 +75,14 @@ def line_of(item: Event | EventGap | CaughtUp | Outage, now_s: float) -> EventLi
 
 
 def _words(event: Event) -> str:
+    if event.control:
+        who = event.control.who or event.control.address
+        return f"{who} asked for {event.control.method}: {event.control.result.value}, {event.control.answer}"
     over = event.kind is EventKind.FAULT_CLEARED
     severity = "over" if over else event.severity.value if event.severity in _TONES else ""
-    component = event.component if event.component and event.component not in event.message else ""
-    return ": ".join(part for part in (severity, component, event.message) if part)
+    # A message may say by itself what stands before it.
+    before = [word for word in (severity, event.component) if word and word not in event.message]
+    return ": ".join([*before, event.message])
 
 
 def _missing(gap: EventGap) -> str:

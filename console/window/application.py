@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
+from PySide6.QtCore import QMessageLogContext, QTimer, QtMsgType, qInstallMessageHandler
 from PySide6.QtWidgets import QApplication
 
 from common.errors import ExitCode, UserError
@@ -34,9 +34,13 @@ def application(title: str) -> Iterator[QApplication]:
     # One style everywhere, in the desktop's light or dark colours.
     app.setStyle("Fusion")
 
-    def on_signal(_number: int, _frame: FrameType | None) -> None:
+    def end() -> None:
         app.closeAllWindows()
         app.quit()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        # In the event loop: before it runs, quitting does nothing, and the signal would be lost.
+        QTimer.singleShot(0, end)
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -60,7 +60,8 @@ def keep_picture(widget: QWidget, name: str) -> Path:
     """A screenshot, as an artefact."""
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"
-    assert widget.grab().save(str(file)), f"{file} can't be written"
+    # Qt's 0 is the smallest file, without any loss.
+    assert widget.grab().save(str(file), "PNG", 0), f"{file} can't be written"
     return file
 
 

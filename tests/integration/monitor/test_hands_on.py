@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
 from console.client import PreviewProfile
+from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import PreviewPanel
-from console.window.program import monitor
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving

@@ -13,8 +13,8 @@ from console.cli.rows import Tone
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
 from console.window.look import draw_shape
+from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
-from console.window.program import monitor
 from console.window.remembered import Remembered
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until

@@ -16,9 +16,9 @@ from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
 from console.window.lines import ComponentLine, FaultWidget
+from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import NoteLine
-from console.window.program import monitor
 from tests.support.qt import keep_picture, let_pass, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 

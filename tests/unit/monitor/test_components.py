@@ -10,6 +10,7 @@ from console.monitor.components import Component, components
 from console.monitor.link import Link, Phase
 from console.monitor.state import MonitorState
 from omniseer.gateway.v1 import overlay_pb2, source_pb2
+from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.snapshots import NOW_S, heard, snapshot
 
 
@@ -69,6 +70,22 @@ def test_why_a_source_can_never_come_has_a_line() -> None:
     lines = by_name(heard(snapshot(change)))
     assert lines["Odometry"] == Component("Odometry", "no data", Tone.WARNING, "odometry: because", "")
     assert "Mux input" not in lines
+
+
+def test_how_the_robot_is_set_up() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.insecure = True
+        made.status.teleop.state = states.TELEOP_ENABLED
+        made.status.teleop.enabled = True
+        made.status.teleop.max_linear_mps = 0.5
+        made.status.gateway.boot_id, made.status.gateway.uptime_ms = "a", 90_000
+        made.status.gateway.client_count = 2
+
+    lines = by_name(heard(snapshot(change)))
+    assert (lines["Access"].mark, lines["Access"].tone) == ("OPEN", Tone.WARNING)
+    assert (lines["Teleop"].mark, lines["Teleop"].tone) == ("enabled", Tone.GOOD)
+    assert (lines["Gateway"].values, lines["Gateway"].age) == ("2 clients", "1 min 30 s")
+    assert not {"Access", "Teleop", "Gateway"} & by_name(heard()).keys()
 
 
 def test_a_line_never_breaks_between_a_number_and_its_unit() -> None:

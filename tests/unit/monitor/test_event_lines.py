@@ -1,8 +1,10 @@
 """Events as lines, and which of them are new."""
 
+from dataclasses import replace
+
 from console.cli.rows import Tone
 from console.client import CaughtUp, DeadlineExceeded, Event, EventGap, EventPosition, FaultSeverity, Outage
-from console.client.results import EventKind, GapReason
+from console.client.results import ControlAction, ControlResult, EventKind, GapReason
 from console.monitor.event_lines import KEPT, EventLine, EventTrail, line_of
 
 HERE = EventPosition("run", 7)
@@ -35,6 +37,28 @@ def test_a_fault_that_is_over_says_so() -> None:
     line = line_of(over, 0)
     assert line
     assert line.text == "over: lidar: stopped turning"
+
+
+def test_what_the_message_says_itself_is_not_said_twice() -> None:
+    over = happened(EventKind.FAULT_CLEARED, FaultSeverity.INFO, "odometry", "over: odometry stopped coming")
+    line = line_of(over, 0)
+    assert line
+    assert line.text == "over: odometry stopped coming"
+
+
+def test_who_asked_for_what_and_what_came_of_it() -> None:
+    action = ControlAction(
+        who="anna",
+        address="10.0.0.7:5000",
+        method="SetPreviewMode",
+        request="enabled: true",
+        result=ControlResult.REFUSED,
+        answer="not now",
+    )
+    asked = replace(happened(EventKind.CONTROL, FaultSeverity.INFO, "gateway", "long"), control=action)
+    line = line_of(asked, 0)
+    assert line
+    assert line.text == "anna asked for SetPreviewMode: refused, not now"
 
 
 def test_what_is_missing_is_told() -> None:
