@@ -90,6 +90,15 @@ class RunningPreview:
             if kind is not None:
                 sys.stderr.write(self.log.read_text(encoding="utf-8"))
 
+    def descriptors(self) -> int:
+        """How many file descriptors it has."""
+        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+    def resident_mib(self) -> float:
+        """Its memory that is in RAM."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text(encoding="ascii")
+        return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:"))) / 1024
+
     def start_again(self) -> None:
         """What a container engine does when the process has ended."""
         assert self.process.poll() is not None

@@ -16,7 +16,7 @@ FPS = 30
 PICTURES = 60
 HIGHEST_KBPS = 1200
 LARGEST_KBIT = 1.5 * HIGHEST_KBPS * 0.150
-"""Of a key frame: encoders keep to a rate buffer of 150 ms only about. Without one, x265 makes some of 400 kbit."""
+"""Of a key frame: encoders keep to a buffer of 150 ms only about. Without one, x265 makes some of 400."""
 
 
 @pytest.mark.parametrize("name", ["x264", "x265"])

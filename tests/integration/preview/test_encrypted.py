@@ -2,10 +2,12 @@
 
 import asyncio
 import logging
+import socket
 from pathlib import Path
 
 import pytest
 
+from console.doctor import srt_probe
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from console.receiver.receiver import Receiver
@@ -17,6 +19,7 @@ from tests.support.running_preview import RunningPreview
 pytestmark = pytest.mark.gst
 
 PICTURES = 10
+WRONG = "incorrect horse battery staple"
 
 
 @pytest.mark.parametrize("key_length_bytes", [16, 32])
@@ -34,9 +37,11 @@ async def test_the_api_hands_out_what_opens_the_stream_and_no_log_does(
                 assert endpoint.encrypted
                 assert endpoint.passphrase not in endpoint.uri
                 passphrases.append(endpoint.passphrase)
+                assert offered_key_bytes(preview.port) == key_length_bytes
                 await asyncio.to_thread(watch, preview.port, endpoint.passphrase)
-                with pytest.raises(StreamError):
-                    await asyncio.to_thread(watch, preview.port, "")
+                for wrong in ("", WRONG):
+                    with pytest.raises(StreamError):
+                        await asyncio.to_thread(watch, preview.port, wrong)
                 off = await operator.switch(False)
                 assert off.preview.state == states.PREVIEW_DISABLED
                 assert off.preview.endpoint.passphrase == ""
@@ -47,6 +52,16 @@ async def test_the_api_hands_out_what_opens_the_stream_and_no_log_does(
         assert len(passphrase) >= 10
         assert passphrase not in log
         assert passphrase not in caplog.text
+
+
+def offered_key_bytes(port: int) -> int:
+    """How long the listener says that its AES keys are: in its first answer, in units of 8 bytes."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as caller:
+        caller.settimeout(10)
+        caller.sendto(srt_probe.induction(), ("127.0.0.1", port))
+        answer = caller.recv(2048)
+    assert srt_probe.is_answer(answer)
+    return 8 * int.from_bytes(answer[20:22])
 
 
 def watch(port: int, passphrase: str) -> None:

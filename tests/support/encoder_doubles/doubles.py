@@ -7,8 +7,8 @@ ENCODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not 
 | ok | it encodes |
 | null-to-ready | the device can't be opened |
 | ready-to-paused | the device refuses later (as Rockchip's MPP does) |
-| no-output | frames go in, nothing comes out, no error |
-| empty | every buffer is empty |
+| no-output[:N] | frames go in, after N of them nothing comes out, no error |
+| empty[:N] | after N frames every buffer is empty |
 | error:N | an ERROR message after N frames |
 | hang:N | the driver never comes back after N frames, not even for a stop |
 | stuck:N | after N frames, whoever tells it another bit rate is never answered |
@@ -81,13 +81,14 @@ class _Double(Gst.Bin):
         if info.get_buffer().get_size() == 0:
             return Gst.PadProbeReturn.OK
         self._frames += 1
+        if self._frames <= self._after:
+            return Gst.PadProbeReturn.OK
         if self._fault == "no-output":
             return Gst.PadProbeReturn.DROP
         if self._fault == "empty":
             pad.push(_emptied(info.get_buffer()))
             return Gst.PadProbeReturn.DROP
-        if self._frames > self._after:
-            self._fail_now()
+        self._fail_now()
         return Gst.PadProbeReturn.OK
 
     def _fail_now(self) -> None:
