@@ -72,6 +72,8 @@ def robot(
         "srt": {"bind": host, "port": udp, "latency_ms": latency_ms},
         "encoders": {"order": ["x264"]},
         "adaptive": {"enabled": adaptive},
+        # Watchdogs are not what is measured: a machine that is busy otherwise must not end a long run.
+        "timeouts": {"start_s": 20, "source_silence_s": 10, "encoder_silence_s": 10},
         "runtime_dir": str(workdir / name),
     }
     gateway = {
