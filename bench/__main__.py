@@ -14,6 +14,8 @@ from bench import report
 GROUPS = {
     "ros": "bench.ros",
     "status": "bench.status",
+    "watch": "bench.watch",
+    "events": "bench.events",
     "idle": "bench.idle",
     "video": "bench.video",
     "viewer": "bench.viewer",

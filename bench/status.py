@@ -6,11 +6,9 @@ so for both; the median round speaks.
 
 import asyncio
 import statistics
-import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +16,7 @@ import grpc
 import uvloop
 
 from bench.rows import Row
+from bench.stack import running_stack
 from bench.status_server import EMPTY_METHOD
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
@@ -38,8 +37,8 @@ class Round:
 
 
 def run(names: list[str]) -> list[Row]:
-    with _server() as port:
-        empty, status = uvloop.run(_measure(port))
+    with running_stack() as stack:
+        empty, status = uvloop.run(_measure(stack.port))
     rows = [
         Row(
             name="status.throughput",
@@ -60,22 +59,6 @@ def run(names: list[str]) -> list[Row]:
         ),
     ]
     return [row for row in rows if not names or row.name in names]
-
-
-@contextmanager
-def _server() -> Iterator[int]:
-    with subprocess.Popen(
-        [sys.executable, "-m", "bench.status_server"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdin
-        assert process.stdout
-        try:
-            yield int(process.stdout.readline())
-        finally:
-            process.stdin.close()
 
 
 async def _measure(port: int) -> tuple[list[Round], list[Round]]:

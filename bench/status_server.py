@@ -1,11 +1,14 @@
 """The server that bench.status measures: the gateway's own stack with everything filled, and an empty method.
 
-Run as a program it prints its port, serves until its standard input ends and uses no ROS.
+Run as a program it prints its port, serves until its standard input ends and uses no ROS. Callers may ask as
+often as they like, unless the word "limited" follows.
 """
 
 import asyncio
+import itertools
 import sys
 import time
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import grpc
@@ -20,6 +23,8 @@ from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
+from gateway.rpc.limiting import LimitInterceptor
+from gateway.rpc.limits import Admission, Limits
 from gateway.rpc.server import SERVICE, method_handlers
 from gateway.rpc.servicer import RobotGateway, Streams
 from gateway.rpc.staying import Staying
@@ -58,6 +63,11 @@ from gateway.status.values import (
 )
 
 EMPTY_METHOD = "/bench.Reference/Empty"
+CONSTANT_METHOD = "/bench.Reference/Constant"
+RAISE_METHOD = "/bench.Reference/Raise"
+CONSTANT_EVERY_S = 0.1
+_UNLIMITED = Limits(requests_per_s=1e9, burst=1_000_000_000)
+"""The same code runs; nobody is refused."""
 _TOO_HOT = Condition("platform.temperature", Severity.WARNING, "computer", "it is too hot", "let it cool")
 FAULTS = (Fault(_TOO_HOT, onset_s=0.0, seen_s=1.0, cleared_s=None, times_raised=1),) * 5
 _ALL_WELL = Diagnostics((DiagnosticItem("lidar", DiagnosticLevel.OK, ""),) * 20)
@@ -66,10 +76,10 @@ _NEWS_EVERY_S = 0.05
 
 
 def main() -> None:
-    uvloop.run(_serve())
+    uvloop.run(_serve(unlimited="limited" not in sys.argv[1:]))
 
 
-async def _serve() -> None:
+async def _serve(unlimited: bool) -> None:
     board, events = Board(), EventLog("bench")
     reconciler, tally = Reconciler(1), Tally()
     link = PreviewLink(Path("/nonexistent"), reconciler)
@@ -88,31 +98,46 @@ async def _serve() -> None:
             now_s=time.monotonic(),
         )
 
+    streams = Streams(StatusWatch(snapshot, time.monotonic), EventStreams(events), Staying(lambda _: None))
     gateway = RobotGateway(
         snapshot,
         Answers(snapshot, lambda: link.view, time.monotonic),
         PreviewControl(link, 1.0),
         Callers(None),
-        Streams(StatusWatch(snapshot, time.monotonic), EventStreams(events), Staying(lambda _: None)),
+        streams,
         tally=tally,
         controls=Controls(lambda _: None),
         configuration_json="{}",
     )
-    server = new_server()
+
+    async def raise_event(_request: bytes, _context: Context) -> bytes:
+        events.add(_mode("an event"), time.monotonic())
+        return b""
+
+    server = new_server([LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits()))])
     server.add_generic_rpc_handlers(
         (
             grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),
             grpc.method_handlers_generic_handler(
-                "bench.Reference", {"Empty": grpc.unary_unary_rpc_method_handler(_empty)}
+                "bench.Reference",
+                {
+                    "Empty": grpc.unary_unary_rpc_method_handler(_empty),
+                    "Constant": grpc.unary_stream_rpc_method_handler(_constant),
+                    "Raise": grpc.unary_unary_rpc_method_handler(raise_event),
+                },
             ),
         )
     )
     port = bind_tcp(server, "127.0.0.1", 0)
     await server.start()
-    news = asyncio.create_task(_bring_news(board, reconciler))
+    background = [
+        asyncio.create_task(_bring_news(board, reconciler)),
+        asyncio.create_task(streams.watch.run()),
+    ]
     print(port, flush=True)
     await asyncio.to_thread(sys.stdin.read)
-    news.cancel()
+    for task in background:
+        task.cancel()
     await server.stop(None)
 
 
@@ -124,10 +149,19 @@ async def _empty(_request: bytes, _context: Context) -> bytes:
     return b""
 
 
-async def _bring_news(board: Board, reconciler: Reconciler) -> None:
+async def _constant(request: bytes, _context: Context) -> AsyncIterator[bytes]:
+    """The request again, ten times a second."""
     while True:
+        yield request
+        await asyncio.sleep(CONSTANT_EVERY_S)
+
+
+async def _bring_news(board: Board, reconciler: Reconciler) -> None:
+    for number in itertools.count():
         now = time.monotonic()
-        board.odometry = Received(Odometry(vx_mps=0.51, vy_mps=-0.02, wz_rad_s=0.1), now)
+        # A robot that moves: something changes all the time.
+        speed_mps = 0.5 + number % 100 / 1000
+        board.odometry = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
         board.mode = Received(Mode("exploring"), now)
         board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
         board.mux_inputs = {CommandSource.KEYBOARD: board.effective_command}

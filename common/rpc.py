@@ -68,7 +68,7 @@ _SERVER_OPTIONS: Final = (
 _DEFECT: Final = "internal error; the robot's log says more"
 _LEFT: Final = grpc.StatusCode.CANCELLED
 """How a call ends whose caller leaves before the answer."""
-_MAX_CONCURRENT_CALLS: Final = 256
+_MAX_CONCURRENT_CALLS: Final = 4096
 """More at once, of all connections, are refused with RESOURCE_EXHAUSTED. (Beyond a connection's own limit
 HTTP/2 resets streams, which a flooding caller may see as UNAVAILABLE.)"""
 

@@ -1,7 +1,7 @@
 """Every call passes here first. Who wants too much is refused, and waits for the refusal.
 
 To refuse costs nearly as much as to answer: whoever asks again at once would still take the time of all
-others. So a refusal comes late, and a client that floods is slowed down by its own open calls.
+others. So refusals come late and one by one, and a client that floods is slowed down by its own open calls.
 """
 
 import asyncio
@@ -14,10 +14,8 @@ from common.errors import TooMuchError
 from common.rpc import Context, Handler, rewrapped
 from gateway.rpc.limits import Admission
 
-PENALTY_S: Final = 1.0
-"""How late a refusal is."""
 _MOST_WAITING: Final = 1024
-"""Refusals that wait at once; beyond it they come at once, because waiting takes memory."""
+"""Refusals that wait, for five seconds then; beyond it they come at once, because waiting takes memory."""
 
 
 class LimitInterceptor(grpc.aio.ServerInterceptor):
@@ -73,6 +71,6 @@ class LimitInterceptor(grpc.aio.ServerInterceptor):
             return
         self._waiting += 1
         try:
-            await asyncio.sleep(PENALTY_S)
+            await asyncio.sleep(self._admission.refusal_in_s())
         finally:
             self._waiting -= 1

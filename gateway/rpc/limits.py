@@ -17,6 +17,10 @@ QUIET_AFTER_S: Final = 1.0
 """A connection without streams that has not asked for so long gives way when room is needed."""
 MOST_REQUEST_BYTES: Final = 128 * 1024
 """Far more than any request of the contract has; gRPC itself takes twice as much."""
+PENALTY_S: Final = 0.5
+"""A refusal comes so late at least."""
+REFUSE_EVERY_S: Final = 0.005
+"""And so long after the one before, whoever that went to."""
 _SOON_S: Final = 1.0
 """When to try again where nobody knows when there will be room."""
 
@@ -52,6 +56,8 @@ class Admission:
         self._clock = clock
         self._connections: dict[str, _Connection] = {}
         """By peer, the one that asked last at the end."""
+        self._refusal_at_s = 0.0
+        """When the last refusal that waits will leave."""
 
     @property
     def connection_count(self) -> int:
@@ -101,6 +107,12 @@ class Admission:
             connection.streams -= 1
 
         return close
+
+    def refusal_in_s(self) -> float:
+        """How long the next refusal has to wait: a while, and in line behind those that wait already."""
+        now_s = self._clock()
+        self._refusal_at_s = max(now_s + PENALTY_S, self._refusal_at_s + REFUSE_EVERY_S)
+        return self._refusal_at_s - now_s
 
     def _make_room(self, now_s: float) -> None:
         if len(self._connections) < self._limits.connections:

@@ -1,0 +1,153 @@
+"""100 watchers of the status at 10 Hz: what they cost, whether all are served, and whom they disturb.
+
+The reference of the cost is the same server streaming constant bytes of the same size, as often. What the
+others cost a caller who asks for one status after the other is measured against the same caller alone. Both
+in turns; the others run at low priority, because on a robot they would run on other machines.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import grpc
+
+from bench.processes import cpu_share
+from bench.rows import Row
+from bench.stack import Stack, running_stack
+from bench.watch_load import INTERVAL_MS, SERVICE
+
+WATCHERS = 100
+ROUNDS = 3
+ROUND_S = 5.0
+CALLS = 400
+PAUSE_S = 0.01
+_OTHERS = ("stall", "flood")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one round of streams."""
+
+    cpu_percent: float
+    served: float
+    """Of the intervals of the round, how many the stream with the fewest answers got, as a share."""
+
+
+def run(names: list[str]) -> list[Row]:
+    rows: list[Row] = []
+    if not names or {"watch.cpu_100", "watch.served_100"} & set(names):
+        rows += _streams()
+    if not names or "watch.p99_healthy" in names:
+        rows.append(_healthy())
+    return [row for row in rows if not names or row.name in names]
+
+
+def _streams() -> list[Row]:
+    watched, constant = [], []
+    with running_stack() as stack:
+        for number in range(ROUNDS):
+            watched.append(_cost(stack, WATCHERS, 0))
+            constant.append(_cost(stack, 0, WATCHERS))
+            _progress(f"round {number + 1} of {ROUNDS}")
+    return [
+        Row(
+            name="watch.cpu_100",
+            what=f"CPU of {WATCHERS} watchers at 10 Hz against streaming constant bytes on the same stack",
+            unit="% of a core",
+            value=statistics.median(each.cpu_percent for each in watched),
+            reference=statistics.median(each.cpu_percent for each in constant),
+            bar=1.5,
+        ),
+        Row(
+            name="watch.served_100",
+            what="the same watchers: intervals with an answer, of the watcher that had the fewest",
+            unit="of 1",
+            value=min(each.served for each in watched),
+            reference=None,
+            bar=0.97,
+            better="higher",
+        ),
+    ]
+
+
+def _cost(stack: Stack, watchers: int, constants: int) -> Cost:
+    with _load(stack, watchers, constants) as load:
+        time.sleep(0.5)
+        before, began_s = _received(load), time.monotonic()
+        cpu_percent = cpu_share(stack.pid, ROUND_S).whole
+        after, passed_s = _received(load), time.monotonic() - began_s
+    intervals = passed_s * 1000 / INTERVAL_MS
+    fewest = min(late - early for early, late in zip(before, after, strict=True))
+    return Cost(cpu_percent, fewest / intervals)
+
+
+def _healthy() -> Row:
+    alone, among = [], []
+    with running_stack("limited") as stack:
+        target = f"127.0.0.1:{stack.port}"
+        with grpc.insecure_channel(target, options=(("grpc.use_local_subchannel_pool", 1),)) as channel:
+            call = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
+            _p99_ms(call)
+            for number in range(ROUNDS):
+                alone.append(_p99_ms(call))
+                with _load(stack, WATCHERS, 0, *_OTHERS):
+                    time.sleep(2)
+                    among.append(_p99_ms(call))
+                _progress(f"healthy caller, round {number + 1} of {ROUNDS}")
+    return Row(
+        name="watch.p99_healthy",
+        what=f"GetSystemStatus, 99th percentile, among {WATCHERS} watchers, one stalled reader and one that "
+        "floods, against alone",
+        unit="ms",
+        value=statistics.median(among),
+        reference=statistics.median(alone),
+        bar=1.3,
+    )
+
+
+def _p99_ms(call: Any) -> float:
+    took_s = []
+    for _ in range(CALLS):
+        time.sleep(PAUSE_S)
+        sent_s = time.perf_counter()
+        call(b"")
+        took_s.append(time.perf_counter() - sent_s)
+    return statistics.quantiles(took_s, n=100)[98] * 1000
+
+
+@contextmanager
+def _load(stack: Stack, watchers: int, constants: int, *others: str) -> Iterator[subprocess.Popen[str]]:
+    words = [str(stack.port), str(watchers), str(constants), *others]
+    with subprocess.Popen(
+        ["nice", "-n", "15", sys.executable, "-m", "bench.watch_load", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdin
+        assert process.stdout
+        try:
+            if "ready" not in process.stdout.readline():
+                raise RuntimeError("the watchers did not come up")
+            yield process
+        finally:
+            process.stdin.close()
+
+
+def _received(load: subprocess.Popen[str]) -> list[int]:
+    assert load.stdin
+    assert load.stdout
+    load.stdin.write("\n")
+    load.stdin.flush()
+    counts: list[int] = json.loads(load.stdout.readline())
+    return counts
+
+
+def _progress(words: str) -> None:
+    print(f"watch: {words}", file=sys.stderr)
