@@ -10,7 +10,7 @@ from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, TargetOption, session_of
+from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
 from console.cli.words import plural
@@ -43,17 +43,18 @@ def events(
         SeverityWord, typer.Option("--severity", help="Leave out what matters less.")
     ] = SeverityWord.INFO,
     target: TargetOption = None,
+    robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show what happened on the robot, as far as the gateway keeps it.
 
     With --follow also what happens from now on, each event once, whatever becomes of the connection.
     """
-    session = session_of(context, target, as_json)
+    session = session_of(context, target, as_json, robot)
     after = _position(since)
     least = FaultSeverity.UNKNOWN if severity is SeverityWord.INFO else FaultSeverity(severity.value)
-    with session.connect() as robot, until_stopped(robot.close) as stopped:
-        for item in stopped.as_end_of(robot.events(after, least=least)):
+    with session.connect() as gateway, until_stopped(gateway.close) as stopped:
+        for item in stopped.as_end_of(gateway.events(after, least=least)):
             if isinstance(item, CaughtUp):
                 if not follow:
                     return

@@ -1,0 +1,62 @@
+"""The examples of docs/client.md, run as they stand against a real gateway."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from console.client import ClientOptions, GatewayClient, GatewayError, errors
+from tests.support.documented_code import DOCS, Example, examples
+from tests.support.gateway_program import gateway_program
+from tests.support.preview_double import double_process
+from tests.support.robotctl import environment
+
+PAGE = (DOCS / "client.md").read_text(encoding="utf-8")
+ENDS_WITHIN_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    directory = tmp_path_factory.mktemp("gateway")
+    with double_process(directory / "preview.sock"), gateway_program(directory, sources=[]) as gateway:
+        yield f"127.0.0.1:{gateway.port}"
+
+
+@pytest.mark.parametrize("example", examples("client.md"), ids=lambda example: f"example-{example.number}")
+def test_an_example_prints_what_it_says(example: Example, target: str, tmp_path: Path) -> None:
+    book = tmp_path / "robotctl/config.toml"
+    book.parent.mkdir()
+    book.write_text(f'[robots.lab2]\ntarget = "{target}"\n')
+    ran = subprocess.run(
+        [sys.executable, "-W", "error", "-c", example.code.replace("robot.local", target)],
+        capture_output=True,
+        text=True,
+        timeout=ENDS_WITHIN_S,
+        env=environment(XDG_CONFIG_HOME=str(tmp_path)),
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert example.prints, "an example that promises nothing proves nothing"
+    rest = ran.stdout
+    for promised in example.prints:
+        _, found, rest = rest.partition(promised)
+        assert found, f"{promised!r} is not in what it printed:\n{ran.stdout}"
+
+
+def test_every_error_is_in_the_table_with_its_word() -> None:
+    family = {
+        one.__name__: one.kind
+        for one in vars(errors).values()
+        if isinstance(one, type) and issubclass(one, GatewayError) and one is not GatewayError
+    }
+    rows = dict(re.findall(r"^\| `(\w+)`(?:, a `Refused`)? \| `(\w+)` \|", PAGE, re.MULTILINE))
+    assert rows == family
+
+
+def test_every_option_and_method_is_named() -> None:
+    methods = {name for name in vars(GatewayClient) if not name.startswith("_")} - {"close"}
+    for name in (*methods, *ClientOptions.__dataclass_fields__):
+        assert f"`{name}" in PAGE or f"({name}" in PAGE, name
