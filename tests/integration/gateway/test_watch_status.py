@@ -1,0 +1,121 @@
+"""WatchSystemStatus over real connections: at once, on change, at the asked pace, and never a backlog."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+
+from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusRequest
+from tests.support.eventually import eventually
+from tests.support.preview_double import PreviewDouble, serve_double
+from tests.support.running_gateway import Operator, running_gateway
+
+# On a busy machine everything takes longer; what is asserted below are orders and counts.
+WITHIN_S = 20.0
+
+
+@pytest.fixture
+async def operator(tmp_path: Path) -> AsyncIterator[Operator]:
+    server = await serve_double(tmp_path / "preview.sock", PreviewDouble())
+    # A computer that is not looked at changes nothing.
+    async with running_gateway(tmp_path / "preview.sock", platform={"interval_ms": 600_000}) as operator:
+        await eventually(operator.status, lambda it: it.preview.service_reachable, "they have met")
+        yield operator
+    await server.stop(None)
+
+
+def watching(operator: Operator, min_interval_ms: int = 0) -> Any:
+    return operator.stub.WatchSystemStatus(WatchSystemStatusRequest(min_interval_ms=min_interval_ms))
+
+
+async def take(call: Any) -> Any:
+    async with asyncio.timeout(WITHIN_S):
+        return await call.read()
+
+
+async def test_the_first_status_comes_at_once_and_the_next_when_something_changes(operator: Operator) -> None:
+    call = watching(operator)
+    first = await take(call)
+    assert first.status.gateway_name
+    assert abs(first.monotonic_ns - time.monotonic_ns()) < WITHIN_S * 1e9
+    switching = asyncio.create_task(operator.switch(True))
+    while not (await take(call)).status.preview.endpoint.uri:
+        pass
+    await switching
+    call.cancel()
+
+
+async def test_what_does_not_change_is_told_once_a_second_with_its_age(operator: Operator) -> None:
+    call = watching(operator)
+    await take(call)
+    await take(call)  # perhaps the last change of the beginning
+    instants = [(await take(call)).monotonic_ns for _ in range(4)]
+    between_s = [(later - earlier) / 1e9 for earlier, later in pairwise(instants)]
+    assert all(each > 0.9 for each in between_s), between_s
+    call.cancel()
+
+
+async def test_nobody_is_told_more_often_than_asked(operator: Operator) -> None:
+    call = watching(operator, min_interval_ms=300)
+    instants = [(await take(call)).monotonic_ns]
+    stop = asyncio.Event()
+
+    async def change_all_the_time() -> None:
+        enabled = False
+        while not stop.is_set():
+            enabled = not enabled
+            await operator.switch(enabled)
+
+    changing = asyncio.create_task(change_all_the_time())
+    while len(instants) < 8:
+        instants.append((await take(call)).monotonic_ns)
+    stop.set()
+    await changing
+    between_s = [(later - earlier) / 1e9 for earlier, later in pairwise(instants)]
+    # The first interval begins between two ticks.
+    assert all(each > 0.24 for each in between_s[1:]), between_s
+    call.cancel()
+
+
+async def test_an_interval_beyond_the_schemas_bound_is_refused(operator: Operator) -> None:
+    with pytest.raises(grpc.aio.AioRpcError) as seen:
+        await take(watching(operator, min_interval_ms=60_001))
+    assert seen.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert "min_interval_ms" in (seen.value.details() or "")
+
+
+async def test_who_does_not_read_is_not_written_for(operator: Operator) -> None:
+    """What waits for a stalled reader is bounded by its connection, and what comes after is the newest."""
+    options = (("grpc.use_local_subchannel_pool", 1), ("grpc.http2.bdp_probe", 0))
+    async with grpc.aio.insecure_channel(f"127.0.0.1:{operator.port}", options=options) as channel:
+        stalled = Operator(channel, operator.port)
+        call = watching(stalled)
+        await take(call)
+        enabled = False
+        for _ in range(40):
+            enabled = not enabled
+            await operator.switch(enabled)
+            await asyncio.sleep(0.05)
+        # The window of a stream is 64 KiB: some dozens of statuses, however long nobody reads.
+        held_up = 0
+        while (time.monotonic_ns() - (await take(call)).monotonic_ns) / 1e9 > 0.5:
+            held_up += 1
+        assert held_up < 100
+        newest = await take(call)
+        assert time.monotonic_ns() - newest.monotonic_ns < 2e9
+        call.cancel()
+
+
+async def test_watchers_leave_nothing_behind(operator: Operator) -> None:
+    calls = [watching(operator) for _ in range(10)]
+    for call in calls:
+        await take(call)
+    for call in calls:
+        call.cancel()
+    info = await operator.status()
+    assert info.gateway.requests_served >= 10

@@ -1,0 +1,70 @@
+"""What wakes watchers, and what does not."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.status.board import Board, SourceKind
+from gateway.status.change import essence
+from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.preview import Counters, Measurement, PreviewState, PreviewView
+from gateway.status.runtime import Runtime
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.values import Mode, Odometry, Received
+
+OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
+FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
+
+
+def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
+    values: dict[str, Any] = {
+        "identity": Identity("t", "0", insecure=False),
+        "rules": Rules({SourceKind.ODOMETRY: SourceRule(1000, required=True)}, 3000),
+        "board": Board(odometry=Received(Odometry(0.5, 0, 0), 99.9), mode=Received(Mode("idle"), 99.0)),
+        "preview": replace(OFF, measured=Received(Measurement(30, 2500, 1, 10, None, None), 99.9)),
+        "events": (),
+        "faults": (FAULT,),
+        "gateway": Runtime("r", "b", 1000, 1, 1, 0),
+        "now_s": now_s,
+    }
+    return take(**(values | changed))
+
+
+BEFORE = essence(snapshot())
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        pytest.param(snapshot(now_s=100.5), id="time goes by"),
+        pytest.param(snapshot(gateway=Runtime("r", "b", 2000, 7, 99, 3)), id="others ask"),
+        pytest.param(
+            snapshot(
+                board=Board(odometry=Received(Odometry(0.5, 0, 0), 99.99), mode=Received(Mode("idle"), 99.5))
+            ),
+            id="the same values come again",
+        ),
+        pytest.param(snapshot(faults=(replace(FAULT, seen_s=100.2),)), id="a fault goes on"),
+    ],
+)
+def test_this_is_no_change(later: Snapshot) -> None:
+    assert essence(later) == BEFORE
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        pytest.param(snapshot(board=Board(odometry=Received(Odometry(0.6, 0, 0), 99.9))), id="another speed"),
+        pytest.param(snapshot(now_s=101.5), id="it grows stale"),
+        pytest.param(snapshot(faults=()), id="a fault is gone"),
+        pytest.param(snapshot(faults=(replace(FAULT, cleared_s=100.0),)), id="a fault is over"),
+        pytest.param(snapshot(preview=replace(OFF, state=PreviewState.RUNNING)), id="the preview runs"),
+        pytest.param(
+            snapshot(preview=replace(OFF, measured=Received(Measurement(29, 2500, 1, 10, None, None), 99.9))),
+            id="the preview is slower",
+        ),
+    ],
+)
+def test_this_is_a_change(later: Snapshot) -> None:
+    assert essence(later) != BEFORE

@@ -1,0 +1,113 @@
+"""Every connection has its share; nobody has the share of another."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import TooMuchError
+from common.reasons import Reason
+from gateway.rpc.limits import PENALTY_S, QUIET_AFTER_S, REFUSE_EVERY_S, Admission, Limits
+
+SMALL = Limits(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
+
+
+class Clock:
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def admission(clock: Clock) -> Admission:
+    return Admission(SMALL, clock)
+
+
+def refusal(admission: Admission, peer: str) -> TooMuchError:
+    with pytest.raises(TooMuchError) as seen:
+        admission.request(peer)
+    return seen.value
+
+
+def test_a_burst_is_served_and_then_one_by_one(admission: Admission, clock: Clock) -> None:
+    for _ in range(SMALL.burst):
+        admission.request("a")
+    error = refusal(admission, "a")
+    assert error.reason is Reason.TOO_MANY_REQUESTS
+    assert error.retry_after_s == pytest.approx(0.1)
+    clock.now_s += 0.1001
+    admission.request("a")
+    assert refusal(admission, "a").retry_after_s == pytest.approx(0.1, rel=0.01)
+
+
+def test_what_one_has_spent_the_other_still_has(admission: Admission) -> None:
+    for _ in range(SMALL.burst):
+        admission.request("a")
+    refusal(admission, "a")
+    admission.request("b")
+
+
+def test_streams_are_counted_while_they_are_open(admission: Admission) -> None:
+    admission.request("a")
+    close = admission.open_stream("a")
+    admission.open_stream("a")
+    with pytest.raises(TooMuchError) as seen:
+        admission.open_stream("a")
+    assert seen.value.reason is Reason.TOO_MANY_STREAMS
+    close()
+    admission.open_stream("a")
+
+
+def test_a_new_connection_takes_the_place_of_the_quietest(admission: Admission, clock: Clock) -> None:
+    for peer in ("a", "b", "c"):
+        admission.request(peer)
+    error = refusal(admission, "d")
+    assert error.reason is Reason.TOO_MANY_CONNECTIONS
+    assert error.retry_after_s
+    clock.now_s += QUIET_AFTER_S
+    admission.request("a")
+    admission.request("d")
+    assert admission.connection_count == 3
+    admission.request("c")
+    assert refusal(admission, "b").reason is Reason.TOO_MANY_CONNECTIONS, "b was the quietest"
+
+
+def test_who_has_a_stream_open_is_never_put_out(admission: Admission, clock: Clock) -> None:
+    for peer in ("a", "b", "c"):
+        admission.request(peer)
+        admission.open_stream(peer)
+    clock.now_s += 3600
+    assert refusal(admission, "d").reason is Reason.TOO_MANY_CONNECTIONS
+
+
+def test_refusals_stand_in_line(admission: Admission, clock: Clock) -> None:
+    waits = [admission.refusal_in_s() for _ in range(3)]
+    assert waits == pytest.approx([PENALTY_S, PENALTY_S + REFUSE_EVERY_S, PENALTY_S + 2 * REFUSE_EVERY_S])
+    clock.now_s += 60
+    assert admission.refusal_in_s() == pytest.approx(PENALTY_S)
+
+
+@given(st.lists(st.tuples(st.sampled_from("abcdef"), st.floats(0, 0.3)), max_size=200))
+def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
+    clock = Clock()
+    admission = Admission(Limits(connections=100, requests_per_s=10, burst=5), clock)
+    served: dict[str, list[float]] = {}
+    refused: list[TooMuchError] = []
+    for peer, pause_s in asked:
+        clock.now_s += pause_s
+        try:
+            admission.request(peer)
+        except TooMuchError as error:
+            refused.append(error)
+        else:
+            served.setdefault(peer, []).append(clock.now_s)
+    assert all(0 < (error.retry_after_s or 0) <= 0.1 + 1e-9 for error in refused)
+    for instants in served.values():
+        for number, first_s in enumerate(instants):
+            for later, last_s in enumerate(instants[number:], start=1):
+                assert later <= 5 + (last_s - first_s) * 10 + 1e-6
