@@ -58,9 +58,11 @@ _SERVER_OPTIONS: Final = (
     ("grpc.max_concurrent_streams", 256),
     # From the connection to the first whole word.
     ("grpc.server_handshake_timeout_ms", 5_000),
-    # A peer that left without a word is noticed after 10 + 5 s.
-    ("grpc.keepalive_time_ms", 10_000),
-    ("grpc.keepalive_timeout_ms", 5_000),
+    # A peer that left without a word is noticed after 5 + 3 s.
+    ("grpc.keepalive_time_ms", 5_000),
+    ("grpc.keepalive_timeout_ms", 3_000),
+    # Without this one gRPC 1.85 waits 60 s for any ping's answer, keepalive or not.
+    ("grpc.http2.ping_timeout_ms", 3_000),
     ("grpc.keepalive_permit_without_calls", 1),
     # Clients may look more often themselves (ours every 2 s) without being sent away.
     ("grpc.http2.min_ping_interval_without_data_ms", 1_000),

@@ -38,6 +38,7 @@ class Relay:
         self._silent: set[socket.socket] = set()
         self._wake_here, self._wake_there = socket.socketpair()
         self._fall_silent = threading.Event()
+        self._cut = threading.Event()
         self._ended = threading.Event()
         self.connections = 0
         self._thread = threading.Thread(target=self._run, name="relay")
@@ -58,6 +59,11 @@ class Relay:
         self._fall_silent.set()
         self._wake_there.send(b"x")
 
+    def cut(self) -> None:
+        """Closes the connections that exist; new ones work."""
+        self._cut.set()
+        self._wake_there.send(b"x")
+
     def _run(self) -> None:
         while not self._ended.is_set():
             ready, _, _ = select.select([self._listener, self._wake_here, *self._pairs], [], [])
@@ -70,12 +76,21 @@ class Relay:
                         self._fall_silent.clear()
                         self._silent |= set(self._pairs)
                         self._pairs.clear()
+                    if self._cut.is_set():
+                        self._cut.clear()
+                        for end in self._pairs:
+                            end.close()
+                        self._pairs.clear()
                 elif one in self._pairs:
                     self._pass_on(one)
 
     def _accept(self) -> None:
         near, _ = self._listener.accept()
-        far = socket.create_connection(self._to)
+        try:
+            far = socket.create_connection(self._to)
+        except ConnectionRefusedError:
+            near.close()
+            return
         self._pairs[near], self._pairs[far] = far, near
         self.connections += 1
 

@@ -1,0 +1,98 @@
+"""The gateway's event streams on a port of their own: things happen when a test says so, and runs end."""
+
+import asyncio
+from types import TracebackType
+from typing import Any, Self
+
+import grpc
+
+from common.rpc import new_server
+from console.client import EventPosition
+from gateway.rpc.mapping.events import position_from
+from gateway.rpc.subscribing import EventStreams
+from gateway.status.event import ModeChanged, News
+from gateway.status.events import EventLog
+from gateway.status.faults.fault import Severity
+from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
+
+
+class EventServer:
+    """One port; behind it one run of the gateway after the other.
+
+    Args:
+        kept: how many events each run remembers.
+    """
+
+    def __init__(self, kept: int) -> None:
+        self._kept = kept
+        self._runs = 0
+        self.port = 0
+        self.happened: dict[str, int] = {}
+        """How many events each run had."""
+
+    @property
+    def newest(self) -> EventPosition:
+        """After everything that has happened."""
+        return EventPosition(self._log.run_id, self._log.sequence)
+
+    def happen(self, count: int) -> None:
+        """So many things happen at once."""
+        for _ in range(count):
+            words = f"event {self._log.sequence + 1}"
+            self._log.add(News(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
+        self.happened[self._log.run_id] = self._log.sequence
+
+    async def restart(self) -> None:
+        """The gateway ends, and another run of it takes its place."""
+        await self._server.stop(0)
+        await self._start()
+
+    async def __aenter__(self) -> Self:
+        await self._start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self._server.stop(0)
+
+    async def _start(self) -> None:
+        self._runs += 1
+        self._log = EventLog(f"run {self._runs}", self._kept)
+        streams = EventStreams(self._log)
+
+        def subscribe(request: SubscribeEventsRequest, _context: Any) -> Any:
+            after = position_from(request.after) if request.HasField("after") else None
+            return streams.events(after, Severity.INFO)
+
+        handler = grpc.unary_stream_rpc_method_handler(
+            _as_generator(subscribe), SubscribeEventsRequest.FromString, None
+        )
+        self._server = new_server()
+        self._server.add_generic_rpc_handlers(
+            (
+                grpc.method_handlers_generic_handler(
+                    "omniseer.gateway.v1.RobotGateway", {"SubscribeEvents": handler}
+                ),
+            )
+        )
+        self.port = await _bound(self._server, self.port)
+        await self._server.start()
+
+
+def _as_generator(subscribe: Any) -> Any:
+    async def call(request: Any, context: Any) -> Any:
+        async for answer in subscribe(request, context):
+            yield answer
+
+    return call
+
+
+async def _bound(server: grpc.aio.Server, port: int) -> int:
+    """The port of the run before may take a moment to be free."""
+    async with asyncio.timeout(10):
+        while True:
+            try:
+                return server.add_insecure_port(f"127.0.0.1:{port}")
+            except RuntimeError:
+                await asyncio.sleep(0.01)
