@@ -11,7 +11,8 @@ from typing import Final
 
 from common.health import Health
 from common.rpc import Observe, unobserved
-from gateway.config import GatewaySettings, LimitSettings, MetricsSettings, SourceSettings
+from gateway.config import GatewaySettings, LimitSettings, MetricsSettings, SecuritySettings, SourceSettings
+from gateway.door import Door
 from gateway.knowledge import Knowledge
 from gateway.metrics.calls import Calls
 from gateway.metrics.collector import GatewayCollector
@@ -24,6 +25,7 @@ from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
+from gateway.rpc.identity import caller_name
 from gateway.rpc.limits import Limits
 from gateway.rpc.server import SERVICE, serving
 from gateway.rpc.servicer import RobotGateway, Streams
@@ -51,9 +53,9 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: a part can't start.
     """
-    if settings.security.insecure:
-        _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
-    link = PreviewLink(settings.preview.socket, _reconciler(settings.preview.encrypted))
+    _tell_who_gets_in(settings.security)
+    door = Door(settings.security)
+    link = PreviewLink(settings.preview.socket, _reconciler(settings.preview_encrypted))
     tally = Tally()
     knowledge = Knowledge(settings, lambda: link.view, tally)
     streams = Streams(
@@ -68,11 +70,11 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         Callers(settings.preview.advertised_host),
         streams,
         tally=tally,
-        controls=Controls(knowledge.note),
+        controls=Controls(knowledge.note, caller_name, door.note),
         configuration_json=shown_settings(settings),
     )
     board, health = knowledge.board, Health(SERVICE)
-    with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board):
+    with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board), door.recording():
         async with (
             _metrics(settings.metrics, knowledge) as observe,
             serving(
@@ -82,13 +84,17 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
                 health,
                 observe=observe,
                 limits=_limits(settings.limits),
+                guard=door.guard,
+                credentials=door.credentials(),
+                socket=settings.grpc.socket,
             ),
             asyncio.TaskGroup() as timers,
         ):
             background = [
                 timers.create_task(link.run(), name="preview-link"),
                 timers.create_task(streams.watch.run(), name="status-watch"),
-                timers.create_task(_observe(knowledge, link, streams.staying), name="observer"),
+                timers.create_task(_observe(knowledge, link, streams.staying, door), name="observer"),
+                timers.create_task(door.run(), name="door"),
                 timers.create_task(_tell_health(link, health), name="health"),
             ]
             await stop.wait()
@@ -105,6 +111,13 @@ def _limits(settings: LimitSettings) -> Limits:
         burst=settings.burst,
         request_bytes=settings.request_bytes,
     )
+
+
+def _tell_who_gets_in(security: SecuritySettings) -> None:
+    if security.insecure and security.credentials is None:
+        _log.warning("security.insecure: everybody who reaches this gateway may read and switch everything")
+    elif security.insecure and not security.guarded:
+        _log.warning("security.insecure: everybody on the way may read tokens and answers")
 
 
 def _reconciler(encrypted: bool) -> Reconciler:
@@ -147,9 +160,10 @@ async def _metrics(settings: MetricsSettings, knowledge: Knowledge) -> AsyncIter
             measuring.cancel()
 
 
-async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying) -> None:
+async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying, door: Door) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     while True:
+        knowledge.board.access = door.view()
         now = knowledge.snapshot()
         knowledge.observe(now)
         staying.look()

@@ -11,9 +11,11 @@ from common.findings import exit_code, print_findings
 from common.program import run, run_to_exit
 from gateway.app import serve as serve_until
 from gateway.config import load_settings
+from gateway.credentials_cli import app as credentials_app
 from gateway.doctor.examination import examine
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
+app.add_typer(credentials_app, name="credentials")
 
 Config = Annotated[
     Path | None,

@@ -118,13 +118,66 @@ class GrpcSettings(Section):
     host: str = Field(default="127.0.0.1", min_length=1)
     port: int = Field(default=50051, ge=0, le=65535)
     """0 takes any free one; the log tells which."""
+    socket: Path | None = None
+    """A Unix socket to serve on as well, for this machine's own health checks. Unencrypted; whoever asks for
+    more than the health service needs a credential there, too."""
+
+
+class TlsSettings(Section):
+    """How connections are encrypted. Counts where there are credentials."""
+
+    enabled: bool = True
+    """False sends tokens and answers in the clear: on loopback alone, behind a tunnel."""
+    certificate: Path | None = None
+    """What the gateway shows (PEM, with the chain); by default the one that the credentials have."""
+    key: Path | None = None
+    """The certificate's key (PEM, its owner's alone)."""
+    client_certificates: bool = False
+    """Whether every caller must show a certificate."""
+    client_ca: Path | None = None
+    """Who signs these (PEM); by default the credentials' own authority."""
+
+    @model_validator(mode="after")
+    def _keep_pairs(self) -> Self:
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key belong together: name both, or neither")
+        if self.client_certificates and not self.enabled:
+            raise ValueError("client_certificates need TLS: leave enabled at true")
+        return self
+
+
+class AuditSettings(Section):
+    """Where control actions are recorded, besides the program's own log."""
+
+    file: Path | None = None
+    """JSON lines; by default audit.jsonl beside the credentials, and none where there are none."""
+    max_kib: int = Field(default=1024, ge=4, le=1_048_576)
+    """When a file is this long, a new one is begun."""
+    generations: int = Field(default=4, ge=1, le=100)
+    """Files that are kept, the newest included."""
 
 
 class SecuritySettings(Section):
     """Who may call."""
 
     insecure: bool = False
-    """Whether everybody who reaches the address may read and switch everything, unencrypted."""
+    """Whether everybody on the way may listen in, and, without credentials, switch everything."""
+    credentials: Path | None = None
+    """What `robot-gateway credentials init` makes; with it, every caller proves who they are."""
+    tls: TlsSettings = TlsSettings()
+    audit: AuditSettings = AuditSettings()
+
+    @property
+    def guarded(self) -> bool:
+        """Whether nobody gets in unknown, and nobody else can listen."""
+        return self.credentials is not None and self.tls.enabled
+
+    @model_validator(mode="after")
+    def _need_credentials(self) -> Self:
+        tls = self.tls
+        if self.credentials is None and (tls.certificate or tls.client_certificates or tls.client_ca):
+            raise ValueError("tls alone lets everybody in: name the directory of the credentials, too")
+        return self
 
 
 class MetricsSettings(Section):
@@ -133,6 +186,8 @@ class MetricsSettings(Section):
     host: str = Field(default="127.0.0.1", min_length=1)
     port: int | None = Field(default=None, ge=0, le=65535)
     """None: no metrics. 0 takes any free one; the log tells which."""
+    insecure: bool = False
+    """Whether everybody who reaches the address may read them; any other than loopback needs it."""
 
 
 class LimitSettings(Section):
@@ -157,8 +212,9 @@ class PreviewSettings(Section):
     """How long a request to switch waits for the new state before it is answered with the present one."""
     advertised_host: str | None = Field(default=None, min_length=1)
     """The address viewers are sent to; by default the one by which the caller reached the gateway."""
-    encrypted: bool = False
-    """Whether each session gets a passphrase of its own; the preview's configuration says how strong."""
+    encrypted: bool | None = None
+    """Whether each session gets a passphrase of its own; the preview's configuration says how strong. By
+    default it does where callers prove who they are."""
 
 
 class PlatformSettings(Section):
@@ -192,6 +248,12 @@ class GatewaySettings(Settings):
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """None at all makes a gateway that needs no ROS."""
 
+    @property
+    def preview_encrypted(self) -> bool:
+        """Whether the stream has a passphrase."""
+        wanted = self.preview.encrypted
+        return self.security.credentials is not None if wanted is None else wanted
+
 
 def load_settings(path: Path | None) -> GatewaySettings:
     """Reads and checks the configuration, the parts alone and together.
@@ -216,10 +278,23 @@ def is_loopback(host: str) -> bool:
 
 
 def _check_exposure(settings: GatewaySettings) -> None:
-    if not settings.security.insecure and not is_loopback(settings.grpc.host):
+    security = settings.security
+    if not (security.insecure or security.guarded or is_loopback(settings.grpc.host)):
+        what = "everybody on that network could read and switch everything"
+        if security.credentials is not None:
+            what = "everybody on that network could read tokens and answers (security.tls.enabled is false)"
         raise UserError(
-            f"grpc.host is {settings.grpc.host}: everybody on that network could read and switch everything",
-            "Use 127.0.0.1 and a tunnel, or accept it with 'security: {insecure: true}'",
+            f"grpc.host is {settings.grpc.host}: {what}",
+            "Ask callers who they are ('robot-gateway credentials init' tells how), use 127.0.0.1 "
+            "and a tunnel, or accept it with 'security: {insecure: true}'",
+            exit_code=ExitCode.USAGE,
+        )
+    metrics = settings.metrics
+    open_metrics = metrics.port is not None and not is_loopback(metrics.host)
+    if open_metrics and not (security.insecure or metrics.insecure):
+        raise UserError(
+            f"metrics.host is {metrics.host}: everybody on that network could read the metrics",
+            "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",
             exit_code=ExitCode.USAGE,
         )
 

@@ -51,6 +51,8 @@ class FaultSettings(Section):
     battery_percent: LowerLimit = LowerLimit(raise_at=20, clear_at=25)
     """Of the robot's battery and of the computer's."""
     wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
+    expiry_days: float = Field(default=14, ge=0, le=3650)
+    """How long before its end a certificate is a fault."""
 
     def platform_limits(self) -> PlatformLimits:
         """The limits as the rules take them."""

@@ -36,7 +36,9 @@ class Knowledge:
 
     def __init__(self, settings: GatewaySettings, preview: Callable[[], PreviewView], tally: Tally) -> None:
         faults = settings.faults
-        self._identity = Identity(settings.name, project_version(), settings.security.insecure)
+        self._identity = Identity(
+            settings.name, project_version(), settings.security.insecure and not settings.security.guarded
+        )
         self._rules = _rules(settings)
         self._preview = preview
         self._tally = tally
@@ -44,7 +46,8 @@ class Knowledge:
         self._started_s = time.monotonic()
         self._book = FaultBook(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
         self._observer = Observer(
-            self._book, FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000)
+            self._book,
+            FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000, faults.expiry_days),
         )
         self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
 

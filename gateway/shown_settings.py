@@ -7,7 +7,9 @@ from gateway.config import GatewaySettings
 
 # Where values come from, devices and paths: the contract names none of them. Secrets are listed by what their
 # names hold, so that a new one is hidden before anybody thinks of it.
-_OWN_AFFAIR: Final = frozenset({"topic", "type", "reliability", "durability", "socket", "disk_path"})
+_OWN_AFFAIR: Final = frozenset(
+    {"topic", "type", "reliability", "durability", "socket", "disk_path", "credentials", "file", "client_ca"}
+)
 _SECRET: Final = ("secret", "token", "password", "passphrase", "private", "key", "cert")
 
 

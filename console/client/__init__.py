@@ -13,6 +13,7 @@ frozen value of `console.client.results` or raises a `GatewayError` that says wh
 from console.client.aio import AsyncGatewayClient
 from console.client.blocking import GatewayClient
 from console.client.clock import Clock, Offset
+from console.client.credentials import Credentials
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -20,6 +21,7 @@ from console.client.errors import (
     GatewayFailed,
     InvalidRequest,
     NotAllowed,
+    NotTrusted,
     Overloaded,
     Refused,
     Unreachable,
@@ -52,6 +54,7 @@ __all__ = [
     "CaughtUp",
     "ClientOptions",
     "Clock",
+    "Credentials",
     "DeadlineExceeded",
     "Event",
     "EventGap",
@@ -63,6 +66,7 @@ __all__ = [
     "GatewayInfo",
     "InvalidRequest",
     "NotAllowed",
+    "NotTrusted",
     "Offset",
     "Outage",
     "OverlaySnapshot",

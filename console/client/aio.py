@@ -9,6 +9,7 @@ import grpc
 
 from console.client.aio_stream import follow
 from console.client.clock import Clock, Offset
+from console.client.credentials import NO_CREDENTIALS, Credentials
 from console.client.error_table import error_from
 from console.client.errors import Cancelled, GatewayError
 from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
@@ -47,19 +48,27 @@ class AsyncGatewayClient:
     Args:
         target: HOST or HOST:PORT.
         options: how patient to be.
+        credentials: what proves who asks; None where the robot doesn't want to know.
 
     Raises:
-        UserError: the target is not an address. Every method raises a `GatewayError`.
+        UserError: the target is not an address, or the credentials would be sent in the clear. Every method
+            raises a `GatewayError`.
     """
 
-    def __init__(self, target: str = DEFAULT_TARGET, options: ClientOptions | None = None) -> None:
+    def __init__(
+        self,
+        target: str = DEFAULT_TARGET,
+        options: ClientOptions | None = None,
+        credentials: Credentials | None = None,
+    ) -> None:
         options = options or ClientOptions()
         self.target = parse_target(target)
         self._exchanges = Exchanges(options)
         self._followings = Followings(options)
         self.clock = Clock()
         self._closed = asyncio.Event()
-        self._channel = grpc.aio.insecure_channel(self.target, options=options.channel_options())
+        self._metadata = (credentials or NO_CREDENTIALS).metadata()
+        self._channel = _channel(self.target, options, credentials or NO_CREDENTIALS)
         self._calls = {
             method.name: self._channel.unary_unary(
                 method.path, request_serializer=method.encode, response_deserializer=method.decode
@@ -139,7 +148,7 @@ class AsyncGatewayClient:
         return follow(following, self._begin, self.target, self._closed)
 
     def _begin(self, step: Open) -> Any:
-        return self._streams[step.method.name](step.request)
+        return self._streams[step.method.name](step.request, metadata=self._metadata)
 
     async def _run(self, exchange: Exchange[ResultT]) -> ResultT:
         step = advance(exchange, None)
@@ -157,7 +166,9 @@ class AsyncGatewayClient:
 
     async def _send(self, step: Send[Any, Any]) -> Any | GatewayError:
         try:
-            return await self._calls[step.method.name](step.request, timeout=step.timeout_s)
+            return await self._calls[step.method.name](
+                step.request, timeout=step.timeout_s, metadata=self._metadata
+            )
         except grpc.RpcError as failure:
             return error_from(failure, self.target, step.timeout_s)
         except asyncio.CancelledError:
@@ -170,3 +181,10 @@ class AsyncGatewayClient:
 def _being_cancelled() -> bool:
     task = asyncio.current_task()
     return task is not None and task.cancelling() > 0
+
+
+def _channel(target: str, options: ClientOptions, credentials: Credentials) -> grpc.aio.Channel:
+    encryption = credentials.channel_credentials(target)
+    if encryption is None:
+        return grpc.aio.insecure_channel(target, options=options.channel_options())
+    return grpc.aio.secure_channel(target, encryption, options=options.channel_options())

@@ -14,6 +14,7 @@ from console.client.errors import (
     GatewayFailed,
     InvalidRequest,
     NotAllowed,
+    NotTrusted,
     Overloaded,
     Refused,
     Unreachable,
@@ -53,6 +54,13 @@ REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
         Reason.TOO_MANY_CONNECTIONS: Overloaded,
         Reason.TOO_MANY_STREAMS: Overloaded,
         Reason.TOO_MANY_REQUESTS: Overloaded,
+        Reason.CREDENTIAL_MISSING: NotAllowed,
+        Reason.CREDENTIAL_UNKNOWN: NotAllowed,
+        Reason.CREDENTIAL_REVOKED: NotAllowed,
+        Reason.CREDENTIAL_EXPIRED: NotAllowed,
+        Reason.CREDENTIAL_NOT_YET_VALID: NotAllowed,
+        Reason.ROLE_TOO_LOW: NotAllowed,
+        Reason.LOCKED_OUT: NotAllowed,
         Reason.INTERNAL: GatewayFailed,
     }
 )
@@ -65,6 +73,7 @@ _PLAIN_WORDS: Final = (
     ("dns resolution failed", "the name does not resolve"),
     ("dns query cancelled", "the name does not resolve"),
     ("domain name not found", "the name does not resolve"),
+    ("wrong_version_number", "what listens there does not speak TLS"),
     ("keepalive", "the link went silent"),
     ("ping timeout", "the link went silent"),
     ("no route to host", "no route to this host"),
@@ -77,6 +86,13 @@ _PLAIN_WORDS: Final = (
     ("connection reset", "the connection was closed"),
     ("failed parsing http/2", "what listens there does not speak gRPC"),
 )
+_NOT_TRUSTED: Final = (
+    ("certificate has expired", "its certificate has ended"),
+    ("certificate is not yet valid", "its certificate is not valid yet, by this computer's clock"),
+    ("hostname verification", "its certificate is for other names than this one"),
+    ("certificate_verify_failed", "its certificate was not signed by the authority of this robot's login"),
+)
+"""The same for a connection that was encrypted and then given up, because of whom it led to."""
 
 
 class _Coded(Protocol):
@@ -99,8 +115,11 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
     """
     coded = cast("_Coded", failure)
     code, refusal = coded.code(), refusal_in(coded.trailing_metadata())
+    details = coded.details() or code.name
+    if code is grpc.StatusCode.UNAVAILABLE and (why := _words_for(details, _NOT_TRUSTED)):
+        return NotTrusted(f"what answers at {target} is not trusted: {why}")
     family = REASONS.get(refusal.reason, ERRORS[code])
-    error = family(_sentence(family, coded.details() or code.name, target, timeout_s))
+    error = family(_sentence(family, details, target, timeout_s))
     error.reason, error.fields, error.retry_after_s = refusal.reason, refusal.fields, refusal.retry_after_s
     return error
 
@@ -129,5 +148,9 @@ def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: 
 
 
 def _in_plain_words(details: str) -> str:
+    return _words_for(details, _PLAIN_WORDS) or details
+
+
+def _words_for(details: str, table: tuple[tuple[str, str], ...]) -> str:
     lowered = details.lower()
-    return next((plain for fragment, plain in _PLAIN_WORDS if fragment in lowered), details)
+    return next((plain for fragment, plain in table if fragment in lowered), "")

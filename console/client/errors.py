@@ -63,7 +63,14 @@ class NotAllowed(Refused):
     """This client may not do that, or did not say who it is."""
 
     kind = "not_allowed"
-    advice = "Ask whoever keeps this robot for access"
+    advice = "Ask whoever keeps this robot for access, then type: robotctl login"
+
+
+class NotTrusted(GatewayError):
+    """What answers there can't prove that it is the robot: its certificate is another's, or has ended."""
+
+    kind = "not_trusted"
+    advice = "Type: robotctl login, with what this robot's keeper gave you; if you have, ask them"
 
 
 class Overloaded(Refused):

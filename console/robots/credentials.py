@@ -2,32 +2,15 @@
 
 import shutil
 import string
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
+from console.client import Credentials
 from console.robots.book import Robot
 from console.robots.private import read_private, read_public
 
 _TOKEN_CHARACTERS: Final = frozenset(string.ascii_letters + string.digits + "-._~+/=")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Credentials:
-    """The contents of a robot's files; None where it names no such file. Secrets are not in the `repr`.
-
-    Args:
-        ca_certificate: PEM.
-        client_certificate: PEM.
-        client_key: PEM.
-        token: without white space around it.
-    """
-
-    ca_certificate: bytes | None = None
-    client_certificate: bytes | None = None
-    client_key: bytes | None = field(default=None, repr=False)
-    token: str | None = field(default=None, repr=False)
 
 
 def read_credentials(robot: Robot) -> Credentials:

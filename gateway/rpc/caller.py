@@ -8,6 +8,8 @@ from ipaddress import ip_address
 from typing import Final
 from urllib.parse import unquote
 
+from gateway.rpc.identity import caller
+
 _log = logging.getLogger(__name__)
 
 _LOOPBACK: Final = "127.0.0.1"
@@ -21,8 +23,8 @@ class Caller:
 
     Attributes:
         robot_host: the robot's address as this client reaches it.
-        may_watch: whether it may have the stream's passphrase. Only callers on the robot itself may, as
-            long as nothing proves who a remote one is.
+        may_watch: whether it may have the stream's passphrase. Whoever has proved who they are may, and
+            callers on the robot itself.
     """
 
     robot_host: str
@@ -39,13 +41,17 @@ class Callers:
     def __init__(self, advertised_host: str | None) -> None:
         self._advertised_host = advertised_host
         # A connection keeps both its addresses for as long as it lives.
-        self.of = lru_cache(maxsize=_REMEMBERED_CONNECTIONS)(self._of)
+        self._remembered = lru_cache(maxsize=_REMEMBERED_CONNECTIONS)(self._of)
 
-    def _of(self, peer: str) -> Caller:
+    def of(self, peer: str) -> Caller:
+        """Who is at the other end of a connection."""
+        return self._remembered(peer, caller() is not None)
+
+    def _of(self, peer: str, known: bool) -> Caller:
         address = _address(peer)
         local = address is None or ip_address(address.partition("%")[0]).is_loopback
         host = self._advertised_host or (_LOOPBACK if address is None or local else _our_side(address))
-        return Caller(robot_host=host, may_watch=local)
+        return Caller(robot_host=host, may_watch=local or known)
 
 
 @lru_cache(maxsize=_REMEMBERED_CONNECTIONS)

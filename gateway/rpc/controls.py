@@ -24,17 +24,28 @@ def nobody(_context: Context) -> str:
     return ""
 
 
+def unrecorded(_action: ControlAction) -> None:
+    """Events are all there is."""
+
+
 class Controls:
     """Tells of control actions.
 
     Args:
         note: takes the news.
         who: names the caller of a call; empty when nobody knows.
+        record: takes the action for good; events are forgotten some day.
     """
 
-    def __init__(self, note: Callable[[News], None], who: Callable[[Context], str] = nobody) -> None:
+    def __init__(
+        self,
+        note: Callable[[News], None],
+        who: Callable[[Context], str] = nobody,
+        record: Callable[[ControlAction], None] = unrecorded,
+    ) -> None:
         self._note = note
         self._who = who
+        self._record = record
 
     def told(self, method: str, behavior: Behavior, reply_type: type[Message]) -> Behavior:
         """The same behavior; whatever becomes of a call is an event."""
@@ -64,6 +75,7 @@ class Controls:
         return call
 
     def _tell(self, action: ControlAction) -> None:
+        self._record(action)
         who, asked = action.who or action.address, action.request or "nothing more"
         words = f"{who} asked for {action.method} ({asked}), {action.result.value}: {action.answer}"
         severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Final
 
 import grpc
@@ -13,9 +14,10 @@ from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION_SERVIC
 from grpc_reflection.v1alpha.reflection import enable_server_reflection
 
 from common.health import Health
-from common.listen import bind_tcp, bracketed
+from common.listen import bind_tcp, bind_unix, bracketed
 from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
 from gateway.rpc.caller import address_of
+from gateway.rpc.guard import Guard
 from gateway.rpc.limiting import LimitInterceptor
 from gateway.rpc.limits import MOST_REQUEST_BYTES, Admission, Limits
 from gateway.rpc.requests import Requests, hold_to_rules
@@ -64,6 +66,9 @@ async def serving(
     *,
     observe: Observe = unobserved,
     limits: Limits | None = None,
+    guard: Guard | None = None,
+    credentials: grpc.ServerCredentials | None = None,
+    socket: Path | None = None,
 ) -> AsyncIterator[int]:
     """Serves until the block ends; calls that are running then get STOP_GRACE_S to finish.
 
@@ -74,6 +79,9 @@ async def serving(
         health: answers the health service; by default one that knows the contract's service alone.
         observe: told of every call that ends.
         limits: what callers may have; by default what the class says.
+        guard: asks callers who they are; None lets everybody in.
+        credentials: what connections are encrypted with; None for plaintext.
+        socket: a Unix socket to serve on as well.
 
     Yields:
         The port.
@@ -82,14 +90,18 @@ async def serving(
         UserError: the address can't be bound.
     """
     limits = limits or Limits()
-    server = new_server([LimitInterceptor(Admission(limits))], observe)
+    server = new_server([LimitInterceptor(Admission(limits)), *([guard] if guard else [])], observe)
     handlers = method_handlers(gateway, limits.request_bytes)
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     (health or Health(SERVICE)).register(server)
     enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)
-    bound = bind_tcp(server, host, port)
+    bound = bind_tcp(server, host, port, credentials)
+    if socket:
+        bind_unix(server, socket)
     await server.start()
-    _log.info("serving operators at %s:%d", bracketed(host), bound)
+    how = "plaintext" if credentials is None else "TLS"
+    whom = "everybody" if guard is None else "those with a credential"
+    _log.info("serving operators at %s:%d (%s, %s)", bracketed(host), bound, how, whom)
     try:
         yield bound
     finally:

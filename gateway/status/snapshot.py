@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board, SourceKind
 from gateway.status.command import Command, effective_command
 from gateway.status.events import OperatorEvent
@@ -88,6 +89,7 @@ class Snapshot:
     sources: tuple[SourceView, ...]
     events: tuple[OperatorEvent, ...]
     faults: tuple[Fault, ...]
+    access: AccessView = UNGUARDED
 
 
 def take(
@@ -132,6 +134,7 @@ def take(
         sources=tuple(_sources(rules, board, now_s)),
         events=events,
         faults=faults,
+        access=board.access,
     )
 
 

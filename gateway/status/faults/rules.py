@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gateway.status.faults.access import access_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.fault import Condition
 from gateway.status.faults.limits import PlatformLimits
@@ -19,10 +20,12 @@ class FaultRules:
     Attributes:
         platform: what the computer and the batteries should stay within.
         startup_grace_s: how long after the gateway's start nobody is missed: a robot takes its time.
+        expiry_days: how long before its end a certificate is a fault.
     """
 
     platform: PlatformLimits
     startup_grace_s: float
+    expiry_days: float = 14.0
 
 
 def conditions(
@@ -41,3 +44,4 @@ def conditions(
     yield from diagnostics_faults(snapshot.diagnostics)
     yield from preview_faults(snapshot.preview, active, settled=settled)
     yield from platform_faults(snapshot, rules.platform, active)
+    yield from access_faults(snapshot.access, rules.expiry_days)

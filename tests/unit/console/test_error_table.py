@@ -48,7 +48,24 @@ def all_errors(above: type[errors.GatewayError]) -> set[type[errors.GatewayError
 
 def test_the_table_is_total_in_both_directions() -> None:
     assert set(ERRORS) == set(grpc.StatusCode)
-    assert set(ERRORS.values()) == all_errors(errors.GatewayError)
+    # Whom a connection led to is known before any code of a gateway's own comes.
+    assert set(ERRORS.values()) | {errors.NotTrusted} == all_errors(errors.GatewayError)
+
+
+@pytest.mark.parametrize(
+    ("details", "words"),
+    [
+        ("SSL_ERROR_SSL: CERTIFICATE_VERIFY_FAILED: unable to get local issuer certificate", "not signed by"),
+        ("CERTIFICATE_VERIFY_FAILED: certificate has expired", "has ended"),
+        ("CERTIFICATE_VERIFY_FAILED: certificate is not yet valid", "this computer's clock"),
+        ("Hostname Verification Check failed.", "other names"),
+    ],
+)
+def test_who_can_not_prove_to_be_the_robot_is_not_trusted(details: str, words: str) -> None:
+    error = said(grpc.StatusCode.UNAVAILABLE, details)
+    assert type(error) is errors.NotTrusted
+    assert words in error.what
+    assert "robotctl login" in error.remedy
 
 
 def test_every_kind_is_a_word_of_its_own() -> None:
