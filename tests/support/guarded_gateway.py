@@ -1,0 +1,128 @@
+"""A gateway that asks who calls: with credentials of its own, over real TLS, in the test's own loop."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from gateway.access.authority import Pair
+from gateway.access.bundle import Bundle
+from gateway.access.credential import Credential, Kind
+from gateway.access.directory import CredentialDirectory
+from gateway.access.keeping import Keeper, Wanted
+from gateway.access.role import Role
+from gateway.app import serve
+from gateway.config import GatewaySettings
+from tests.support.ports import free_tcp_port
+
+HOSTS = ("localhost", "127.0.0.1")
+UP_WITHIN_S = 10.0
+
+
+@dataclass(frozen=True)
+class Login:
+    """What one caller shows."""
+
+    token: str | None = None
+    client: Pair | None = None
+
+    def metadata(self) -> tuple[tuple[str, str], ...]:
+        return () if self.token is None else (("authorization", f"Bearer {self.token}"),)
+
+
+NOTHING = Login()
+
+
+@dataclass
+class Robot:
+    """One robot's credentials, and how it is reached."""
+
+    directory: CredentialDirectory
+    port: int = 0
+    channels: list[grpc.aio.Channel] = field(default_factory=list)
+
+    @property
+    def keeper(self) -> Keeper:
+        return Keeper(self.directory, "lab")
+
+    @property
+    def authority(self) -> bytes:
+        return self.directory.read_authority().certificate
+
+    @property
+    def audit_file(self) -> Path:
+        return self.directory.path / "audit.jsonl"
+
+    def add(
+        self, role: Role, kind: Kind = Kind.TOKEN, name: str = "anna", **wanted: Any
+    ) -> "tuple[Credential, Login]":
+        credential, bundle = self.keeper.add(Wanted(name, role, kind, **wanted))
+        return credential, login_of(bundle)
+
+    def channel(self, login: Login = NOTHING, authority: bytes | None = None) -> grpc.aio.Channel:
+        """A connection of its own; closed with the gateway."""
+        client = login.client
+        credentials = grpc.ssl_channel_credentials(
+            authority or self.authority,
+            private_key=client.key if client else None,
+            certificate_chain=client.certificate if client else None,
+        )
+        channel = grpc.aio.secure_channel(
+            f"127.0.0.1:{self.port}", credentials, options=(("grpc.use_local_subchannel_pool", 1),)
+        )
+        self.channels.append(channel)
+        return channel
+
+
+def login_of(bundle: Bundle) -> Login:
+    return Login(bundle.token or None, bundle.client)
+
+
+def new_robot(path: Path) -> Robot:
+    """Credentials alone; nothing runs yet."""
+    robot = Robot(CredentialDirectory(path))
+    robot.keeper.begin(HOSTS)
+    return robot
+
+
+@asynccontextmanager
+async def guarded_gateway(robot: Robot, **settings: Any) -> AsyncIterator[Robot]:
+    """Up when the block begins, gone when it ends."""
+    robot.port, stop = free_tcp_port(), asyncio.Event()
+    security = {"credentials": robot.directory.path, **settings.pop("security", {})}
+    values = {
+        "grpc": {"port": robot.port, **settings.pop("grpc", {})},
+        "sources": (),
+        "preview": {"socket": robot.directory.path / "preview.sock", "settle_ms": 0},
+        **settings,
+        "security": security,
+    }
+    gateway = asyncio.create_task(serve(GatewaySettings(**values), stop))
+    try:
+        await _until_it_listens(gateway, robot.port)
+        yield robot
+    finally:
+        for channel in robot.channels:
+            await channel.close()
+        robot.channels.clear()
+        stop.set()
+        await asyncio.wait_for(gateway, 10)
+
+
+async def _until_it_listens(gateway: "asyncio.Task[None]", port: int) -> None:
+    deadline_s = asyncio.get_running_loop().time() + UP_WITHIN_S
+    while True:
+        if gateway.done():
+            gateway.result()
+        try:
+            _, writer = await asyncio.open_connection("127.0.0.1", port)
+        except ConnectionRefusedError:
+            assert asyncio.get_running_loop().time() < deadline_s, "the gateway did not come up"
+            await asyncio.sleep(0.02)
+        else:
+            writer.close()
+            return
