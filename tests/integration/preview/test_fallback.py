@@ -2,12 +2,12 @@
 
 import signal
 import time
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.lossy_relay import LossyRelay
 from tests.support.running_preview import RunningPreview
 from tests.support.watcher import Watcher
 
@@ -128,23 +128,58 @@ def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp
 
 def test_a_driver_that_hangs_when_told_something_holds_nobody_up(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview, ExitStack() as stack:
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
         preview.wish(pb.PROFILE_BALANCED)
         preview.running()
-        watcher = stack.enter_context(Watcher(preview.port))
-        watcher.wait_for_pictures(10)
-        preview.wish(pb.PROFILE_LOW_BW)
-        # The loop answers while the driver does not.
-        assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
-        state = preview.wait_for(
-            lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
-        )
-        watcher.wait_for_pictures(10)
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_pictures(10)
+            preview.wish(pb.PROFILE_LOW_BW)
+            # The loop answers while the driver does not.
+            assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
+            state = fallen_back(preview, watcher, "stuck")
         passed_over(state, "va-h265", "hung when the profile was changed")
         assert state.profile == pb.PROFILE_LOW_BW
-        # The old pictures flow on until it is given up; the port is free although the driver keeps its call.
-        assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
-        print(f"stuck: {watcher.longest_pause_s:.2f} s without a picture")
+
+
+def test_a_driver_that_hangs_when_a_viewer_joins_holds_nobody_up(tmp_path: Path) -> None:
+    doubles = {"mpph265enc": "later deaf:60", "vah265enc": "ok"}
+    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+        preview.wish()
+        preview.running()
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_pictures(90)
+            with Watcher(preview.port) as other:
+                state = fallen_back(preview, watcher, "deaf")
+                other.wait_for_pictures(10)
+        passed_over(state, "va-h265", "hung when it was asked for a key frame")
+
+
+def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_holds_nobody_up(tmp_path: Path) -> None:
+    doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
+    settings = ORDER | {"adaptive": {"enabled": True}}
+    with RunningPreview(tmp_path, settings, doubles) as preview, LossyRelay(preview.port, 0.0) as relay:
+        preview.wish()
+        preview.running()
+        with Watcher(relay.port, latency_ms=120) as watcher:
+            watcher.wait_for_pictures(10)
+            relay.loss = 0.4
+            state = fallen_back(preview, watcher, "stuck, adaptive")
+        passed_over(state, "va-h265", "hung when its bit rate was changed")
+
+
+def fallen_back(preview: RunningPreview, watcher: Watcher, fault: str) -> pb.ActualState:
+    """Waits for the other encoder.
+
+    The old pictures flow on until the first one is given up; the port is free then, although its driver
+    keeps the call.
+    """
+    state = preview.wait_for(
+        lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
+    )
+    watcher.wait_for_pictures(10)
+    assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
+    print(f"{fault}: {watcher.longest_pause_s:.2f} s without a picture")
+    return state
 
 
 def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:

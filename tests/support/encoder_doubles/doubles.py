@@ -12,6 +12,7 @@ ENCODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not 
 | error:N | an ERROR message after N frames |
 | hang:N | the driver never comes back after N frames, not even for a stop |
 | stuck:N | after N frames, whoever tells it another bit rate is never answered |
+| deaf:N | after N frames, whoever asks for a key frame is never answered |
 | crash:N | the process dies after N frames |
 
 With "later " before it, the encoder proves itself in its trial and fails in the pipeline only.
@@ -24,7 +25,7 @@ import sys
 import threading
 from typing import Any, ClassVar
 
-from common.gst import GLib, GObject, Gst
+from common.gst import GLib, GObject, Gst, GstVideo
 
 VARIABLE = "ENCODER_DOUBLES"
 _ENDLESS = threading.Event()
@@ -56,6 +57,8 @@ class _Double(Gst.Bin):
         self.body.get_by_name("inner").get_static_pad(probe_on).add_probe(
             Gst.PadProbeType.BUFFER, self._on_frame
         )
+        if self._fault == "deaf":
+            self.get_static_pad("src").add_probe(Gst.PadProbeType.EVENT_UPSTREAM, self._on_request)
 
     def do_change_state(self, transition: Any) -> Any:
         for fault, refused in (
@@ -89,6 +92,11 @@ class _Double(Gst.Bin):
             pad.push(_emptied(info.get_buffer()))
             return Gst.PadProbeReturn.DROP
         self._fail_now()
+        return Gst.PadProbeReturn.OK
+
+    def _on_request(self, _pad: Any, info: Any) -> Any:
+        if GstVideo.video_event_is_force_key_unit(info.get_event()) and self._frames > self._after:
+            _ENDLESS.wait()
         return Gst.PadProbeReturn.OK
 
     def _fail_now(self) -> None:
