@@ -9,7 +9,7 @@ import os
 import statistics
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -35,7 +35,7 @@ FPS = 30
 
 def run(_names: list[str]) -> list[Row]:
     with tempfile.TemporaryDirectory() as directory:
-        extra = extra_latency_ms(Path(directory), ROUNDS)
+        extra = statistics.median(extra_latency_ms(Path(directory), ROUNDS))
     return [
         Row(
             name=NAME,
@@ -48,17 +48,16 @@ def run(_names: list[str]) -> list[Row]:
     ]
 
 
-def extra_latency_ms(workdir: Path, rounds: int) -> float:
-    """The median over rounds of both sides."""
-    bare, painted = [], []
+def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]:
+    """What the window adds, round by round: the difference of the medians of both sides."""
     with camera(workdir, FPS) as source, product.robot(workdir, source, LATENCY_MS) as robot, robot.preview():
         for _ in range(rounds):
             with robot.viewer() as receiver:
                 watch(receiver, SETTLE_S)
-                bare.append(statistics.median(one.latency_ms for one in watch(receiver, WATCH_S)))
-            painted.append(statistics.median(_painted_ms(robot)))
-            tell(f"decoded after {bare[-1]:.1f} ms, painted after {painted[-1]:.1f} ms")
-    return statistics.median(painted) - statistics.median(bare)
+                bare = statistics.median(one.latency_ms for one in watch(receiver, WATCH_S))
+            painted = statistics.median(_painted_ms(robot))
+            tell(f"decoded after {bare:.1f} ms, painted after {painted:.1f} ms")
+            yield painted - bare
 
 
 def _painted_ms(robot: product.Robot) -> list[float]:

@@ -86,7 +86,7 @@ class Connection:
         ]
         for one in (source, demuxer):
             self._pipeline.add(one)
-        if self._setup.recording and self._setup.recording.is_writable():
+        if self._setup.recording:
             self._file = FileBranch(self._setup.recording)
             self._file.attach(self._pipeline, source).link(demuxer)
         else:
@@ -141,8 +141,6 @@ class Connection:
 
     def _on_error(self, message: Any) -> None:
         error, detail = message.parse_error()
-        if self._file and self._file.take_error(message.src, error.message):
-            return
         if any(branch.is_mine(message.src) for branch in self._branches.values()) or error.matches(
             GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE
         ):

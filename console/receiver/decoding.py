@@ -48,8 +48,7 @@ _PACKAGES = {
     "appsink": "gstreamer1.0-plugins-base",
     "tee": "libgstreamer1.0-0",
     "queue": "libgstreamer1.0-0",
-    "filesink": "libgstreamer1.0-0",
-    "errorignore": "gstreamer1.0-plugins-bad",
+    "fdsink": "libgstreamer1.0-0",
 }
 
 

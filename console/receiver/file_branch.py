@@ -1,5 +1,6 @@
-"""The way of the encoded stream into a file, beside the way to the decoder."""
+"""The way of the encoded stream into a recording, beside the way to the decoder."""
 
+from itertools import pairwise
 from typing import Any, Final
 
 from console.receiver.decoding import element
@@ -10,55 +11,37 @@ _BACKLOG_BYTES: Final = 16 * 2**20
 
 
 class FileBranch:
-    """Appends what the source gives to a recording, packet by packet, without Python.
+    """Hands what the source gives to a recording, packet by packet, without Python.
 
-    Neither a slow nor a full disk reaches the pictures: what can't be written waits in a queue of its own,
-    and an error in this branch ends the recording alone.
+    A slow disk does not reach the pictures: what can't be handed over waits in a queue of its own, and
+    `fdsink`, other than `filesink`, can be stopped while it waits.
 
     Args:
-        recording: the file, and whom to tell.
+        recording: what keeps it, and whom to tell what was left out.
 
     Raises:
         UserError: an element is not installed.
     """
 
     def __init__(self, recording: Recording) -> None:
-        self._recording = recording
         self._fork = element("tee")
         self._queue = element(
             "queue", leaky="downstream", max_size_buffers=0, max_size_time=0, max_size_bytes=_BACKLOG_BYTES
         )
         self._handler = self._queue.connect("overrun", lambda _queue: recording.leave_out())
-        self._elements = [
-            # Without it the queue would hand the file's error to the source, which would stop.
-            element("errorignore", ignore_error=True, ignore_notlinked=True, convert_to="ok"),
-            self._queue,
-            element(
-                "filesink",
-                location=str(recording.file),
-                append=True,
-                buffer_mode="unbuffered",
-                sync=False,
-            ),
-        ]
-        self._elements[-1].set_property("async", False)
+        self._sink = element("fdsink", fd=recording.pipe, sync=False)
+        # The pipeline shall not wait for the first packet here. `async` is a word of Python's.
+        self._sink.set_property("async", False)
 
     def attach(self, pipeline: Any, source: Any) -> Any:
         """Joins a pipeline that does not run yet; returns the element to link the decoder's way to."""
-        for one in (self._fork, *self._elements):
+        chain = (source, self._fork, self._queue, self._sink)
+        for one in chain[1:]:
             pipeline.add(one)
-        source.link(self._fork)
-        for upstream, downstream in zip((self._fork, *self._elements), self._elements, strict=False):
+        for upstream, downstream in pairwise(chain):
             upstream.link(downstream)
         return self._fork
 
     def detach(self) -> None:
         """Lets go of the elements, which are stopped."""
         self._queue.disconnect(self._handler)
-
-    def take_error(self, source: Any, text: str) -> bool:
-        """Whether an error is this branch's own; then the recording is over."""
-        mine = any(source is one for one in self._elements)
-        if mine:
-            self._recording.fail(text)
-        return mine

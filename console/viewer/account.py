@@ -104,7 +104,7 @@ class Bookkeeper:
 def _recorded(recording: Recording | None) -> dict[str, Any] | None:
     if recording is None:
         return None
-    return {"file": str(recording.file), "bytes": recording.size_bytes(), "gaps": recording.gaps}
+    return {"file": str(recording.file), "bytes": recording.size_bytes, "gaps": recording.gaps}
 
 
 def _kept(recording: dict[str, Any] | None) -> str:

@@ -5,11 +5,11 @@ import time
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from console.client import PreviewState, PreviewStatus
+from console.client import Credentials, PreviewState, PreviewStatus
 from console.monitor.link import Phase as LinkPhase
 from console.monitor.state import MonitorState
 from console.monitor.video import pass_on
-from console.monitor.worker import Worker
+from console.monitor.worker import Worker, connecting
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
 from console.viewer.account import Account, Bookkeeper
@@ -26,6 +26,7 @@ def watch_headless(
     patience_s: float,
     recording: Recording | None,
     stop: threading.Event,
+    credentials: Credentials | None = None,
 ) -> Account:
     """Watches until there were enough pictures.
 
@@ -35,6 +36,7 @@ def watch_headless(
         patience_s: how long no picture may come before it gives up.
         recording: keeps the encoded stream, too.
         stop: ends it early.
+        credentials: what proves to the gateway who asks.
 
     Raises:
         GatewayError: the gateway was not reached at all.
@@ -43,7 +45,7 @@ def watch_headless(
     """
     books = Bookkeeper()
     session = VideoSession(pixels=PixelFormat.I420, on_picture=books.note, recording=recording)
-    worker = Worker(target, lambda: pass_on(worker.newest(), session))
+    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(credentials))
     try:
         session.start()
         worker.start()
@@ -55,8 +57,9 @@ def watch_headless(
                 books.news.wait_for(lambda: stop.is_set() or _enough(books, frames), _LOOK_S)
     finally:
         worker.close()
-        session.close()
-    # Only now is the recording complete.
+        if session.close() and recording:
+            # Only now does nobody write to it any more.
+            recording.close()
     account = books.account(session.figures().redials, recording)
     if frames and account.pictures < frames:
         raise UserError(f"ended after {account.pictures} of {frames} pictures")

@@ -24,4 +24,4 @@ def recording_line(recording: Recording | None) -> str:
     if recording.trouble:
         return recording.trouble.what
     gaps = f", {plural(recording.gaps, 'gap')}" if recording.gaps else ""
-    return f"recording {recording.file.name}: {recording.size_bytes() / _MIB:.1f} MiB{gaps}"
+    return f"recording {recording.file.name}: {recording.size_bytes / _MIB:.1f} MiB{gaps}"

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from console.client import Credentials
 from console.monitor.video import overlay_of, pass_on
-from console.monitor.worker import Worker
+from console.monitor.worker import Worker, connecting
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.account import Account, Bookkeeper
@@ -27,24 +28,27 @@ class Viewing:
     worker: Worker
 
 
-def run_view(target: str, recording: Recording | None) -> Account:
+def run_view(
+    target: str, recording: Recording | None, credentials: Credentials | None = None
+) -> Account:
     """Shows the window until it is closed; returns what was seen.
 
     Raises:
         UserError: the target is no address, or there is no display.
     """
     books = Bookkeeper()
-    with application("Robot view") as app, viewing(target, recording, books) as now:
+    with application("Robot view") as app, viewing(target, recording, books, credentials) as now:
         app.exec()
-    # Only now is the recording complete.
     return books.account(now.session.figures().redials, recording)
 
 
 @contextmanager
-def viewing(target: str, recording: Recording | None, books: Bookkeeper) -> Iterator[Viewing]:
+def viewing(
+    target: str, recording: Recording | None, books: Bookkeeper, credentials: Credentials | None = None
+) -> Iterator[Viewing]:
     """At the end of the block everything has hung up."""
     session = VideoSession(recording=recording)
-    worker = Worker(target, lambda: pass_on(worker.newest(), session))
+    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(credentials))
     video = VideoView(session, lambda: overlay_of(worker.newest()))
 
     def on_picture(frame: Frame) -> None:
@@ -61,4 +65,6 @@ def viewing(target: str, recording: Recording | None, books: Bookkeeper) -> Iter
     finally:
         window.close()
         worker.close(_HANG_UP_WITHIN_S)
-        session.close(_HANG_UP_WITHIN_S)
+        if session.close(_HANG_UP_WITHIN_S) and recording:
+            # Only now does nobody write to it any more.
+            recording.close()

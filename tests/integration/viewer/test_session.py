@@ -1,5 +1,6 @@
 """The viewer's session against the real gateway, preview service and SRT: what an operator lives through."""
 
+import os
 import signal
 import time
 from pathlib import Path
@@ -141,12 +142,13 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
         ground.preview.start_again()
         before = session.figures().pictures
         wait_until(lambda: session.figures().pictures >= before + 30, "pictures again", 30)
-        kept_while_live = recording.size_bytes()
+        kept_while_live = recording.size_bytes
         seen = session.figures().pictures
+    recording.close()
     assert recording.trouble is None
     assert recording.gaps == 0
-    assert recording.size_bytes() >= kept_while_live > 0
-    assert recording.size_bytes() % 188 == 0
+    assert recording.size_bytes >= kept_while_live > 0
+    assert recording.size_bytes % 188 == 0
     # A picture that waits in the session is dropped for a newer one; the file has them all.
     assert decoded_pictures(recording.file) >= seen >= 60
 
@@ -159,7 +161,28 @@ def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:
         before = session.figures().pictures
         wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on")
         assert session.figures().redials == 0
+    recording.close()
     assert "ended early: No space left" in str(recording.trouble)
+
+
+def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(ground: VideoGround) -> None:
+    """A terminal that nobody reads takes a few kB; then whoever writes to it waits for ever."""
+    master, slave = os.openpty()
+    recording = Recording(Path(os.ttyname(slave)))
+    try:
+        with following(ground.target, recording=recording) as session:
+            ground.switch_on()
+            becomes(session, Phase.LIVE)
+            ground.kill_preview()
+            wait_until(lambda: session.figures().redials >= 1, "called again, with a disk that hangs")
+            ground.preview.start_again()
+            before = session.figures().pictures
+            wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on", 30)
+        recording.close(within_s=0.2)
+        assert "the disk does not answer" in str(recording.trouble)
+    finally:
+        os.close(master)
+        os.close(slave)
 
 
 def test_closing_takes_no_time_whatever_it_does() -> None:

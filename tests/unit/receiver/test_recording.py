@@ -1,9 +1,12 @@
+import os
+import select
 from pathlib import Path
 
 import pytest
 
 from common.errors import ExitCode, UserError
 from console.receiver.recording import Recording
+from tests.support.waiting import wait_until
 
 
 def test_a_file_that_exists_is_never_overwritten(tmp_path: Path) -> None:
@@ -20,28 +23,47 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_starts(tmp_path:
         Recording(tmp_path / "nowhere" / "drive.ts")
 
 
-def test_the_first_failure_counts_and_ends_it(tmp_path: Path) -> None:
+def test_what_several_connections_write_is_kept_in_order(tmp_path: Path) -> None:
+    with Recording(tmp_path / "drive.ts") as recording:
+        for number in range(300):
+            os.write(recording.pipe, bytes([number % 256]) * 188)
+    assert recording.trouble is None
+    assert recording.size_bytes == 300 * 188
+    assert recording.file.read_bytes() == b"".join(bytes([number % 256]) * 188 for number in range(300))
+
+
+def test_a_full_disk_ends_it_and_holds_up_nobody() -> None:
+    with Recording(Path("/dev/full")) as recording:
+        os.write(recording.pipe, bytes(188))
+        wait_until(lambda: recording.trouble, "the trouble is known")
+        for _ in range(2000):
+            wait_until(lambda: poll_once(recording.pipe), "what comes is read")
+            os.write(recording.pipe, bytes(1316))
+    assert "/dev/full ended early: No space left on device" in str(recording.trouble)
+    assert recording.size_bytes == 0
+
+
+def poll_once(pipe: int) -> bool:
+    """Whether there is room in the pipe."""
+    return bool(select.select([], [pipe], [], 1)[1])
+
+
+def test_a_pipe_or_a_directory_is_not_written_to(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo")
+    for there in (tmp_path / "fifo", tmp_path):
+        with pytest.raises(UserError, match="exists already"):
+            Recording(there)
+
+
+def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "drive.ts")
-    assert recording.is_writable()
-    recording.fail("No space left on the resource.")
-    recording.fail("something later")
-    assert "ended early: No space left" in str(recording.trouble)
-    assert not recording.is_writable()
-
-
-def test_a_file_that_was_taken_away_fails_at_the_next_connection(tmp_path: Path) -> None:
-    folder = tmp_path / "stick"
-    folder.mkdir()
-    recording = Recording(folder / "drive.ts")
-    recording.file.unlink()
-    folder.rmdir()
-    assert not recording.is_writable()
-    assert "No such file" in str(recording.trouble)
-    assert recording.size_bytes() == 0
+    recording.close()
+    recording.close()
+    assert recording.trouble is None
 
 
 def test_what_was_left_out_is_counted(tmp_path: Path) -> None:
-    recording = Recording(tmp_path / "drive.ts")
-    for _ in range(3):
-        recording.leave_out()
+    with Recording(tmp_path / "drive.ts") as recording:
+        for _ in range(3):
+            recording.leave_out()
     assert recording.gaps == 3

@@ -1,3 +1,4 @@
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,14 +10,16 @@ from console.viewer.account import Bookkeeper
 from console.viewer.words import figures_line, recording_line
 from tests.unit.receiver.pictures import frame
 
+MIB = 1 << 20
+
 
 def picture(at_s: float, *, corrupt: bool = False) -> Frame:
     return replace(frame(), arrival_s=at_s, corrupt=corrupt, decoder="avdec_h264")
 
 
 def kept(tmp_path: Path) -> Recording:
-    recording = Recording(tmp_path / "drive.ts")
-    recording.file.write_bytes(bytes(3 << 20))
+    with Recording(tmp_path / "drive.ts") as recording:
+        os.write(recording.pipe, bytes(MIB))
     return recording
 
 
@@ -55,8 +58,8 @@ def test_one_picture_has_no_rate() -> None:
 def test_the_recording_is_told(tmp_path: Path) -> None:
     recording = kept(tmp_path)
     account = Bookkeeper().account(0, recording)
-    assert account.recording == {"file": str(recording.file), "bytes": 3 << 20, "gaps": 0}
-    assert account.line() == f"no picture, {recording.file}: 3.0 MiB"
+    assert account.recording == {"file": str(recording.file), "bytes": MIB, "gaps": 0}
+    assert account.line() == f"no picture, {recording.file}: 1.0 MiB"
     recording.leave_out()
     assert "with 1 gap: the disk was too slow" in Bookkeeper().account(0, recording).line()
 
@@ -71,8 +74,12 @@ def test_the_line_below_the_picture() -> None:
 def test_the_line_of_the_recording(tmp_path: Path) -> None:
     assert recording_line(None) == ""
     recording = kept(tmp_path)
-    assert recording_line(recording) == "recording drive.ts: 3.0 MiB"
+    assert recording_line(recording) == "recording drive.ts: 1.0 MiB"
     recording.leave_out()
     assert recording_line(recording).endswith(", 1 gap")
-    recording.fail("No space left")
+
+
+def test_the_line_of_a_recording_that_ended_early() -> None:
+    with Recording(Path("/dev/full")) as recording:
+        os.write(recording.pipe, bytes(188))
     assert "ended early: No space left" in recording_line(recording)
