@@ -8,6 +8,7 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.lossy_relay import LossyRelay
+from tests.support.ports import udp_port_is_free
 from tests.support.running_preview import RunningPreview
 from tests.support.watcher import Watcher
 
@@ -139,6 +140,10 @@ def test_a_driver_that_hangs_when_told_something_holds_nobody_up(tmp_path: Path)
             state = fallen_back(preview, watcher, "stuck")
         passed_over(state, "va-h265", "hung when the profile was changed")
         assert state.profile == pb.PROFILE_LOW_BW
+        # Whatever the driver keeps, the port is not among it.
+        preview.wish(None)
+        preview.disabled()
+        assert udp_port_is_free(preview.port)
 
 
 def test_a_driver_that_hangs_when_a_viewer_joins_holds_nobody_up(tmp_path: Path) -> None:
