@@ -9,6 +9,7 @@ from console.cli.doctor import doctor
 from console.cli.events import events
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
+from console.cli.login import login
 from console.cli.monitor import monitor
 from console.cli.options import JsonOption, RobotOption, TargetOption, remember, session_of
 from console.cli.preview import preview_app
@@ -27,6 +28,7 @@ app.add_typer(preview_app, name="preview")
 app.add_typer(robots_app, name="robots")
 app.command()(doctor)
 app.command()(events)
+app.command()(login)
 app.command()(monitor)
 app.command()(view)
 

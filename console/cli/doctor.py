@@ -20,7 +20,7 @@ def doctor(
     Ends 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
     session = session_of(context, target, as_json, robot)
-    examination = Examination(parse_target(session.target))
+    examination = Examination(parse_target(session.target), session.credentials())
     findings = list(examination.findings())
     print_findings(findings, as_json=session.as_json, out=session.out)
     code = exit_code(findings) if examination.reached else ExitCode.UNREACHABLE

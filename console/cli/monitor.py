@@ -6,6 +6,7 @@ import typer
 
 from common.errors import UserError
 from console.cli.options import RobotOption, TargetOption, session_of
+from console.client import Credentials
 
 
 def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOption = None) -> None:
@@ -14,10 +15,11 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
     """
     run = _window()
-    run(session_of(context, target, False, robot).target)
+    session = session_of(context, target, False, robot)
+    run(session.target, session.credentials())
 
 
-def _window() -> Callable[[str], None]:
+def _window() -> Callable[[str, Credentials], None]:
     try:
         from console.window.monitor_program import run_monitor  # noqa: PLC0415 - Qt is needed here only
     except ModuleNotFoundError as error:

@@ -10,8 +10,8 @@ from typing import Any
 from rich.console import Console
 
 from common.errors import ExitCode, UserError
-from console.client import AsyncGatewayClient, GatewayClient, GatewayError
-from console.robots import Robot, choose
+from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError
+from console.robots import Robot, choose, read_credentials
 
 # Where nobody looks at columns, lines are left long rather than broken.
 _WIDTH_OF_A_FILE = 160
@@ -38,11 +38,19 @@ class Session:
 
     def connect(self) -> GatewayClient:
         """A client for this run, to be used in a `with` block."""
-        return GatewayClient(self.target)
+        return GatewayClient(self.target, credentials=self.credentials())
 
     def connect_async(self) -> AsyncGatewayClient:
         """As `connect`, for the running loop: to be used in an `async with` block."""
-        return AsyncGatewayClient(self.target)
+        return AsyncGatewayClient(self.target, credentials=self.credentials())
+
+    def credentials(self) -> Credentials:
+        """What proves to the robot who asks.
+
+        Raises:
+            UserError: a file is missing, or others may read a secret.
+        """
+        return read_credentials(self.robot)
 
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
         """One JSON document, out at once."""

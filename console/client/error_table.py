@@ -66,6 +66,8 @@ REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
 )
 """Total. What a gateway says counts more than the code; a word of a newer one leaves the code to speak."""
 
+_CLOSED: Final = "the connection was closed, as by a gateway that wants to know who asks (robotctl login)"
+
 # gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
 _PLAIN_WORDS: Final = (
     ("before receiving settings", "something listens there, but it does not answer as a gateway"),
@@ -82,8 +84,8 @@ _PLAIN_WORDS: Final = (
     ("handshaker shutdown", "no answer"),
     ("timeout occurred", "no answer"),
     ("timed out", "no answer"),
-    ("socket closed", "the connection was closed"),
-    ("connection reset", "the connection was closed"),
+    ("socket closed", _CLOSED),
+    ("connection reset", _CLOSED),
     ("failed parsing http/2", "what listens there does not speak gRPC"),
 )
 _NOT_TRUSTED: Final = (

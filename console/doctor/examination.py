@@ -5,7 +5,17 @@ from collections.abc import Callable, Iterator
 
 from common.findings import Finding, Verdict, good, wrong
 from common.version import project_version
-from console.client import GatewayClient, GatewayError, GatewayInfo, PreviewState, SystemStatus, Unsupported
+from console.client import (
+    Credentials,
+    GatewayClient,
+    GatewayError,
+    GatewayInfo,
+    NotAllowed,
+    NotTrusted,
+    PreviewState,
+    SystemStatus,
+    Unsupported,
+)
 from console.doctor import network, robot
 
 
@@ -14,14 +24,21 @@ class Examination:
 
     Args:
         target: HOST:PORT.
+        credentials: what proves to the robot who asks.
         wall_clock: seconds since 1970; this computer's calendar clock.
 
     Attributes:
         reached: whether the gateway answered; known when the findings are all there.
     """
 
-    def __init__(self, target: str, wall_clock: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self,
+        target: str,
+        credentials: Credentials | None = None,
+        wall_clock: Callable[[], float] = time.time,
+    ) -> None:
         self._target = target
+        self._credentials = credentials
         self._wall_clock = wall_clock
         self.reached = False
 
@@ -36,9 +53,13 @@ class Examination:
         yield tcp
         if tcp.verdict is Verdict.WRONG:
             return
-        with GatewayClient(self._target) as client:
+        with GatewayClient(self._target, credentials=self._credentials) as client:
             try:
                 status = client.status()
+            except (NotAllowed, NotTrusted) as error:
+                self.reached = True
+                yield wrong("access", error.what, "The gateway tells nothing to strangers", error.remedy)
+                return
             except GatewayError as error:
                 yield wrong("grpc", error.what, "Something listens there, but no gateway", error.remedy)
                 return

@@ -8,7 +8,14 @@ from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-from console.client import AsyncGatewayClient, Backoff, ClientOptions, GatewayFailed, parse_target
+from console.client import (
+    AsyncGatewayClient,
+    Backoff,
+    ClientOptions,
+    Credentials,
+    GatewayFailed,
+    parse_target,
+)
 from console.monitor.conversation import Conversation
 from console.monitor.feed import PollingFeed, Robot
 from console.monitor.link import Link, Phase
@@ -24,8 +31,9 @@ _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_aft
 Connect: TypeAlias = Callable[[str], AbstractAsyncContextManager[Robot]]
 
 
-def _connect(target: str) -> AbstractAsyncContextManager[Robot]:
-    return AsyncGatewayClient(target, _OPTIONS)
+def connecting(credentials: Credentials | None = None) -> Connect:
+    """Makes clients that show these credentials."""
+    return lambda target: AsyncGatewayClient(target, _OPTIONS, credentials)
 
 
 class Worker:
@@ -34,7 +42,7 @@ class Worker:
     Args:
         target: HOST:PORT.
         on_news: called in the worker's thread whenever `newest()` has changed; must only hand over.
-        connect: makes the client, inside the worker's loop.
+        connect: makes the client, inside the worker's loop; by default one without credentials.
         retry: the pauses between attempts while the robot does not answer; they never end by themselves.
 
     Raises:
@@ -42,12 +50,16 @@ class Worker:
     """
 
     def __init__(
-        self, target: str, on_news: Callable[[], None], connect: Connect = _connect, retry: Backoff = _RETRY
+        self,
+        target: str,
+        on_news: Callable[[], None],
+        connect: Connect | None = None,
+        retry: Backoff = _RETRY,
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(phase=Phase.CONNECTING, since_s=time.monotonic()))
         self._newest = Newest(first, on_news)
-        self._connect = connect
+        self._connect = connect or connecting()
         self._retry = retry
         self._thread = threading.Thread(target=self._run, name="gateway-worker", daemon=True)
         self._loop = asyncio.new_event_loop()

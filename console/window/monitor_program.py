@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from console.client import Credentials
 from console.monitor.video import overlay_of, pass_on
-from console.monitor.worker import Worker
+from console.monitor.worker import Worker, connecting
 from console.viewer.session import VideoSession
 from console.window.application import application
 from console.window.monitor_window import MonitorWindow
@@ -16,21 +17,22 @@ _HANG_UP_WITHIN_S = 0.8
 """Each of the two that work in threads of their own: all is over in less than 2 s."""
 
 
-def run_monitor(target: str) -> None:
+def run_monitor(target: str, credentials: Credentials | None = None) -> None:
     """Shows the window until it is closed.
 
     Args:
         target: the robot's gateway.
+        credentials: what proves to it who asks.
 
     Raises:
         UserError: the target is no address, or there is no display.
     """
-    with application("Robot monitor") as app, monitor(target):
+    with application("Robot monitor") as app, monitor(target, credentials):
         app.exec()
 
 
 @contextmanager
-def monitor(target: str) -> Iterator[MonitorWindow]:
+def monitor(target: str, credentials: Credentials | None = None) -> Iterator[MonitorWindow]:
     """The window and all that works behind it; at the end of the block everything has hung up."""
     news, session = News(), VideoSession()
 
@@ -38,7 +40,7 @@ def monitor(target: str) -> Iterator[MonitorWindow]:
         pass_on(worker.newest(), session)
         news.tell()
 
-    worker = Worker(target, on_news)
+    worker = Worker(target, on_news, connecting(credentials))
     video = VideoView(session, lambda: overlay_of(worker.newest()))
     window = MonitorWindow(worker, news, video, Remembered())
     try:

@@ -1,0 +1,72 @@
+"""robotctl login: keep what the robot's keeper handed over, after the robot has accepted it."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from common.errors import ExitCode, UserError
+from console.cli.options import JsonOption, json_wanted
+from console.cli.session import print_json, standard_output
+from console.client import Credentials, GatewayClient, parse_target
+from console.robots import read_book, read_credentials
+from console.robots.book import check_name
+from console.robots.login import keep_login, parse_login
+from console.robots.private import read_public
+
+_STANDARD_INPUT = "-"
+
+
+def login(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(metavar="ROBOT", help="What you call it: --robot ROBOT.")],
+    target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Its gateway.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="The login; - reads it from standard input.")
+    ] = _STANDARD_INPUT,
+    *,
+    ca: Annotated[
+        Path | None, typer.Option(help="Only exchange the robot's certificate authority for this one (PEM).")
+    ] = None,
+    offline: Annotated[bool, typer.Option(help="Keep it without asking the robot.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Keep what the robot's keeper gave you, for your eyes only, and use it from now on.
+
+    On one line: ssh HOST robot-gateway credentials add NAME --role operator | robotctl login ROBOT HOST:PORT
+    """
+    check_name(name)
+    target = parse_target(target)
+    who, shown = _with_new_authority(name, ca) if ca else _read(file)
+    robot_says = ""
+    if not offline:
+        with GatewayClient(target, credentials=shown) as gateway:
+            robot_says = gateway.status().gateway_name
+    book = keep_login(name, target, shown)
+    out = standard_output()
+    if json_wanted(context, as_json):
+        print_json(out, {"robot": name, "target": target, "who": who, "gateway_name": robot_says})
+        return
+    words = f"{robot_says} accepts you" if robot_says else "not asked"
+    out.print(f"{name} at {target}: {words}{f' as {who}' if who else ''}. Kept in {book.path.parent}.")
+    out.print(f"Type: robotctl --robot {name} status")
+
+
+def _read(file: str) -> tuple[str, Credentials]:
+    found = parse_login(sys.stdin.read() if file == _STANDARD_INPUT else _text(Path(file)))
+    return ", ".join(word for word in (found.name, found.role) if word), found.credentials
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise UserError(f"{path} can't be read: {reason}", exit_code=ExitCode.USAGE) from error
+
+
+def _with_new_authority(name: str, ca: Path) -> tuple[str, Credentials]:
+    known = read_credentials(read_book().find(name))
+    return "", replace(known, ca_certificate=read_public(ca, "CA certificate file"))
