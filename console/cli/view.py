@@ -11,7 +11,7 @@ from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
 from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.cli.stopping import until_stopped
-from console.client import parse_target
+from console.client import Credentials, parse_target
 from console.receiver.recording import Recording
 from console.viewer.account import Account
 from console.viewer.headless import watch_headless
@@ -65,11 +65,16 @@ def view(
     show = None if headless else _window()
     recording = Recording(record) if record else None
     if show:
-        account = show(address, recording)
+        account = show(address, recording, session.credentials())
     else:
         with until_stopped(_nothing) as stopped:
             account = watch_headless(
-                address, frames=frames, patience_s=patience_s, recording=recording, stop=stopped.event
+                address,
+                frames=frames,
+                patience_s=patience_s,
+                recording=recording,
+                stop=stopped.event,
+                credentials=session.credentials(),
             )
     if session.as_json:
         session.print_json(json_form(account))
@@ -90,7 +95,7 @@ def _need_gstreamer() -> None:
         raise UserError(f"video needs GStreamer: {error.what}", _GSTREAMER) from error
 
 
-def _window() -> Callable[[str, Recording | None], Account]:
+def _window() -> Callable[[str, Recording | None, Credentials], Account]:
     try:
         from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
     except ImportError as error:

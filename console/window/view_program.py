@@ -28,9 +28,7 @@ class Viewing:
     worker: Worker
 
 
-def run_view(
-    target: str, recording: Recording | None, credentials: Credentials | None = None
-) -> Account:
+def run_view(target: str, recording: Recording | None, credentials: Credentials | None = None) -> Account:
     """Shows the window until it is closed; returns what was seen.
 
     Raises:
