@@ -11,12 +11,11 @@ from console.monitor.worker import Worker
 from console.receiver.recording import Recording
 from console.viewer.session import VideoSession
 from console.viewer.words import figures_line, recording_line
-from console.window.labels import set_text, word_label
+from console.window.labels import ElidedLabel, set_text, word_label
 from console.window.look import DimLabel
 from console.window.video_view import VideoView
 
 _TICK_MS = 500
-_MS_PER_S = 1000
 _KEYS = "P preview   O boxes   F full screen   Q quit"
 
 
@@ -39,7 +38,7 @@ class ViewWindow(QWidget):
         self._recording = recording
         self._counted = (time.monotonic(), 0)
         self.video = video
-        self.figures, self.recorded = word_label(), word_label()
+        self.figures, self.said = word_label(), ElidedLabel()
         self._lay_out()
         self._ticks = QTimer(self, interval=_TICK_MS)
         self._ticks.timeout.connect(self._tick)
@@ -64,9 +63,9 @@ class ViewWindow(QWidget):
         self._below = QWidget()
         line = QHBoxLayout(self._below)
         line.setContentsMargins(8, 3, 8, 3)
+        line.setSpacing(16)
         line.addWidget(self.figures)
-        line.addWidget(self.recorded)
-        line.addStretch(1)
+        line.addWidget(self.said, 1)
         keys = DimLabel(_KEYS)
         keys.setAlignment(Qt.AlignmentFlag.AlignRight)
         line.addWidget(keys)
@@ -82,9 +81,10 @@ class ViewWindow(QWidget):
         self._counted = (now_s, pictures)
         fps = (pictures - before) / (now_s - before_s)
         set_text(self.figures, figures_line(self._session.latest(), fps, self._session.figures().redials))
-        set_text(self.recorded, recording_line(self._recording))
-        snapshot = self._worker.newest().snapshot
-        name = snapshot.status.gateway_name if snapshot else ""
+        state = self._worker.newest()
+        notes = [note.text for note in controls(state, None, now_s).notes]
+        set_text(self.said, "   ".join(filter(None, (recording_line(self._recording), *notes))))
+        name = state.snapshot.status.gateway_name if state.snapshot else ""
         self.setWindowTitle(f"{name} {self._worker.target}".strip())
 
     def _switch(self) -> None:

@@ -17,7 +17,7 @@ from tests.integration.viewer.conftest import following
 from tests.support.judges import decoded_pictures
 from tests.support.ports import free_udp_port
 from tests.support.streams import SrtSender, encode
-from tests.support.video_ground import VideoGround
+from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
 from tests.unit.viewer.previews import preview
 
@@ -194,3 +194,16 @@ def test_closing_takes_no_time_whatever_it_does() -> None:
     begun_s = time.monotonic()
     assert session.close()
     assert time.monotonic() - begun_s < 1.5
+
+
+def test_an_encrypted_stream_needs_nothing_more(tmp_path: Path) -> None:
+    """Each session has a passphrase of its own; the endpoint brings it, also the next one."""
+    with (
+        video_ground(tmp_path, gateway={"preview": {"encrypted": True}}) as ground,
+        following(ground.target) as session,
+    ):
+        for _ in range(2):
+            ground.switch_on()
+            becomes(session, Phase.LIVE)
+            ground.switch_off()
+            becomes(session, Phase.OFF)
