@@ -1,4 +1,4 @@
-"""Every method, every role, every kind of credential: over real sockets, with real TLS, by the schema itself."""
+"""Every method, every role, every kind of credential, over real sockets with real TLS, by the schema."""
 
 import time
 from pathlib import Path

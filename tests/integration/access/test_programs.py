@@ -1,0 +1,186 @@
+"""`robot-gateway credentials` and `robotctl login` as people type them, and what must be in no log."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from common.errors import UserError
+from gateway.cli import app
+from tests.support.ports import free_tcp_port
+from tests.support.robotctl import only_line, robotctl
+from tests.support.waiting import wait_until
+
+MAIN = "from gateway.cli import main; main()"
+SECRET = re.compile(r"rgt-[0-9a-f]{12}\.[A-Za-z0-9_-]{43}|PRIVATE KEY")
+
+
+@pytest.fixture
+def ground(tmp_path: Path) -> Path:
+    """A configuration of a gateway with credentials, which do not exist yet."""
+    (tmp_path / "gateway.yaml").write_text(
+        f"grpc: {{port: {free_tcp_port()}}}\npreview: {{socket: {tmp_path / 'p.sock'}, settle_ms: 0}}\n"
+        f"sources: []\nlog_level: debug\nsecurity: {{credentials: {tmp_path / 'credentials'}}}\n"
+    )
+    return tmp_path
+
+
+def gateway(ground: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, *words, "--config", str(ground / "gateway.yaml")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def credentials(ground: Path, *words: str) -> str:
+    """What the command prints, in this process, because a program takes its time to start; it must work."""
+    done = CliRunner().invoke(app, ["credentials", *words, "--config", str(ground / "gateway.yaml")])
+    if done.exception:
+        raise done.exception
+    return done.stdout
+
+
+def port_of(ground: Path) -> str:
+    found = re.search(r"port: (\d+)", (ground / "gateway.yaml").read_text())
+    assert found
+    return found[1]
+
+
+@contextmanager
+def running(ground: Path) -> Iterator[Path]:
+    """A gateway as a program; its log."""
+    log = ground / "log"
+    command = [sys.executable, "-c", MAIN, "serve", "--config", str(ground / "gateway.yaml")]
+    with log.open("w") as errors, subprocess.Popen(command, stderr=errors) as process:
+        try:
+            wait_until(lambda: "serving operators" in log.read_text(), "the gateway serves")
+            yield log
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+def operator(ground: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    return robotctl(*words, XDG_CONFIG_HOME=str(ground / "config"))
+
+
+def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(ground: Path) -> None:
+    without = gateway(ground, "serve")
+    assert without.returncode == 2
+    assert "robot-gateway credentials init" in only_line(without.stderr)
+
+    credentials(ground, "init", "--host", "lab.local")
+    login = ground / "anna.login"
+    credentials(ground, "add", "anna", "--role", "operator", "--out", str(login))
+    printed = credentials(ground, "add", "ben", "--role", "viewer")
+    target = f"127.0.0.1:{port_of(ground)}"
+    with running(ground) as log:
+        assert operator(ground, "login", "lab", target, str(login)).returncode == 0
+        assert operator(ground, "status", "--json").returncode == 0
+        # The wish is taken note of; that there is no preview service is another matter.
+        assert "preview" in operator(ground, "preview", "on").stderr
+
+        (ground / "ben.login").write_text(printed)
+        assert operator(ground, "login", "lab-ben", target, str(ground / "ben.login")).returncode == 0
+        refused = operator(ground, "--robot", "lab-ben", "preview", "on")
+        assert refused.returncode == 1
+        assert "ben is viewer, and SetPreviewMode needs operator" in only_line(refused.stderr)
+
+        credentials(ground, "revoke", "anna")
+        wait_until(lambda: operator(ground, "status").returncode == 1, "anna is refused")
+        over = only_line(operator(ground, "status").stderr)
+        assert "was revoked" in over
+        assert "robotctl login" in over
+
+        stranger = robotctl("--target", target, "status")
+        assert stranger.returncode == 3
+        assert "robotctl login" in only_line(stranger.stderr)
+
+    # What everything that has run has written, but for what is made to hold a secret.
+    kept = {login, ground / "ben.login", *(ground / "config").rglob("token"), *ground.rglob("*-key.pem")}
+    written = [path for path in ground.rglob("*") if path.is_file() and path not in kept]
+    assert {log, ground / "credentials/audit.jsonl", ground / "credentials/credentials.json"} <= set(written)
+    assert [path for path in written if SECRET.search(path.read_text())] == []
+    assert SECRET.search(login.read_text())
+
+
+def test_rights_are_tight_whatever_the_umask_says(ground: Path) -> None:
+    credentials(ground, "init")
+    credentials(ground, "add", "anna", "--role", "admin", "--certificate", "--out", str(ground / "x/a.login"))
+    with running(ground):
+        login = operator(
+            ground, "login", "lab", f"127.0.0.1:{port_of(ground)}", str(ground / "x/a.login"), "--offline"
+        )
+        assert login.returncode == 0, login.stderr
+    for top in (ground / "credentials", ground / "config/robotctl", ground / "x"):
+        for path in (top, *top.rglob("*")):
+            assert path.stat().st_mode & 0o777 == (0o700 if path.is_dir() else 0o600), path
+
+
+@pytest.mark.parametrize("file", ["credentials.json", "server-key.pem"])
+def test_a_gateway_does_not_start_with_secrets_that_others_may_read(ground: Path, file: str) -> None:
+    credentials(ground, "init")
+    (ground / "credentials" / file).chmod(0o640)
+    done = gateway(ground, "serve")
+    assert done.returncode == 2
+    assert f"chmod 600 {ground / 'credentials' / file}" in only_line(done.stderr)
+
+
+def test_calls_at_once_lose_nothing(ground: Path) -> None:
+    credentials(ground, "init")
+    names = [f"person-{number}" for number in range(4)]
+    with ThreadPoolExecutor(3) as pool:
+        done = pool.map(lambda name: gateway(ground, "credentials", "add", name, "--role", "viewer"), names)
+        assert [each.returncode for each in done] == [0] * len(names)
+    listed = json.loads(credentials(ground, "list", "--json"))
+    assert sorted(each["name"] for each in listed) == names
+    assert len({each["id"] for each in listed}) == len(names)
+
+
+def test_what_is_there_is_not_thrown_away_by_mistake(ground: Path) -> None:
+    credentials(ground, "init")
+    credentials(ground, "add", "anna", "--role", "admin")
+    with pytest.raises(UserError, match="--again"):
+        credentials(ground, "init")
+    assert len(json.loads(credentials(ground, "list", "--json"))) == 1
+    credentials(ground, "init", "--again")
+    assert json.loads(credentials(ground, "list", "--json")) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("revoke", "nobody"), "no credential in force"),
+        (("rotate", "nobody"), "no credential in force"),
+        (("add", "../x", "--role", "viewer"), "can't be the name"),
+    ],
+)
+def test_what_can_not_be_is_one_line(ground: Path, words: tuple[str, ...], complaint: str) -> None:
+    credentials(ground, "init")
+    with pytest.raises(UserError, match=complaint):
+        credentials(ground, *words)
+
+
+def test_a_login_for_another_robot_is_refused_before_anything_is_sent(ground: Path, tmp_path: Path) -> None:
+    """Two robots have two authorities."""
+    credentials(ground, "init", "--host", "lab.local")
+    other = str(tmp_path / "other")
+    credentials(ground, "init", "--directory", other)
+    login = ground / "other.login"
+    credentials(ground, "add", "anna", "--role", "admin", "--directory", other, "--out", str(login))
+    with running(ground) as log:
+        done = operator(ground, "login", "lab", f"127.0.0.1:{port_of(ground)}", str(login))
+        assert done.returncode == 1
+        assert "not trusted" in only_line(done.stderr)
+        assert not (ground / "config").exists()
+    assert "wrong tokens" not in log.read_text()

@@ -1,0 +1,263 @@
+"""What the robot's keeper changes counts without a restart, for open streams as well."""
+
+import asyncio
+import json
+import ssl
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+
+from common.reasons import Reason
+from console.client.refusal import refusal_in
+from gateway.access.credential import Kind
+from gateway.access.role import Role
+from gateway.rpc.mapping.enums import SEVERITIES
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    GetSystemStatusRequest,
+    PingRequest,
+    SetPreviewModeRequest,
+    SubscribeEventsRequest,
+    WatchSystemStatusRequest,
+)
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.eventually import eventually
+from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot
+
+
+def stub(robot: Robot, login: Login = NOTHING) -> Any:
+    return RobotGatewayStub(robot.channel(login))
+
+
+async def ping(robot: Any, login: Login) -> str:
+    """The reason for which it was refused; empty when it was not."""
+    try:
+        await robot.Ping(PingRequest(), metadata=login.metadata(), timeout=5)
+    except grpc.aio.AioRpcError as error:
+        return refusal_in(error.trailing_metadata()).reason or error.code().name
+    return ""
+
+
+async def to_its_end(stream: Any) -> None:
+    while await stream.read() is not grpc.aio.EOF:
+        pass
+
+
+async def until(look: Callable[[], Awaitable[Any]], wanted: Any) -> None:
+    await eventually(look, lambda seen: seen == wanted, f"{wanted!r}")
+
+
+async def test_a_new_token_counts_soon_and_a_revoked_one_no_more(tmp_path: Path) -> None:
+    async with guarded_gateway(new_robot(tmp_path)) as robot:
+        calls = stub(robot)
+        credential, login = robot.add(Role.VIEWER)
+        await until(lambda: ping(calls, login), "")
+        robot.keeper.revoke(credential.credential_id)
+        await until(lambda: ping(calls, login), Reason.CREDENTIAL_REVOKED)
+
+
+async def test_a_rotated_token_goes_over_without_a_gap(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, old = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        _, bundle = robot.keeper.rotate("anna", overlap_s=3600)
+        new = Login(bundle.token)
+        await until(lambda: ping(calls, new), "")
+        assert await ping(calls, old) == ""
+
+
+@pytest.mark.parametrize("how", ["revoked", "expires"])
+@pytest.mark.parametrize("method", ["WatchSystemStatus", "SubscribeEvents"])
+async def test_open_streams_end_with_the_credential_and_no_others_do(
+    tmp_path: Path, how: str, method: str
+) -> None:
+    robot = new_robot(tmp_path)
+    days = (time.time() % 1 + 3) / 86_400 if how == "expires" else None
+    credential, login = robot.add(Role.VIEWER, days=days)
+    _, other = robot.add(Role.VIEWER, name="ben")
+    request = {"WatchSystemStatus": WatchSystemStatusRequest(), "SubscribeEvents": SubscribeEventsRequest()}
+    async with guarded_gateway(robot):
+        ending = getattr(stub(robot), method)(request[method], metadata=login.metadata())
+        staying = getattr(stub(robot), method)(request[method], metadata=other.metadata())
+        await ending.read()
+        await staying.read()
+        if how == "revoked":
+            robot.keeper.revoke(credential.credential_id)
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await asyncio.wait_for(to_its_end(ending), 10)
+        assert caught.value.code() is grpc.StatusCode.UNAUTHENTICATED
+        assert refusal_in(caught.value.trailing_metadata()).reason == Reason.CREDENTIAL_REVOKED
+        async with asyncio.timeout(10):
+            assert await staying.read() is not grpc.aio.EOF
+        staying.cancel()
+
+
+async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path) -> None:
+    """Its caller learns nothing, but it costs the robot nothing any more."""
+    robot = new_robot(tmp_path)
+    credential, login = robot.add(Role.VIEWER)
+    _, admin = robot.add(Role.ADMIN, name="ben")
+    async with guarded_gateway(robot):
+        unread = stub(robot).WatchSystemStatus(
+            WatchSystemStatusRequest(min_interval_ms=50), metadata=login.metadata()
+        )
+        calls = stub(robot)
+
+        async def told(detail: str) -> bool:
+            events = calls.SubscribeEvents(SubscribeEventsRequest(), metadata=admin.metadata(), timeout=5)
+            found = False
+            async for answer in events:
+                if answer.HasField("caught_up"):
+                    break
+                found = found or answer.event.HasField(detail)
+            events.cancel()
+            return found
+
+        await until(lambda: told("client_joined"), True)
+        robot.keeper.revoke(credential.credential_id)
+        await until(lambda: told("client_left"), True)
+        unread.cancel()
+
+
+async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        before = stub(robot)
+        stream = before.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
+        await stream.read()
+        old = await shown_certificate(robot.port)
+        robot.keeper.rotate_server(None)
+
+        async def changed() -> bool:
+            return await shown_certificate(robot.port) != old
+
+        await until(changed, True)
+        assert await ping(stub(robot), login) == ""
+        assert await ping(before, login) == ""
+        assert await stream.read() is not grpc.aio.EOF
+        stream.cancel()
+
+
+async def test_a_new_authority_ends_what_the_old_one_has_signed_and_leaves_tokens(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, token = robot.add(Role.VIEWER)
+    robot.add(Role.VIEWER, Kind.CERTIFICATE, name="ben")
+    async with guarded_gateway(robot):
+        old_authority = robot.authority
+        over = robot.keeper.rotate_authority(None)
+        assert [each.name for each in over] == ["ben"]
+
+        async def with_new_authority() -> str:
+            return await ping(stub(robot), token)
+
+        await until(with_new_authority, "")
+        assert (
+            await ping(RobotGatewayStub(robot.channel(token, authority=old_authority)), token)
+            == "UNAVAILABLE"
+        )
+
+
+async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        text = robot.directory.store_file.read_text()
+        robot.directory.store_file.write_text(text[:-20])
+        await until(lambda: faults(calls, login), {"access.credentials": "error"})
+        assert await ping(calls, login) == ""
+        robot.directory.store_file.write_text(text)
+        await until(lambda: faults(calls, login), {})
+
+
+async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    # Longer than the server's certificate lasts, shorter than the authority does.
+    _, client = robot.add(Role.VIEWER, Kind.CERTIFICATE)
+    async with guarded_gateway(robot, faults={"expiry_days": 900}):
+        calls = stub(robot)
+        await until(lambda: faults(calls, login), {"access.server_certificate": "warning"})
+    async with guarded_gateway(
+        robot, faults={"expiry_days": 3650}, security={"tls": {"client_certificates": True}}
+    ):
+        shown = stub(robot, client)
+        await until(
+            lambda: faults(shown, NOTHING),
+            {"access.server_certificate": "warning", "access.authority": "warning"},
+        )
+
+
+async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    operator, login = robot.add(Role.OPERATOR)
+    viewer, viewer_login = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        switch = calls.SetPreviewMode
+        await switch(SetPreviewModeRequest(enabled=True), metadata=login.metadata(), timeout=5)
+        for refused in (viewer_login, NOTHING):
+            with pytest.raises(grpc.aio.AioRpcError):
+                await switch(SetPreviewModeRequest(enabled=True), metadata=refused.metadata(), timeout=5)
+        with pytest.raises(grpc.aio.AioRpcError):
+            await switch(
+                SetPreviewModeRequest(enabled=True, profile=99),  # type: ignore[arg-type]  # what no client sends
+                metadata=login.metadata(),
+                timeout=5,
+            )
+        await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=5)
+    records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
+    assert [(each["who"], each["role"], each["credential"], each["result"]) for each in records] == [
+        ("anna", "operator", operator.credential_id, "accepted"),
+        ("ben", "viewer", viewer.credential_id, "refused"),
+        ("", "", "", "refused"),
+        ("anna", "operator", operator.credential_id, "refused"),
+    ]
+    assert all(each["action"] == "SetPreviewMode" for each in records)
+    assert all(
+        each["address"].startswith("127.0.0.1:") and each["time"].endswith("+00:00") for each in records
+    )
+    assert robot.audit_file.stat().st_mode & 0o777 == 0o600
+
+
+async def test_who_guesses_waits_and_others_at_the_same_address_do_not(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, annas = robot.add(Role.VIEWER)
+    _, bens = robot.add(Role.VIEWER, name="ben")
+    assert annas.token
+    wrong = Login(annas.token[:-1] + ("A" if annas.token[-1] != "A" else "B"))
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        said = [await ping(calls, wrong) for _ in range(7)]
+        assert said == [Reason.CREDENTIAL_UNKNOWN] * 6 + [Reason.LOCKED_OUT]
+        # Locked is the token that is guessed, from here: even the right one waits. Ben does not.
+        assert await ping(calls, annas) == Reason.LOCKED_OUT
+        assert await ping(calls, bens) == ""
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await calls.Ping(PingRequest(), metadata=annas.metadata(), timeout=5)
+        assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+        wait_s = refusal_in(caught.value.trailing_metadata()).retry_after_s
+        assert wait_s is not None
+        assert 0 < wait_s <= 1
+        await until(lambda: ping(calls, annas), "")
+
+
+async def shown_certificate(port: int) -> str:
+    """What a stranger is shown."""
+    return await asyncio.to_thread(ssl.get_server_certificate, ("127.0.0.1", port), timeout=5)
+
+
+async def faults(calls: Any, login: Login) -> dict[str, str]:
+    """Active faults of the door, and how bad they are."""
+    answer = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=5)
+    words = {number: severity.value for severity, number in SEVERITIES.items()}
+    return {
+        each.id: words[each.severity]
+        for each in answer.faults
+        if each.active and each.id.startswith("access.")
+    }
