@@ -5,7 +5,7 @@ import logging
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, NoReturn
 
 import grpc
 
@@ -45,6 +45,13 @@ _CHANNEL_OPTIONS: Final = (
 _GONE: Final = frozenset(
     {grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED}
 )
+
+
+class _Trouble(NamedTuple):
+    """What broke a session, in words. The exception itself would keep the call, and so the connection."""
+
+    for_people: str
+    in_full: str
 
 
 class PreviewLink:
@@ -97,10 +104,10 @@ class PreviewLink:
         while True:
             trouble = await self._session()
             self._failures_in_a_row += 1
-            if self._reconciler.lost(_for_people(trouble)):
-                _log.warning("preview service lost: %s", _in_full(trouble))
+            if self._reconciler.lost(trouble.for_people):
+                _log.warning("preview service lost: %s", trouble.in_full)
             elif self._failures_in_a_row == 1:
-                _log.warning("preview service not reached at %s: %s", self._socket, _in_full(trouble))
+                _log.warning("preview service not reached at %s: %s", self._socket, trouble.in_full)
             self.news.spread()
             await self._pause(self._failures_in_a_row)
 
@@ -109,20 +116,21 @@ class PreviewLink:
         pause_s = min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(failures - 1, 10))
         await self.news.wait_until(lambda: self._reconciler.wish.revision != revision, pause_s)
 
-    async def _session(self) -> Exception:
+    async def _session(self) -> _Trouble:
         """One connection, until it breaks; returns what broke it."""
         async with grpc.aio.insecure_channel(f"unix:{self._socket}", options=_CHANNEL_OPTIONS) as channel:
             stub: PreviewServiceAsyncStub = PreviewServiceStub(channel)
             try:
                 await _first_to_end(self._listen(stub), self._keep_applied(stub))
             except (grpc.aio.AioRpcError, TimeoutError, UnknownSpeechError) as trouble:
-                return trouble
+                return _Trouble(_for_people(trouble), _in_full(trouble))
 
     async def _listen(self, stub: "PreviewServiceAsyncStub") -> None:
         stream = stub.WatchActualState(WatchActualStateRequest())
         while True:
-            async with asyncio.timeout(SILENCE_S):
-                message = await stream.read()
+            message = await _next_word(stream)
+            if message is None:
+                raise TimeoutError
             if not isinstance(message, WatchActualStateResponse):
                 raise UnknownSpeechError("it ended its report without a word")
             self._take(message.actual)
@@ -164,6 +172,16 @@ class PreviewLink:
         self.news.spread()
 
 
+async def _next_word(stream: Any) -> object | None:
+    """What comes next; None when nothing comes in time. An exception would keep the call, as above."""
+    try:
+        async with asyncio.timeout(SILENCE_S):
+            message: object = await stream.read()
+            return message
+    except TimeoutError:
+        return None
+
+
 async def _first_to_end(*jobs: Coroutine[Any, Any, None]) -> NoReturn:
     """Runs endless jobs side by side until one raises, and raises that.
 
@@ -178,6 +196,8 @@ async def _first_to_end(*jobs: Coroutine[Any, Any, None]) -> NoReturn:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        # Their exception knows this frame: kept here, both would outlive the connection.
+        tasks.clear()
     raise AssertionError("an endless job ended quietly")
 
 

@@ -1,6 +1,7 @@
 """The gateway against a preview service that comes late, dies, freezes and refuses, over real sockets."""
 
 import asyncio
+import gc
 import os
 import signal
 import time
@@ -95,6 +96,26 @@ async def test_a_frozen_service_is_noticed_and_found_again(operator: Operator, s
         assert "no word for 2.5 s" in status.preview.last_error
         status = await until(operator, states.PREVIEW_RUNNING)
         assert (status.preview.counters.starts, status.preview.counters.restarts) == (1, 0)
+
+
+async def test_a_lost_connection_does_not_stay_open(operator: Operator, socket: Path) -> None:
+    async def descriptors() -> int:
+        return len(await asyncio.to_thread(os.listdir, descriptors_dir))
+
+    with double_process(socket) as process:
+        descriptors_dir = f"/proc/{process.pid}/fd"
+        await in_contact(operator)
+        before = await descriptors()
+        gc.disable()  # It would close what was forgotten, some time.
+        try:
+            for _ in range(2):
+                os.kill(process.pid, signal.SIGSTOP)
+                await eventually(operator.status, lambda it: not it.preview.service_reachable, "loss")
+                os.kill(process.pid, signal.SIGCONT)
+                await in_contact(operator)
+            await eventually(descriptors, lambda count: count <= before, "one connection")
+        finally:
+            gc.enable()
 
 
 async def test_a_wish_to_a_frozen_service_is_answered_in_time(operator: Operator, socket: Path) -> None:
