@@ -20,7 +20,8 @@ def running_stack(*words: str) -> Iterator[Stack]:
     """Serves until the block ends.
 
     Args:
-        words: "limited" for the bounds that a gateway has by default.
+        words: "limited" for the bounds that a gateway has by default; "guarded" and a directory of
+            credentials for one that asks who calls, over TLS.
     """
     with subprocess.Popen(
         [sys.executable, "-m", "bench.status_server", *words],

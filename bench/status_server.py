@@ -1,7 +1,8 @@
 """The server that bench.status measures: the gateway's own stack with everything filled, and an empty method.
 
 Run as a program it prints its port, serves until its standard input ends and uses no ROS. Callers may ask as
-often as they like, unless the word "limited" follows.
+often as they like, unless the word "limited" follows. After "guarded" comes the directory of the credentials
+that callers need.
 """
 
 import asyncio
@@ -16,6 +17,8 @@ import uvloop
 
 from common.listen import bind_tcp
 from common.rpc import Context, new_server
+from gateway.config import SecuritySettings
+from gateway.door import Door
 from gateway.preview_link.actual import Actual
 from gateway.preview_link.control import PreviewControl
 from gateway.preview_link.link import PreviewLink
@@ -76,10 +79,12 @@ _NEWS_EVERY_S = 0.05
 
 
 def main() -> None:
-    uvloop.run(_serve(unlimited="limited" not in sys.argv[1:]))
+    words = sys.argv[1:]
+    guarded = words[words.index("guarded") + 1] if "guarded" in words else None
+    uvloop.run(_serve("limited" not in words, Path(guarded) if guarded else None))
 
 
-async def _serve(unlimited: bool) -> None:
+async def _serve(unlimited: bool, credentials: Path | None) -> None:
     board, events = Board(), EventLog("bench")
     reconciler, tally = Reconciler(1), Tally()
     link = PreviewLink(Path("/nonexistent"), reconciler)
@@ -114,7 +119,9 @@ async def _serve(unlimited: bool) -> None:
         events.add(_mode("an event"), time.monotonic())
         return b""
 
-    server = new_server([LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits()))])
+    door = Door(SecuritySettings(credentials=credentials))
+    guards = [door.guard] if door.guard else []
+    server = new_server([LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits())), *guards])
     server.add_generic_rpc_handlers(
         (
             grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),
@@ -128,7 +135,7 @@ async def _serve(unlimited: bool) -> None:
             ),
         )
     )
-    port = bind_tcp(server, "127.0.0.1", 0)
+    port = bind_tcp(server, "127.0.0.1", 0, door.credentials())
     await server.start()
     background = [
         asyncio.create_task(_bring_news(board, reconciler)),

@@ -63,7 +63,8 @@ class Lockout:
         Raises:
             TooMuchError: too many failed before.
         """
-        entry = self._entries.get((site_of(host), credential_id))
+        # Every call comes by here, and nearly always nobody is locked out.
+        entry = self._entries.get((site_of(host), credential_id)) if self._entries else None
         if entry is None:
             return
         left_s = entry.locked_until_s - self._clock()
