@@ -1,6 +1,6 @@
 """The one language of the benchmarks: a row is a figure, its reference and the promised limit."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 
@@ -36,6 +36,11 @@ class Row:
         """Whether the promise is kept."""
         figure = self.value if self.ratio is None else self.ratio
         return figure <= self.bar if self.better == "lower" else figure >= self.bar
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> "Row":
+        """The row that the JSON file of another run holds."""
+        return cls(**{field.name: data[field.name] for field in fields(cls)})
 
     def as_json(self) -> dict[str, Any]:
         """The row as the JSON file holds it."""
