@@ -10,7 +10,7 @@ from tests.support.engine import ROOT
 
 pytestmark = pytest.mark.docker
 
-OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo")
+OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded")
 
 
 def config(*overlays: str) -> dict[str, Any]:
@@ -50,6 +50,18 @@ def test_video_yields_to_the_mission() -> None:
     services = config()["services"]
     assert services["preview"]["cpu_shares"] < 1024
     assert services["preview"]["oom_score_adj"] > services["gateway"].get("oom_score_adj", 0)
+
+
+def test_a_guarded_gateway_reads_credentials_that_it_can_not_change() -> None:
+    services = config("guarded")["services"]
+    for name in ("gateway", "gateway-config"):
+        environment = services[name]["environment"]
+        assert environment["GATEWAY__SECURITY__CREDENTIALS"] == "/var/lib/robot-gateway/credentials"
+        assert environment["HEALTH_TARGET"] == f"unix:{environment['GATEWAY__GRPC__SOCKET']}"
+    mounts = {each["target"]: each for each in services["gateway"]["volumes"]}
+    assert mounts["/var/lib/robot-gateway/credentials"]["read_only"]
+    assert not mounts["/var/lib/robot-gateway/audit"].get("read_only")
+    assert "credentials" not in services, "it runs when the robot's keeper asks for it, never by itself"
 
 
 def test_the_gateway_is_where_the_robots_nodes_are() -> None:
