@@ -58,7 +58,7 @@ def components(state: MonitorState, now_s: float) -> list[Component]:
     return [
         *lines.always(state.snapshot),
         *lines.where_there_is_something(status),
-        *_standing(status),
+        *lines.without_an_age(status),
         *(lines.source(source) for source in status.sources if _worth_a_line(source)),
     ]
 
@@ -97,6 +97,21 @@ class _Lines:
             if sample.available:
                 yield self._of(name, sample, values)
 
+    def without_an_age(self, status: SystemStatus) -> Iterator[Component]:
+        """How the robot is set up."""
+        teleop, gateway = status.teleop, status.gateway
+        if teleop.state is not TeleopState.UNKNOWN:
+            turning = quantity(teleop.max_angular_rad_s, "rad/s")
+            limits = _unbroken(f"at most {quantity(teleop.max_linear_mps, 'm/s')}, {turning}")
+            tone = Tone.GOOD if teleop.enabled else Tone.QUIET
+            yield Component("Teleop", teleop.state.value, tone, joined(limits, teleop.last_error), "")
+        if status.insecure:
+            risk = "not encrypted, everybody on the network may switch the preview"
+            yield Component("Access", "OPEN", Tone.WARNING, risk, "")
+        if gateway.uptime_ms is not None and not self._outdated:
+            clients = plural(gateway.client_count, "client")
+            yield Component("Gateway", "up", Tone.QUIET, clients, age(gateway.uptime_ms + self._silent_ms))
+
     def source(self, source: Source) -> Component:
         tone = Tone.WARNING if source.required else Tone.QUIET
         return Component(
@@ -117,24 +132,6 @@ class _Lines:
 def _unbroken(values: str) -> str:
     """The same; a line of it ends behind a comma, never between a number and its unit."""
     return ", ".join(part.replace(" ", "\u00a0") for part in values.split(", "))
-
-
-def _standing(status: SystemStatus) -> Iterator[Component]:
-    """What has no age: how the robot is set up."""
-    teleop, gateway = status.teleop, status.gateway
-    if teleop.state is not TeleopState.UNKNOWN:
-        tone = Tone.GOOD if teleop.enabled else Tone.QUIET
-        limits = (
-            f"at most {quantity(teleop.max_linear_mps, 'm/s')}, {quantity(teleop.max_angular_rad_s, 'rad/s')}"
-        )
-        yield Component("Teleop", teleop.state.value, tone, joined(_unbroken(limits), teleop.last_error), "")
-    if status.insecure:
-        risk = "not encrypted, everybody on the network may switch the preview"
-        yield Component("Access", "OPEN", Tone.WARNING, risk, "")
-    if gateway.uptime_ms is not None:
-        yield Component(
-            "Gateway", "up", Tone.QUIET, plural(gateway.client_count, "client"), age(gateway.uptime_ms)
-        )
 
 
 def _worth_a_line(source: Source) -> bool:

@@ -131,7 +131,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     reason = watch.window.preview.notes.shown[0]
     assert isinstance(reason, NoteLine)
     until(reason.text.text, "the reason is shown")
-    let_pass(1)
+    watch.mark_is("Video", "STALE")
     keep_picture(watch.window, "preview-faulted")
     watch.robot.preview.start_again()
     watch.preview_is("RUNNING")
@@ -143,6 +143,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     assert not watch.window.preview.switch.isEnabled()
     watch.mark_is("Motion", "STALE")
     watch.picture_moves()  # the stream does not need the gateway
+    let_pass(3)
     keep_picture(watch.window, "unreachable")
 
     watch.robot.start_gateway()

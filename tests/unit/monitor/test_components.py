@@ -86,6 +86,7 @@ def test_how_the_robot_is_set_up() -> None:
     assert (lines["Teleop"].mark, lines["Teleop"].tone) == ("enabled", Tone.GOOD)
     assert (lines["Gateway"].values, lines["Gateway"].age) == ("2 clients", "1 min 30 s")
     assert not {"Access", "Teleop", "Gateway"} & by_name(heard()).keys()
+    assert "Gateway" not in by_name(heard(snapshot(change)), NOW_S + 60), "nobody knows whether it is up"
 
 
 def test_a_line_never_breaks_between_a_number_and_its_unit() -> None:
