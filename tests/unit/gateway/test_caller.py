@@ -2,6 +2,9 @@ import socket
 
 import pytest
 
+from gateway.access.credential import Principal
+from gateway.access.role import Role
+from gateway.rpc import identity
 from gateway.rpc.caller import Caller, Callers
 
 
@@ -30,3 +33,15 @@ def test_a_caller_without_a_route_is_sent_to_the_hosts_name() -> None:
     # 240.0.0.0/4 is routed nowhere; where it is, the answer is an address and as good.
     host = Callers(None).of("ipv4:255.255.255.255:4711").robot_host
     assert host == socket.gethostname() or host.count(".") == 3
+
+
+def test_who_is_known_may_watch_from_anywhere_and_nobody_else_learns_it() -> None:
+    callers = Callers("robot.local")
+    remote = "ipv4:192.0.2.1:4711"
+    assert not callers.of(remote).may_watch
+    identity.begin(Principal("anna", Role.VIEWER, ("a",)))
+    try:
+        assert callers.of(remote).may_watch
+    finally:
+        identity.begin(None)
+    assert not callers.of(remote).may_watch

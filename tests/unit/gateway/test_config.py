@@ -82,3 +82,68 @@ def test_the_loopback_needs_no_permission(tmp_path: Path, host: str) -> None:
 def test_exposure_can_be_accepted(tmp_path: Path) -> None:
     settings = load(tmp_path, "{grpc: {host: 0.0.0.0}, security: {insecure: true}}")
     assert settings.security.insecure
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{grpc: {host: 0.0.0.0}}",
+        "{grpc: {host: robot.local}}",
+        "{grpc: {host: '::'}}",
+        "{grpc: {host: 10.0.0.5}, security: {credentials: /c, tls: {enabled: false}}}",
+        "{metrics: {host: 0.0.0.0, port: 9464}}",
+        "{metrics: {host: '::', port: 0}, security: {credentials: /c}}",
+    ],
+)
+def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_somebody_accepts_it(
+    tmp_path: Path, text: str
+) -> None:
+    with pytest.raises(UserError) as seen:
+        load(tmp_path, text)
+    assert "insecure: true" in str(seen.value)
+    assert seen.value.exit_code is ExitCode.USAGE
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{grpc: {host: 0.0.0.0}, security: {credentials: /c}}",
+        "{grpc: {host: 0.0.0.0}, security: {credentials: /c, tls: {client_certificates: true}}}",
+        "{grpc: {host: 127.0.0.1}, security: {credentials: /c, tls: {enabled: false}}}",
+        "{metrics: {host: 0.0.0.0}}",
+        "{metrics: {host: 0.0.0.0, port: 9464, insecure: true}}",
+        "{metrics: {host: 0.0.0.0, port: 9464}, security: {insecure: true}}",
+    ],
+)
+def test_what_is_guarded_kept_in_or_accepted_is_good(tmp_path: Path, text: str) -> None:
+    assert load(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{tls: {certificate: /a, key: /b}}", "tls alone lets everybody in"),
+        ("{tls: {client_certificates: true}}", "tls alone lets everybody in"),
+        ("{credentials: /c, tls: {certificate: /a}}", "belong together"),
+        ("{credentials: /c, tls: {enabled: false, client_certificates: true}}", "need TLS"),
+    ],
+)
+def test_half_a_guard_is_none(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(UserError) as seen:
+        load(tmp_path, f"security: {text}")
+    assert words in str(seen.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "encrypted"),
+    [
+        ("{}", False),
+        ("{security: {credentials: /c}}", True),
+        ("{security: {credentials: /c}, preview: {encrypted: false}}", False),
+        ("{preview: {encrypted: true}}", True),
+    ],
+)
+def test_where_callers_are_known_the_video_is_theirs_alone(
+    tmp_path: Path, text: str, encrypted: bool
+) -> None:
+    assert load(tmp_path, text).preview_encrypted is encrypted
