@@ -1,7 +1,9 @@
 """One SRT connection and what decodes it."""
 
+import socket
 import threading
 from collections import deque
+from dataclasses import replace
 from typing import Any
 
 from common.errors import UserError
@@ -65,7 +67,7 @@ class Connection:
 
     def _build(self) -> None:
         # The URI first: setting it resets the source's other properties.
-        source = element("srtsrc", uri=f"{self._address.uri}?mode=caller")
+        source = element("srtsrc", uri=f"{_with_number(self._address).uri}?mode=caller")
         for name, value in {
             "latency": self._address.latency_ms,
             # Whether and when to call again is the Receiver's decision.
@@ -152,6 +154,16 @@ class Connection:
         self._pipeline.post_message(
             Gst.Message.new_application(self._pipeline, Gst.Structure.new_empty(what))
         )
+
+
+def _with_number(address: StreamAddress) -> StreamAddress:
+    """The same with a number for a name: of IPv4 where there is one. GLib would take IPv6 first."""
+    try:
+        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError:
+        # The source tries by itself, and says what is wrong.
+        return address
+    return replace(address, host=str(found[0][4][0]))
 
 
 def _undecodable(address: StreamAddress, what: str) -> UndecodableError:

@@ -28,7 +28,7 @@ class Decoders:
     def __init__(self, prove: Prove = _prove) -> None:
         self._prove = prove
         self._proven: dict[str, str] = {}
-        self._distrusted = False
+        self._distrusted = self._waited = False
         self._trials = threading.Thread(target=self._try_all, name="decoder-trials", daemon=True)
 
     def start(self) -> None:
@@ -37,8 +37,9 @@ class Decoders:
 
     def chosen(self) -> Mapping[str, str]:
         """GStreamer's element by codec; a codec that is not named is decoded in software."""
-        if self._trials.ident is not None:
+        if self._trials.ident is not None and not self._waited:
             self._trials.join(_WAIT_S)
+            self._waited = True
         return {} if self._distrusted else dict(self._proven)
 
     def after_undecodable(self, trouble: UndecodableError) -> StreamError:

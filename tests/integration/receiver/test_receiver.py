@@ -156,6 +156,22 @@ def test_the_passphrase_fits(port: int) -> None:
         assert receiver.next_frame(PATIENCE_S).width == 320
 
 
+def test_a_name_is_called_where_the_robot_listens(sender: SrtSender, port: int) -> None:
+    """The name localhost is an IPv6 address, too, and nobody listens there."""
+    with Receiver(StreamAddress("localhost", port, latency_ms=20)) as receiver:
+        joined(sender)
+        sender.send(encode("h264", 1)[0])
+        assert receiver.next_frame(PATIENCE_S).width == 320
+
+
+def test_a_name_that_nobody_knows_is_told(port: int) -> None:
+    with (
+        Receiver(StreamAddress("robot.invalid", port, latency_ms=20)) as receiver,
+        pytest.raises(StreamRefusedError, match=r"srt://robot\.invalid"),
+    ):
+        receiver.next_frame(PATIENCE_S)
+
+
 def test_a_stream_of_another_codec_is_named(sender: SrtSender, port: int) -> None:
     pieces = encode("mpeg4", 5)
     with viewer(port) as receiver:
