@@ -76,6 +76,12 @@ def analyse(data: bytes) -> Stream:
     return _Analysis().run(data)
 
 
+def share_beyond(times_ms: list[float], limit_ms: float) -> float:
+    """The share of distances that are longer, 0 to 1; 1 where there is nothing to measure."""
+    distances = [later - earlier for earlier, later in pairwise(times_ms)]
+    return sum(distance > limit_ms for distance in distances) / len(distances) if distances else 1.0
+
+
 def _longest(times_ms: list[float]) -> float:
     """The longest distance; infinite where there is nothing to measure."""
     return max((later - earlier for earlier, later in pairwise(times_ms)), default=float("inf"))

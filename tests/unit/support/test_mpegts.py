@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.mpegts import PACKET_BYTES, Stream, analyse
+from tests.support.mpegts import PACKET_BYTES, Stream, analyse, share_beyond
 
 PMT_PID, VIDEO_PID = 0x20, 0x41
 SLICE, IDR, SPS, PPS = 1, 5, 7, 8
@@ -208,3 +208,8 @@ def test_what_is_no_transport_stream() -> None:
 
 def test_nothing_to_measure_is_never_good_enough() -> None:
     assert analyse(b"").longest_without_pcr_ms == float("inf")
+
+
+def test_how_many_distances_are_too_long() -> None:
+    assert share_beyond([0, 30, 70, 111, 130], 40) == 0.25
+    assert share_beyond([7], 40) == share_beyond([], 40) == 1
