@@ -6,6 +6,7 @@ from pathlib import Path
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.config import GatewaySettings, SourceSettings, load_settings
+from gateway.doctor.access import access_finding
 from gateway.doctor.devices import device_findings
 from gateway.doctor.doors import operator_door, preview_door
 
@@ -28,6 +29,8 @@ def _of(settings: GatewaySettings, config: Path | None) -> Iterator[Finding]:
             "security.insecure: everybody who reaches the address may read and switch everything",
             "Nothing is encrypted and nobody is asked who they are",
         )
+    if settings.security.credentials is not None:
+        yield access_finding(settings.security)
     yield operator_door(settings.grpc.host, settings.grpc.port)
     yield preview_door(settings.preview.socket)
     yield from device_findings()

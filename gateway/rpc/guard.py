@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final, NoReturn
 
 import grpc
@@ -40,15 +40,6 @@ class _OpenStream:
     task: "asyncio.Task[Any]"
 
 
-@dataclass(slots=True)
-class Counts:
-    """What became of those who asked to be let in."""
-
-    admitted: int = 0
-    refused: dict[str, int] = field(default_factory=dict)
-    """By the word of the reason."""
-
-
 class Guard(grpc.aio.ServerInterceptor):
     """Belongs to one event loop.
 
@@ -72,7 +63,6 @@ class Guard(grpc.aio.ServerInterceptor):
         self._audit = audit
         self._certificates = certificates
         self._streams: set[_OpenStream] = set()
-        self.counts = Counts()
 
     async def intercept_service(
         self,
@@ -140,7 +130,6 @@ class Guard(grpc.aio.ServerInterceptor):
         except (NotAuthenticatedError, NotAllowedError, TooMuchError) as error:
             self._note_refusal(context, method, needed, principal, error)
             raise
-        self.counts.admitted += 1
         return principal
 
     def _identify(self, context: Context) -> Principal:
@@ -180,8 +169,6 @@ class Guard(grpc.aio.ServerInterceptor):
         principal: Principal | None,
         error: NotAuthenticatedError | NotAllowedError | TooMuchError,
     ) -> None:
-        refused = self.counts.refused
-        refused[error.reason] = refused.get(error.reason, 0) + 1
         # A flood of guesses must not push what matters out of a log that has an end.
         if needed in (Role.OPERATOR, Role.ADMIN) and not isinstance(error, TooMuchError):
             self._audit(
@@ -214,7 +201,7 @@ class Guard(grpc.aio.ServerInterceptor):
         telling = stream.context.abort(code, str(error), trailing_metadata=metadata_of(error, code))
         try:
             await asyncio.wait_for(telling, _END_WITHIN_S)
-        except (grpc.aio.AbortError, grpc.aio.UsageError, TimeoutError):
+        except (grpc.aio.BaseError, TimeoutError):
             # Told (gRPC raises whenever it has aborted); gone already; or it does not read.
             pass
         finally:

@@ -1,5 +1,6 @@
 """Every method, every role, every kind of credential, over real sockets with real TLS, by the schema."""
 
+import asyncio
 import time
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 from grpc_health.v1 import health_pb2
 from grpc_reflection.v1alpha import reflection_pb2
 
+from common.healthcheck import state_of
 from common.reasons import Reason
 from console.client.refusal import refusal_in
 from gateway.access.credential import Kind
@@ -149,6 +151,20 @@ async def test_health_is_for_everybody_and_nothing_else_is(tmp_path: Path) -> No
         with pytest.raises(grpc.aio.AioRpcError) as caught:
             await robot.channel().unary_unary("/omniseer.gateway.v1.RobotGateway/Nothing")(b"", timeout=5)
         assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
+
+
+async def test_the_local_socket_is_for_health_checks_and_asks_for_the_rest(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path / "a")
+    login = robot.add(Role.VIEWER)[1]
+    socket = tmp_path / "health.sock"
+    ping = f"/{SERVICE.full_name}/Ping"
+    async with (
+        guarded_gateway(robot, grpc={"socket": socket}, security={"tls": {"client_certificates": True}}),
+        grpc.aio.insecure_channel(f"unix:{socket}") as local,
+    ):
+        assert await asyncio.to_thread(state_of, f"unix:{socket}") == "SERVING"
+        assert await called(local, ping, NOTHING) == (UNAUTHENTICATED, Reason.CREDENTIAL_MISSING)
+        assert await called(local, ping, login) == (OK, "")
 
 
 async def test_neither_plaintext_nor_another_robots_authority_gets_anywhere(tmp_path: Path) -> None:

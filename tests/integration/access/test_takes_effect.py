@@ -123,6 +123,27 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
         unread.cancel()
 
 
+async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    credential, login = robot.add(Role.VIEWER)
+    _, other = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot, limits={"streams_per_connection": 64}):
+        calls = stub(robot, login)
+        streams = [
+            calls.WatchSystemStatus(WatchSystemStatusRequest(min_interval_ms=50), metadata=login.metadata())
+            for _ in range(40)
+        ]
+        for stream in streams:
+            await stream.read()
+        robot.keeper.revoke(credential.credential_id)
+        # Some leave before they are sent away, some at the same moment, some after.
+        for stream in streams:
+            stream.cancel()
+            await asyncio.sleep(0.03)
+        assert await ping(stub(robot), other) == ""
+        assert await ping(stub(robot), login) == Reason.CREDENTIAL_REVOKED
+
+
 async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)

@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 from common.findings import Finding, Verdict
+from gateway.access.directory import CredentialDirectory
+from gateway.access.keeping import Keeper, Wanted
+from gateway.access.role import Role
 from gateway.doctor.devices import device_findings
 from gateway.doctor.doors import operator_door, preview_door
 from gateway.doctor.examination import examine
@@ -77,3 +80,24 @@ def test_the_previews_door(tmp_path: Path) -> None:
     path.unlink()
     path.write_text("no socket", encoding="utf-8")
     assert preview_door(path).verdict is Verdict.WRONG
+
+
+def access_of(tmp_path: Path) -> Finding:
+    config = tmp_path / "gateway.yaml"
+    config.write_text(f"sources: []\nsecurity: {{credentials: {tmp_path / 'c'}}}\n", encoding="utf-8")
+    return {finding.check: finding for finding in examine(config)}["access"]
+
+
+def test_credentials_are_looked_at_as_the_gateway_does(tmp_path: Path) -> None:
+    missing = access_of(tmp_path)
+    assert missing.verdict is Verdict.WRONG
+    assert "robot-gateway credentials init" in missing.remedy
+    keeper = Keeper(CredentialDirectory(tmp_path / "c"), "lab")
+    keeper.begin(("localhost",))
+    assert access_of(tmp_path).verdict is Verdict.NOTE
+    keeper.add(Wanted("anna", Role.VIEWER))
+    assert access_of(tmp_path).what.startswith(
+        "credentials that are valid: 1; the certificate is good until 2"
+    )
+    (tmp_path / "c/server-key.pem").write_text("no key", encoding="utf-8")
+    assert access_of(tmp_path).verdict is Verdict.WRONG
