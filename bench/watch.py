@@ -96,7 +96,7 @@ def _healthy() -> Row:
     with running_stack("limited") as stack:
         target = f"127.0.0.1:{stack.port}"
         with grpc.insecure_channel(target, options=(("grpc.use_local_subchannel_pool", 1),)) as channel:
-            call = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
+            call: Any = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
             _took_ms(call)
             for number in range(TURNS):
                 alone += _took_ms(call)

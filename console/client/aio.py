@@ -145,7 +145,7 @@ class AsyncGatewayClient:
         await self.close()
 
     def _follow(self, following: Following) -> AsyncIterator[Any]:
-        return follow(following, self._begin, self.target, self._closed)
+        return follow(following, self._begin, self._send, self.target, self._closed)
 
     def _begin(self, step: Open) -> Any:
         return self._streams[step.method.name](step.request, metadata=self._metadata)

@@ -2,23 +2,25 @@
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import grpc
 
 from console.client.error_table import error_from, stream_error_from
 from console.client.errors import Cancelled, DeadlineExceeded, GatewayError
-from console.client.exchange import Pause
+from console.client.exchange import Pause, Send
 from console.client.following import Following, Open, Read, StreamStep, Tell, go_on
 from console.client.mailbox import MOST_WAITING
 
 Begin = Callable[[Open], Any]
 """Makes the call that a step asks for."""
+Ask = Callable[[Send[Any, Any]], Awaitable[Any]]
+"""Carries out a call with one answer, which it returns, or the error."""
 
 
 async def follow(
-    following: Following, begin: Begin, target: str, closed: asyncio.Event
+    following: Following, begin: Begin, send: Ask, target: str, closed: asyncio.Event
 ) -> AsyncIterator[Any]:
     """What the following tells, as it comes; ends its call when the caller stops iterating.
 
@@ -39,6 +41,8 @@ async def follow(
                     if call:
                         call.end()
                     call = _Call(step, begin, target)
+                case Send():
+                    outcome = await send(step)
                 case Read(within_s) if call:
                     outcome = await call.read(within_s)
             if closed.is_set():

@@ -176,7 +176,7 @@ class GatewayClient:
         self.close()
 
     def _follow(self, following: Following) -> Iterator[Any]:
-        return follow(following, self._begin, self.target, self._closed)
+        return follow(following, self._begin, self._send, self.target, self._closed)
 
     def _begin(self, step: Open) -> Any:
         return self._streams[step.method.name](step.request, metadata=self._metadata)

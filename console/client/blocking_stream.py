@@ -8,15 +8,19 @@ import grpc
 
 from console.client.error_table import error_from, stream_error_from
 from console.client.errors import Cancelled, GatewayError
-from console.client.exchange import Pause
+from console.client.exchange import Pause, Send
 from console.client.following import Following, Open, Read, StreamStep, Tell, go_on
 from console.client.mailbox import Mailbox
 
 Begin = Callable[[Open], Any]
 """Makes the call that a step asks for."""
+Ask = Callable[[Send[Any, Any]], Any]
+"""Carries out a call with one answer, which it returns, or the error."""
 
 
-def follow(following: Following, begin: Begin, target: str, closed: threading.Event) -> Iterator[Any]:
+def follow(
+    following: Following, begin: Begin, send: Ask, target: str, closed: threading.Event
+) -> Iterator[Any]:
     """What the following tells, as it comes; ends its call when the caller stops iterating.
 
     Raises:
@@ -36,6 +40,8 @@ def follow(following: Following, begin: Begin, target: str, closed: threading.Ev
                     if call:
                         call.end()
                     call = _Call(step, begin, target)
+                case Send():
+                    outcome = send(step)
                 case Read(within_s) if call:
                     outcome = call.read(within_s)
             if closed.is_set():

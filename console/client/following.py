@@ -6,18 +6,28 @@ the caller something. The blocking and the asyncio client carry them out.
 
 import time
 from collections.abc import Callable, Generator, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final, Generic, NoReturn, TypeAlias, TypeVar
+from typing import Any, Final, Generic, TypeAlias, TypeVar
 
-from console.client.errors import DeadlineExceeded, GatewayError, Overloaded, Unreachable
-from console.client.exchange import Pause
+from console.client.errors import DeadlineExceeded, GatewayError, Overloaded, Unreachable, Unsupported
+from console.client.exchange import Pause, Send
 from console.client.feed import EventFeed
-from console.client.mapping.methods import SUBSCRIBE_EVENTS, WATCH_SYSTEM_STATUS, Method
+from console.client.mapping.methods import (
+    GET_SYSTEM_STATUS,
+    SUBSCRIBE_EVENTS,
+    WATCH_SYSTEM_STATUS,
+    Method,
+)
 from console.client.options import ClientOptions
 from console.client.results import CaughtUp, Event, EventGap, WatchedStatus
 
 ItemT = TypeVar("ItemT")
 
+_LONGEST_INTERVAL_S: Final = 60.0
+"""No gateway lets itself be watched more slowly; who wants that has to ask."""
+_SHORTEST_PAUSE_S: Final = 0.05
+"""Between two questions to a gateway that can't be watched."""
 _EVENTS_SILENT_S: Final = 5.0
 """The gateway gives a sign of life this often when nothing happens."""
 _STATUS_SILENT_S: Final = 1.0
@@ -67,8 +77,8 @@ class Tell(Generic[ItemT]):
     item: ItemT
 
 
-StreamStep: TypeAlias = Open | Read | Pause | Tell[Any]
-Following: TypeAlias = Generator[StreamStep, Any, NoReturn]
+StreamStep: TypeAlias = Open | Read | Send[Any, Any] | Pause | Tell[Any]
+Following: TypeAlias = Generator[StreamStep, Any, None]
 
 
 def go_on(following: Following, outcome: Any) -> StreamStep:
@@ -90,13 +100,19 @@ class Followings:
         """Connections made after the first, of all streams together, since this client was made."""
 
     def status(self, min_interval_s: float) -> Following:
-        """Tells `WatchedStatus` and `Outage`."""
+        """Tells `WatchedStatus` and `Outage`; asks again and again where the gateway can't be watched."""
 
         def take(item: WatchedStatus) -> Iterable[WatchedStatus]:
             return (item,)
 
-        silent_s = max(_STATUS_SILENT_S, min_interval_s)
-        return self._follow(lambda: Open(WATCH_SYSTEM_STATUS, min_interval_s, True), take, silent_s)
+        if min_interval_s <= _LONGEST_INTERVAL_S:
+            silent_s = max(_STATUS_SILENT_S, min_interval_s)
+            # An older gateway knows no such method.
+            with suppress(Unsupported):
+                yield from self._follow(
+                    lambda: Open(WATCH_SYSTEM_STATUS, min_interval_s, True), take, silent_s
+                )
+        yield from self._ask(max(min_interval_s, _SHORTEST_PAUSE_S))
 
     def events(self, feed: EventFeed) -> Following:
         """Tells `Event`, `EventGap`, `CaughtUp` and `Outage`."""
@@ -105,6 +121,22 @@ class Followings:
             return feed.take(item)
 
         return self._follow(lambda: Open(SUBSCRIBE_EVENTS, feed.wanted(), False), take, _EVENTS_SILENT_S)
+
+    def _ask(self, pause_s: float) -> Following:
+        attempt = 0
+        heard = False
+        while True:
+            try:
+                status = yield Send(GET_SYSTEM_STATUS, None, self._options.answer_within_s)
+            except (Unreachable, DeadlineExceeded, Overloaded) as error:
+                if not heard:
+                    raise
+                attempt += 1
+                yield Tell(Outage(error, attempt))
+            else:
+                heard, attempt = True, 0
+                yield Tell(WatchedStatus(status=status, monotonic_ns=None))
+            yield Pause(pause_s)
 
     def _follow(
         self, opening: Callable[[], Open], take: Callable[[Any], Iterable[Any]], silent_s: float

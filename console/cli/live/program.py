@@ -19,7 +19,7 @@ from console.cli.live.screen import Screen
 from console.cli.live.wishes import Wish, Wishes
 from console.cli.look import Look
 from console.cli.session import Session
-from console.client import DeadlineExceeded, GatewayError, Unreachable
+from console.client import GatewayError, Outage, WatchedStatus
 
 _MS_PER_S: Final = 1000
 # Sentences go out of date, and the age of old values counts up, between two looks as well.
@@ -28,7 +28,7 @@ _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 def watch_on_a_terminal(session: Session, interval_s: float, count: int | None) -> None:
-    """Looks every `interval_s` until q, SIGINT or SIGTERM, or `count` times.
+    """Shows what the robot tells, `interval_s` apart at least, until q, SIGINT or SIGTERM, or `count` times.
 
     Raises:
         GatewayError: the very first look failed. Later the robot may come and go: that is shown.
@@ -47,24 +47,24 @@ class _Watch:
         self._keyboard = Keyboard() if there_is_one() else None
         self._over = asyncio.Event()
         self._changed = asyncio.Event()
-        self._hurry = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
         """Until it is over."""
         with _signals(dict.fromkeys(_ENDING, self._over.set)):
             async with self._session.connect_async() as self._robot:
+                self._told = self._robot.watch_status(self._interval_s)
                 if await self._first_look():
                     await self._show_until_over()
 
     async def _first_look(self) -> bool:
-        asking = asyncio.create_task(self._robot.status())
+        asking = asyncio.create_task(self._next())
         ending = asyncio.create_task(self._over.wait())
         try:
             await asyncio.wait((asking, ending), return_when=asyncio.FIRST_COMPLETED)
             if not asking.done():
                 return False
-            self._look, self._received_s = Look(asking.result(), None, 0), time.monotonic()
+            self._take(asking.result())
             return True
         finally:
             for task in (asking, ending):
@@ -103,27 +103,21 @@ class _Watch:
             self._tasks.discard(task)
 
     async def _follow(self) -> None:
-        due_s = time.monotonic()
         looks = 1
         while looks != self._count:
-            # After a slow answer the beat starts anew: looks are never made up for.
-            due_s = max(due_s + self._interval_s, time.monotonic())
-            await _pause(due_s - time.monotonic(), self._hurry)
-            self._hurry.clear()
-            due_s = min(due_s, time.monotonic())
-            await self._look_again()
+            self._take(await self._next())
             looks += 1
         self._over.set()
 
-    async def _look_again(self) -> None:
-        trouble: GatewayError | None = None
-        status = self._look.status
-        try:
-            status = await self._robot.status()
-            self._received_s = time.monotonic()
-        except (Unreachable, DeadlineExceeded) as error:
-            trouble = error
-        self._look = Look(status, trouble, 0)
+    async def _next(self) -> WatchedStatus | Outage:
+        return await anext(self._told)
+
+    def _take(self, told: WatchedStatus | Outage) -> None:
+        """What the robot tells is the newest look; an outage leaves the status as it was."""
+        if isinstance(told, WatchedStatus):
+            self._look, self._received_s = Look(told.status, None, 0), time.monotonic()
+        else:
+            self._look = Look(self._look.status, told.error, 0)
         self._changed.set()
 
     async def _redraw(self) -> None:
@@ -177,7 +171,6 @@ class _Watch:
             self._wishes.done(trouble)
         else:
             self._wishes.done(change)
-        self._hurry.set()
         self._changed.set()
 
     def _on_suspend(self) -> None:

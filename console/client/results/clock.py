@@ -20,4 +20,5 @@ class WatchedStatus:
     """A status and its instant on the robot's monotonic clock."""
 
     status: SystemStatus
-    monotonic_ns: int
+    monotonic_ns: int | None
+    """None of a gateway that had to be asked: it is older than the stream."""
