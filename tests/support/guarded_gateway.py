@@ -43,6 +43,8 @@ class Robot:
 
     directory: CredentialDirectory
     port: int = 0
+    host: str = "127.0.0.1"
+    """By which its callers call."""
     channels: list[grpc.aio.Channel] = field(default_factory=list)
 
     @property
@@ -72,7 +74,7 @@ class Robot:
             certificate_chain=client.certificate if client else None,
         )
         channel = grpc.aio.secure_channel(
-            f"127.0.0.1:{self.port}", credentials, options=(("grpc.use_local_subchannel_pool", 1),)
+            f"{self.host}:{self.port}", credentials, options=(("grpc.use_local_subchannel_pool", 1),)
         )
         self.channels.append(channel)
         return channel

@@ -52,9 +52,11 @@ class Operator:
 
 
 @asynccontextmanager
-async def running_gateway(preview_socket: Path, **settings: Any) -> AsyncIterator[Operator]:
-    """Up when this returns, gone when the block ends."""
-    port, stop = free_tcp_port(), asyncio.Event()
+async def running_gateway(
+    preview_socket: Path, *, port: int | None = None, **settings: Any
+) -> AsyncIterator[Operator]:
+    """Up when this returns, gone when the block ends; `port` is for settings that name their own `grpc`."""
+    port, stop = port or free_tcp_port(), asyncio.Event()
     values = {
         "grpc": {"port": port},
         "sources": (),

@@ -1,0 +1,102 @@
+"""Who has proved who they are gets the stream's passphrase, from wherever they call; nobody else does."""
+
+import ipaddress
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+
+from gateway.access.role import Role
+from gateway.platform.hosts import hosts_found
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    GetOverlaySnapshotRequest,
+    GetSystemStatusRequest,
+    SetPreviewModeRequest,
+    WatchSystemStatusRequest,
+)
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from omniseer.gateway.v1.states_pb2 import PREVIEW_RUNNING
+from tests.support.eventually import eventually
+from tests.support.guarded_gateway import HOSTS, guarded_gateway, new_robot
+from tests.support.preview_double import PreviewDouble, serve_double
+from tests.support.running_gateway import Operator, free_tcp_port, running_gateway
+
+
+@pytest.fixture
+def own_address() -> str:
+    """By which this machine is called as if from another one."""
+    for host in hosts_found():
+        try:
+            address = ipaddress.ip_address(host)
+        except ValueError:
+            continue
+        if address.version == 4 and not address.is_loopback:
+            return host
+    pytest.skip("this machine has no address but the loopback's")
+
+
+async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Path, own_address: str) -> None:
+    robot, double = new_robot(tmp_path / "c"), PreviewDouble()
+    robot.keeper.rotate_server((*HOSTS, own_address))
+    robot.host = own_address
+    shown = robot.add(Role.OPERATOR)[1].metadata()
+    server = await serve_double(robot.directory.path / "preview.sock", double)
+    try:
+        async with guarded_gateway(robot, grpc={"host": "0.0.0.0"}):
+            calls: Any = RobotGatewayStub(robot.channel())
+
+            async def switched() -> Any:
+                return await calls.SetPreviewMode(
+                    SetPreviewModeRequest(enabled=True), metadata=shown, timeout=5
+                )
+
+            await eventually(
+                switched, lambda reply: reply.preview.state == PREVIEW_RUNNING, "the preview is running"
+            )
+            passphrase = double.wishes[-1].passphrase
+            assert len(passphrase) >= 10
+            status = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=shown, timeout=5)
+            overlay = await calls.GetOverlaySnapshot(GetOverlaySnapshotRequest(), metadata=shown, timeout=5)
+            watching = calls.WatchSystemStatus(WatchSystemStatusRequest(), metadata=shown, timeout=5)
+            watched = await watching.read()
+            watching.cancel()
+            previews = [
+                status.preview,
+                overlay.status.preview,
+                watched.status.preview,
+                (await switched()).preview,
+            ]
+            assert [each.endpoint.passphrase for each in previews] == [passphrase] * 4
+            assert passphrase not in robot.audit_file.read_text()
+    finally:
+        await server.stop(None)
+
+
+async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, own_address: str) -> None:
+    double = PreviewDouble()
+    server = await serve_double(tmp_path / "p.sock", double)
+    port = free_tcp_port()
+    try:
+        async with (
+            running_gateway(
+                tmp_path / "p.sock",
+                port=port,
+                grpc={"host": "0.0.0.0", "port": port},
+                preview={"encrypted": True},
+                security={"insecure": True},
+            ) as near,
+            grpc.aio.insecure_channel(f"{own_address}:{port}") as channel,
+        ):
+            far = Operator(channel, port)
+            await eventually(
+                lambda: near.switch(True),
+                lambda reply: reply.preview.state == PREVIEW_RUNNING,
+                "the preview is running",
+            )
+            assert (await near.status()).preview.endpoint.passphrase == double.wishes[-1].passphrase
+            endpoint = (await far.status()).preview.endpoint
+            assert endpoint.encrypted
+            assert not endpoint.passphrase
+    finally:
+        await server.stop(None)
