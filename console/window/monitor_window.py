@@ -4,7 +4,7 @@ import time
 from functools import partial
 from typing import Protocol
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
@@ -22,7 +22,9 @@ from console.window.side_panel import SidePanel
 from console.window.video_view import VideoView
 
 _TICK_MS = 500
-_FIRST_SIZE = (1280, 800)
+_FIRST_SIZE = QSize(1280, 800)
+_FRAME = QSize(16, 48)
+"""What a desktop puts around a window, roughly."""
 _HANDLE_PX = 10
 _FIRST_DIVISION = (790, 490)
 
@@ -65,7 +67,8 @@ class MonitorWindow(QWidget):
         self._lay_out()
         self._connect(news)
         self.setWindowTitle(f"Robot {robot.target}")
-        self.resize(*_FIRST_SIZE)
+        # No larger than a small laptop's screen leaves room for.
+        self.resize(_FIRST_SIZE.boundedTo(self.screen().availableSize() - _FRAME))
         remembered.restore(self, self.splitter)
         self.refresh()
 

@@ -41,7 +41,7 @@ def test_without_qt_it_says_what_to_install(tmp_path: Path) -> None:
     )
     ended = robotctl("monitor", PYTHONPATH=str(tmp_path))
     assert ended.returncode == 1
-    assert only_line(ended.stderr).endswith("Type: pip install PySide6-Essentials")
+    assert only_line(ended.stderr).endswith("Type, in a clone of the project: scripts/install-console")
 
 
 def test_qt_without_a_library_of_the_system_says_what_to_install(tmp_path: Path) -> None:

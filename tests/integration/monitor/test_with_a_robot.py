@@ -24,7 +24,7 @@ from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
 
-LOOP_DELAY_P99_MS = 200.0
+LOOP_DELAY_P99_MS = 500.0
 """Generous: the machine has other things to do. bench/monitor.py measures what is promised."""
 CLOSES_WITHIN_S = 6.0
 """Promised are 2 s; the machine has other things to do. A call that is waited for takes 8 s."""
