@@ -1,0 +1,144 @@
+"""Both clients' streams against a real gateway, over links that break and gateways that end."""
+
+import asyncio
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from console.client import (
+    AsyncGatewayClient,
+    Cancelled,
+    CaughtUp,
+    Event,
+    GatewayClient,
+    Outage,
+    Unreachable,
+    WatchedStatus,
+)
+from console.client.options import Backoff, ClientOptions
+from tests.support.bad_links import Relay
+from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_program import GatewayProgram, gateway_program
+
+QUICK = ClientOptions(stream_backoff=Backoff(first_s=0.02, longest_s=0.1))
+
+
+@pytest.fixture(scope="module")
+def gateway(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GatewayProgram]:
+    with gateway_program(tmp_path_factory.mktemp("gateway"), sources=[]) as program:
+        yield program
+
+
+def next_status(stream: Any) -> WatchedStatus:
+    return next(item for item in stream if isinstance(item, WatchedStatus))
+
+
+def test_a_link_that_breaks_is_told_and_made_again(gateway: GatewayProgram) -> None:
+    with Relay(gateway.port) as relay, GatewayClient(f"127.0.0.1:{relay.port}", QUICK) as client:
+        stream = client.watch_status()
+        next_status(stream)
+        relay.cut()
+        items = iter(stream)
+        outage = next(item for item in items if isinstance(item, Outage))
+        assert isinstance(outage.error, Unreachable)
+        assert next_status(items).status.gateway_name
+        assert client.reconnects >= 1
+
+
+def test_who_reads_slowly_gets_the_newest(gateway: GatewayProgram) -> None:
+    with GatewayClient(f"127.0.0.1:{gateway.port}") as client:
+        stream = client.watch_status()
+        next_status(stream)
+        # The gateway tells its status once a second at least: five come, and only the last is kept.
+        waiting = threading.Event()
+        waiting.wait(5.5)
+        late, newer = next_status(stream), next_status(stream)
+        assert late.monotonic_ns is not None
+        assert newer.monotonic_ns is not None
+        assert (time.monotonic_ns() - late.monotonic_ns) / 1e9 < 3, "not the first of those that came"
+
+
+def test_nobody_there_is_known_soon() -> None:
+    with Relay(1) as relay:  # a port that was taken and is now free again
+        port = relay.port
+    began_s = time.monotonic()
+    with GatewayClient(f"127.0.0.1:{port}") as client, pytest.raises(Unreachable):
+        next(client.watch_status())
+    assert time.monotonic() - began_s < 10
+
+
+def test_closing_the_client_ends_its_streams(gateway: GatewayProgram) -> None:
+    client = GatewayClient(f"127.0.0.1:{gateway.port}")
+    stream = client.events()
+    assert any(isinstance(item, CaughtUp) for item in stream)
+    closing = threading.Timer(0.2, client.close)
+    closing.start()
+    with pytest.raises(Cancelled):
+        for _ in stream:
+            pass
+    closing.join()
+
+
+def test_a_stream_that_nobody_reads_any_more_leaves_no_thread(gateway: GatewayProgram) -> None:
+    with GatewayClient(f"127.0.0.1:{gateway.port}") as client:
+        stream = client.watch_status()
+        next_status(stream)
+        assert any(thread.name == "gateway-stream" for thread in threading.enumerate())
+        stream.close()  # type: ignore[attr-defined]  # it is a generator
+        for thread in threading.enumerate():
+            if thread.name == "gateway-stream":
+                thread.join(10)
+                assert not thread.is_alive()
+
+
+async def test_the_asyncio_client_does_the_same(gateway: GatewayProgram) -> None:
+    with Relay(gateway.port) as relay:
+        async with AsyncGatewayClient(f"127.0.0.1:{relay.port}", QUICK) as client, asyncio.timeout(30):
+            stream = client.watch_status()
+            assert isinstance(await anext(stream), WatchedStatus)
+            relay.cut()
+            while not isinstance(await anext(stream), Outage):
+                pass
+            while not isinstance(await anext(stream), WatchedStatus):
+                pass
+            events = client.events()
+            first = await anext(events)
+            assert isinstance(first, Event | CaughtUp)
+    assert client.reconnects >= 1
+
+
+async def test_closing_the_asyncio_client_ends_its_streams(gateway: GatewayProgram) -> None:
+    client = AsyncGatewayClient(f"127.0.0.1:{gateway.port}")
+
+    async def read() -> None:
+        async for _ in client.events():
+            began.set()
+
+    began = asyncio.Event()
+    reading = asyncio.create_task(read())
+    async with asyncio.timeout(20):
+        await began.wait()
+        await client.close()
+        with pytest.raises(Cancelled):
+            await reading
+
+
+async def test_the_robots_clock_is_known_within_what_is_told(gateway: GatewayProgram) -> None:
+    async with AsyncGatewayClient(f"127.0.0.1:{gateway.port}") as client:
+        offsets = [await client.ping() for _ in range(5)]
+    best = min(offsets, key=lambda offset: offset.error_s)
+    # Both run on one machine: the truth is zero.
+    assert abs(best.seconds) <= best.error_s + 1e-6
+
+
+def test_an_older_gateway_is_asked(tmp_path: Path) -> None:
+    double = GatewayDouble()
+    with serving(double) as port, GatewayClient(f"127.0.0.1:{port}") as client:
+        stream = client.watch_status(0.05)
+        told = [next_status(stream) for _ in range(3)]
+    assert [each.monotonic_ns for each in told] == [None] * 3
+    assert double.calls.count("GetSystemStatus") >= 3
