@@ -26,7 +26,8 @@ def _window() -> Callable[[str, Credentials], None]:
         if not (error.name or "").startswith(("PySide6", "shiboken6")):
             raise
         raise UserError(
-            "the window needs Qt for Python, which is not installed", "Type: pip install PySide6-Essentials"
+            "the window needs Qt for Python, which is not installed",
+            "Type, in a clone of the project: scripts/install-console",
         ) from error
     except ImportError as error:
         raise UserError(
