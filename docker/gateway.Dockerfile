@@ -73,6 +73,7 @@ COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 RUN install -d -m 0700 -o 10001 -g 10000 /var/lib/robot-gateway/credentials /var/lib/robot-gateway/audit
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     GATEWAY__LOG_FORMAT=json \
+    GRPC_VERBOSITY=ERROR \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
     HEALTH_TARGET=127.0.0.1:50051

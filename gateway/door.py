@@ -50,7 +50,6 @@ class Door:
         asked = tls_files is not None and tls_files.client_authority is not None
         self.guard = Guard(self._keyring, Lockout(), self._audit.note, certificates=asked)
         self._tls = ServerTls(watch.loaded.tls) if watch.loaded.tls else None
-        self._changed = asyncio.Event()
 
     def credentials(self) -> grpc.ServerCredentials | None:
         """What the server encrypts with; None for plaintext."""
@@ -90,21 +89,13 @@ class Door:
             return
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._watch.run(), name="credentials")
-            tasks.create_task(self.guard.run(), name="expiry")
-            tasks.create_task(self._end_streams_after_changes(self.guard), name="revocation")
-
-    async def _end_streams_after_changes(self, guard: Guard) -> None:
-        while True:
-            await self._changed.wait()
-            self._changed.clear()
-            await guard.end_what_is_over()
+            tasks.create_task(self.guard.run(), name="streams")
 
     def _take_over(self, loaded: Loaded) -> None:
         self._keyring.use(loaded.store)
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         self._audit.note(_changed_note(len(loaded.store.credentials)))
-        self._changed.set()
 
 
 def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:

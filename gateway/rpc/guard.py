@@ -24,8 +24,8 @@ from gateway.rpc.method_roles import Needed, Open, needed_for
 
 _log = logging.getLogger(__name__)
 
-LOOK_EVERY_S: Final = 1.0
-"""How often open streams are looked at for credentials that have expired; changed ones count at once."""
+LOOK_EVERY_S: Final = 0.5
+"""How often open streams are looked at: whether the credential is still valid by which each was opened."""
 _END_WITHIN_S: Final = 1.0
 """How long a caller may take to be told that a stream ends; one that doesn't read is not told."""
 _WRONG: Final = (Reason.CREDENTIAL_UNKNOWN,)
@@ -84,7 +84,7 @@ class Guard(grpc.aio.ServerInterceptor):
         )
 
     async def run(self) -> NoReturn:
-        """Ends streams whose credential has expired, until cancelled."""
+        """Ends streams whose credential is over, until cancelled."""
         while True:
             await asyncio.sleep(LOOK_EVERY_S)
             await self.end_what_is_over()

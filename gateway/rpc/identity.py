@@ -10,7 +10,7 @@ from common.rpc import Context
 from gateway.access.credential import Principal
 
 TOKEN_HEADER: Final = "authorization"
-_SCHEME: Final = "Bearer "
+_SCHEME: Final = "bearer"
 _CERTIFICATE: Final = "x509_pem_cert"
 _REMEMBERED: Final = 256
 
@@ -37,8 +37,8 @@ def token_of(context: Context) -> str | None:
     """The bearer token that a call shows; None for none, "" for something that is no bearer token."""
     for key, value in context.invocation_metadata() or ():
         if key == TOKEN_HEADER:
-            text = value if isinstance(value, str) else ""
-            return text.removeprefix(_SCHEME) if text.startswith(_SCHEME) else ""
+            scheme, _, text = (value if isinstance(value, str) else "").partition(" ")
+            return text.strip() if scheme.lower() == _SCHEME else ""
     return None
 
 

@@ -17,7 +17,7 @@ class ServerTls:
 
     def __init__(self, material: TlsMaterial) -> None:
         self._insists = material.client_authority is not None
-        self._configuration = _configuration(material)
+        self._configuration = self._given = _configuration(material)
 
     def use(self, material: TlsMaterial) -> None:
         """Connections from now on are made with this; those that exist go on as they are."""
@@ -25,10 +25,19 @@ class ServerTls:
 
     def credentials(self) -> grpc.ServerCredentials:
         """For the server. gRPC's own threads ask for the newest at each handshake."""
-        return grpc.dynamic_ssl_server_credentials(self._configuration, self._newest, self._insists)
+        return grpc.dynamic_ssl_server_credentials(
+            self._configuration,
+            self._newest,  # type: ignore[arg-type]  # None is documented, and missing in the stubs
+            self._insists,
+        )
 
-    def _newest(self) -> grpc.ServerCertificateConfiguration:
-        return self._configuration
+    def _newest(self) -> grpc.ServerCertificateConfiguration | None:
+        """None where nothing has changed: gRPC would read keys and certificates anew for every connection."""
+        newest = self._configuration
+        if newest is self._given:
+            return None
+        self._given = newest
+        return newest
 
 
 def _configuration(material: TlsMaterial) -> grpc.ServerCertificateConfiguration:
