@@ -67,3 +67,41 @@ async def test_a_stream_of_new_connections_fills_no_memory() -> None:
     for number in range(5000):
         await ask(tally, str(number))
     assert tally.client_count() == 1024
+
+
+async def follow(tally: Tally, answers: int, raises: type[Exception] | None = None) -> list[bytes]:
+    async def behavior(_request: Any, _context: Any) -> Any:
+        for _ in range(answers):
+            yield b"answer"
+        if raises:
+            raise raises
+
+    context: Any = Call("a")
+    return [each async for each in tally.counted_stream("Watch", behavior)(None, context)]
+
+
+async def test_a_stream_is_served_once_however_much_it_tells() -> None:
+    tally = Tally(Clock())
+    assert await follow(tally, 3) == [b"answer"] * 3
+    with pytest.raises(InvalidRequestError):
+        await follow(tally, 0, raises=InvalidRequestError)
+    with pytest.raises(ZeroDivisionError):
+        await follow(tally, 0, raises=ZeroDivisionError)
+    assert tally.methods == {"Watch": Counts(served=1, refused=1, failed=1)}
+
+
+async def test_who_is_told_something_is_a_client() -> None:
+    clock = Clock()
+    tally = Tally(clock)
+
+    async def behavior(_request: Any, _context: Any) -> Any:
+        while True:
+            yield b"answer"
+
+    context: Any = Call("a")
+    stream = tally.counted_stream("Watch", behavior)(None, context)
+    await anext(stream)
+    clock.now_s += RECENT_S * 2
+    assert tally.client_count() == 0
+    await anext(stream)
+    assert tally.client_count() == 1
