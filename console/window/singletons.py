@@ -1,9 +1,9 @@
 """Keeps None, True and False alive under a Qt binding that gives them back more often than it took them.
 
 Since Python 3.12 they can't be deallocated, whatever their reference count says, and PySide6 6.12 relies on
-that on Python 3.11, too: every call that returns nothing takes one reference from None. After some ten thousand
-calls, half a minute of a window with video, none is left, and the interpreter ends with "Fatal Python error:
-none_dealloc". PySide6 6.11 and older count rightly.
+that on Python 3.11, too: every call that returns nothing takes one reference from None. After some ten
+thousand calls, half a minute of a window with video, none is left, and the interpreter ends with "Fatal
+Python error: none_dealloc". PySide6 6.11 and older count rightly.
 """
 
 import ctypes
