@@ -40,6 +40,8 @@ class ViewWindow(QWidget):
         self.video = video
         self.figures, self.said = word_label(), ElidedLabel()
         self._lay_out()
+        # The picture in its own size, where there is room: Qt alone would take two thirds of the screen.
+        self.resize(self.sizeHint().boundedTo(self.screen().availableSize()))
         self._ticks = QTimer(self, interval=_TICK_MS)
         self._ticks.timeout.connect(self._tick)
         self._ticks.start()
