@@ -1,6 +1,6 @@
 """From a plan to a pipeline that is not yet started.
 
-    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! listener
+    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! plain caps ! listener
 
 - Frames are reduced to the profile's rate before anything is done to them. A source that makes any rate is
   asked for the right one instead.
@@ -25,6 +25,12 @@ _TABLES_EVERY: Final = 4500
 """50 ms of the 90 kHz clock: with ten pictures a second and more, tables are at most 100 ms apart."""
 _CLOCK_REFERENCE_EVERY: Final = 900
 """10 ms of the 90 kHz clock: with every picture, however fast."""
+_WITHOUT_TABLES: Final = "video/mpegts,systemstream=true,packetsize=188"
+"""The muxer's caps bring its tables along, and srtsink would send them to every new viewer once more, with
+counters that don't continue in the stream; the key frame that a new viewer gets brings them along anyway.
+
+An element takes them out, not a probe: caps that a probe drops are sent again with every buffer.
+"""
 _SRT_POLL_MS: Final = 1000
 """The listener's thread wakes this often; for ever (the default) can hang a stop."""
 
@@ -129,6 +135,7 @@ def _body(plan: Plan) -> str:
             chain(plan.encoder),
             f"mpegtsmux name=muxer alignment=0 pat-interval={_TABLES_EVERY} pmt-interval={_TABLES_EVERY}"
             f" pcr-interval={_CLOCK_REFERENCE_EVERY}",
+            f"capssetter replace=true join=false caps={_WITHOUT_TABLES}",
             "srtsink name=sink",
         ]
     )

@@ -1,13 +1,14 @@
 """Sends each picture whole: a transport stream cut at the picture's end, not seven packets at a time.
 
 A muxer that groups packets by seven keeps the tail of every picture until the next one fills the group. Here
-it hands out all packets of a picture as one list, and this probe on its source pad joins them and passes on
-slices of at most 1316 bytes, the last one ending where the picture ends.
+it hands out all packets of a picture as one list, and this probe on its source pad joins them to one buffer.
+The listener cuts that into datagrams of seven packets itself, the last one ending where the picture ends.
 
-The slices get the packets' memory and timestamps but none of their flags: the muxer flags everything that
-starts with its tables as HEADER, and a srtsink that got tables with the caps drops such buffers whole.
+The buffer gets none of the packets' flags: the muxer flags everything that starts with its tables as HEADER,
+and a srtsink that got tables with the caps drops such buffers whole.
 
-This runs in Python once per picture, never per packet; it also is where pictures are counted.
+This is the only Python that runs with every picture, and every call into GStreamer costs microseconds, so it
+makes as few as it can. It also is where pictures are counted.
 """
 
 import time
@@ -18,9 +19,6 @@ from typing import Any, Final
 from common.gst import Gst
 from preview.pipeline.clock_references import ClockReferences
 
-PACKET_BYTES: Final = 188
-SLICE_BYTES: Final = 7 * PACKET_BYTES
-"""What fits one datagram of SRT's live mode."""
 # More than any packet has: asking each of the fifty for its size first would cost a third more.
 _ALL: Final = 1 << 16
 
@@ -42,42 +40,25 @@ class Framing:
         self._way_out: Any = None
         """The listener's pad; None again once it is given up, while the encoder may still be at it."""
         self._references = ClockReferences(self._send_reference, rate_fps)
-        self._detach: tuple[Callable[[], None], ...] = ()
+        self._detach: Callable[[], None] | None = None
 
     def attach(self, muxer_pad: Any) -> None:
         """Puts the probe on the muxer's source pad, which is linked to the listener."""
         self._way_out = muxer_pad.get_peer()
-        tables = muxer_pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, self._plain_caps)
         probe = muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe)
-        self._detach = (partial(muxer_pad.remove_probe, tables), partial(muxer_pad.remove_probe, probe))
+        self._detach = partial(muxer_pad.remove_probe, probe)
 
     def detach(self) -> None:
         """Takes the probe away: through it the pipeline and this object would keep each other alive."""
-        for release in self._detach:
-            release()
-        self._detach = ()
+        if self._detach:
+            self._detach()
+        self._detach = None
         self._references.stop()
         self._way_out = None
 
     def set_rate(self, rate_fps: float) -> None:
         """Another rate of pictures. May wait until one is sent."""
         self._references.set_rate(rate_fps)
-
-    def _plain_caps(self, _pad: Any, info: Any) -> Any:
-        """Takes the tables out of the caps.
-
-        srtsink would send them to every new viewer once more, with counters that don't continue in the
-        stream; the key frame that a new viewer gets brings them along anyway.
-        """
-        event = info.get_event()
-        if event.type != Gst.EventType.CAPS or not event.parse_caps().get_structure(0).has_field(
-            "streamheader"
-        ):
-            return Gst.PadProbeReturn.OK
-        plain = Gst.Caps.from_string(f"video/mpegts,systemstream=true,packetsize={PACKET_BYTES}")
-        if way_out := self._way_out:
-            way_out.send_event(Gst.Event.new_caps(plain))
-        return Gst.PadProbeReturn.DROP
 
     def _probe(self, _pad: Any, info: Any) -> Any:
         if info.type & Gst.PadProbeType.BUFFER_LIST:
@@ -91,24 +72,14 @@ class Framing:
 
     def _send_picture(self, parts: list[Any], way_out: Any) -> None:
         joined = b"".join(part.extract_dup(0, _ALL) for part in parts)
-        slices = self._slices(joined, parts[0])
+        picture = Gst.Buffer.new_wrapped(joined)
 
         def send() -> None:
-            way_out.chain_list(slices)
+            way_out.chain(picture)
             self.bytes += len(joined)
 
         self._references.around(joined, send)
         self._count()
-
-    def _slices(self, joined: bytes, first: Any) -> Any:
-        picture = Gst.Buffer.new_wrapped(joined)
-        picture.pts, picture.dts = first.pts, first.dts
-        size = len(joined)
-        flags = Gst.BufferCopyFlags.MEMORY | Gst.BufferCopyFlags.TIMESTAMPS
-        slices = Gst.BufferList.new_sized(size // SLICE_BYTES + 1)
-        for offset in range(0, size, SLICE_BYTES):
-            slices.insert(-1, picture.copy_region(flags, offset, min(SLICE_BYTES, size - offset)))
-        return slices
 
     def _send_reference(self, packet: bytes) -> None:
         """On the clock references' thread. The listener takes what comes from one thread at a time."""
