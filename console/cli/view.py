@@ -103,6 +103,6 @@ def _window() -> Callable[[str, Recording | None, Credentials], Account]:
             raise
         raise UserError(
             f"the window needs Qt, which can't be loaded ({error}); --headless works without",
-            "Type, in a clone of the project: scripts/install-console libxcb-cursor0 libdbus-1-3",
+            "Type, in a clone of the project: scripts/install-console",
         ) from error
     return run_view
