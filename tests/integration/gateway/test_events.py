@@ -24,6 +24,7 @@ from console.client import (
 from console.client.options import Backoff, ClientOptions
 from console.client.results import ControlResult, EventKind, GapReason
 from gateway.rpc.staying import STAYS_AFTER_S
+from omniseer.gateway.v1.event_pb2 import EVENT_GAP_REASON_NEW_RUN, EVENT_GAP_REASON_NO_LONGER_KEPT
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 from tests.support.bad_links import Relay
 from tests.support.event_server import EventServer
@@ -114,6 +115,28 @@ async def test_the_overlays_short_list_comes_from_the_same_log(operator: Operato
     assert not any("SetPreviewMode" in message for message in messages)
 
 
+@pytest.mark.parametrize(
+    ("after", "reason", "missed"),
+    [
+        (EventPosition("run 1", 3), EVENT_GAP_REASON_NO_LONGER_KEPT, 12),
+        (EventPosition("an earlier run", 99), EVENT_GAP_REASON_NEW_RUN, 15),
+    ],
+)
+async def test_a_gap_is_sent_before_what_follows_it(after: EventPosition, reason: int, missed: int) -> None:
+    async with EventServer(kept=5) as server:
+        server.happen(20)
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{server.port}") as channel:
+            request = SubscribeEventsRequest()
+            request.after.run_id, request.after.sequence = after.run_id, after.sequence
+            call = Operator(channel, server.port).stub.SubscribeEvents(request)
+            gap = (await call.read()).gap
+            assert (gap.reason, gap.missed_count) == (reason, missed)
+            assert (gap.position.run_id, gap.position.sequence) == ("run 1", 15)
+            assert [(await call.read()).event.sequence for _ in range(5)] == [16, 17, 18, 19, 20]
+            assert (await call.read()).caught_up.sequence == 20
+            call.cancel()
+
+
 class Ledger:
     """Everything that one subscriber was told, checked as it comes."""
 
@@ -134,6 +157,7 @@ class Ledger:
             case EventGap():
                 run_id = item.position.run_id
                 assert self.position is not None
+                assert item.reason is not GapReason.UNKNOWN, "the gateway announces its gaps"
                 assert (item.reason is GapReason.NEW_RUN) is (run_id != self.position.run_id)
                 self.missed[run_id] = self.missed.get(run_id, 0) + item.missed_count
                 self.position = item.position
