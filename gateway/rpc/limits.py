@@ -5,6 +5,7 @@ one per call. gRPC tells nobody here of connections that come and go, so one cou
 or has asked lately; the quietest gives way to a new one.
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,10 @@ PENALTY_S: Final = 0.5
 """A refusal comes so late at least."""
 REFUSE_EVERY_S: Final = 0.005
 """And so long after the one before, whoever that went to."""
+FORGIVEN_AFTER_S: Final = 5.0
+"""Without a refusal. Until then a connection may not ask in bursts."""
+_HARDLY_ANYTHING_S: Final = 0.01
+"""What is saved up in this time."""
 _SOON_S: Final = 1.0
 """When to try again where nobody knows when there will be room."""
 
@@ -41,6 +46,8 @@ class _Connection:
     tokens: float
     at_s: float
     streams: int = 0
+    refused_s: float = -math.inf
+    """When it was refused last."""
 
 
 class Admission:
@@ -76,12 +83,14 @@ class Admission:
             self._make_room(now_s)
             connection = _Connection(limits.burst, now_s)
         self._connections[peer] = connection
-        tokens = min(limits.burst, connection.tokens + (now_s - connection.at_s) * limits.requests_per_s)
+        most = self._most_saved(connection, now_s)
+        tokens = min(most, connection.tokens + (now_s - connection.at_s) * limits.requests_per_s)
         connection.at_s = now_s
         if tokens >= 1:
             connection.tokens = tokens - 1
             return
         connection.tokens = tokens
+        connection.refused_s = now_s
         raise TooMuchError(
             f"this connection asks more than {limits.requests_per_s:g} times a second; ask less often",
             Reason.TOO_MANY_REQUESTS,
@@ -113,6 +122,13 @@ class Admission:
         now_s = self._clock()
         self._refusal_at_s = max(now_s + PENALTY_S, self._refusal_at_s + REFUSE_EVERY_S)
         return self._refusal_at_s - now_s
+
+    def _most_saved(self, connection: _Connection, now_s: float) -> float:
+        """Who was refused lately saves up hardly anything: it would only spend it all at once again."""
+        limits = self._limits
+        if now_s - connection.refused_s >= FORGIVEN_AFTER_S:
+            return limits.burst
+        return max(1.0, min(limits.burst, limits.requests_per_s * _HARDLY_ANYTHING_S))
 
     def _make_room(self, now_s: float) -> None:
         if len(self._connections) < self._limits.connections:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from common.errors import TooMuchError
 from common.reasons import Reason
-from gateway.rpc.limits import PENALTY_S, QUIET_AFTER_S, REFUSE_EVERY_S, Admission, Limits
+from gateway.rpc.limits import FORGIVEN_AFTER_S, PENALTY_S, QUIET_AFTER_S, REFUSE_EVERY_S, Admission, Limits
 
 SMALL = Limits(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
 
@@ -43,6 +43,18 @@ def test_a_burst_is_served_and_then_one_by_one(admission: Admission, clock: Cloc
     clock.now_s += 0.1001
     admission.request("a")
     assert refusal(admission, "a").retry_after_s == pytest.approx(0.1, rel=0.01)
+
+
+def test_who_was_refused_saves_nothing_up_until_it_is_forgiven(admission: Admission, clock: Clock) -> None:
+    for _ in range(SMALL.burst):
+        admission.request("a")
+    refusal(admission, "a")
+    clock.now_s += FORGIVEN_AFTER_S * 0.9
+    admission.request("a")
+    refusal(admission, "a")
+    clock.now_s += FORGIVEN_AFTER_S
+    for _ in range(SMALL.burst):
+        admission.request("a")
 
 
 def test_what_one_has_spent_the_other_still_has(admission: Admission) -> None:
