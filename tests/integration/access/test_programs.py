@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from common.errors import UserError
+from console.client import Credentials, GatewayClient, NotAllowed
 from gateway.cli import app
 from tests.support.ports import free_tcp_port
 from tests.support.robotctl import only_line, robotctl
@@ -74,6 +75,18 @@ def operator(ground: Path, *words: str) -> "subprocess.CompletedProcess[str]":
     return robotctl(*words, XDG_CONFIG_HOME=str(ground / "config"))
 
 
+def guess(ground: Path, target: str, login: str) -> None:
+    """Shows a token with one slip in it until it is locked: nearly a secret, and in no log either."""
+    token = re.search(r"token: (\S+)", login)
+    assert token
+    slip = token[1][:-2] + ("AA" if token[1][-2] != "A" else "BA")
+    shown = Credentials(ca_certificate=(ground / "credentials/ca.pem").read_bytes(), token=slip)
+    with GatewayClient(target, credentials=shown) as client:
+        for _ in range(7):
+            with pytest.raises(NotAllowed):
+                client.status()
+
+
 def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(ground: Path) -> None:
     without = gateway(ground, "serve")
     assert without.returncode == 2
@@ -105,6 +118,9 @@ def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(
         stranger = robotctl("--target", target, "status")
         assert stranger.returncode == 3
         assert "robotctl login" in only_line(stranger.stderr)
+
+        guess(ground, target, login.read_text())
+        wait_until(lambda: "is locked out" in log.read_text(), "who guesses is locked out")
 
     # What everything that has run has written, but for what is made to hold a secret.
     kept = {login, ground / "ben.login", *(ground / "config").rglob("token"), *ground.rglob("*-key.pem")}
