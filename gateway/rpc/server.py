@@ -117,9 +117,10 @@ def _unary(gateway: RobotGateway, name: str, behavior: Behavior, most_bytes: int
         hold_to_rules(message)
         return await behavior(message, context)
 
-    inner: Behavior = held_to_rules
+    # What has no field can break no rule.
+    inner: Behavior = held_to_rules if request.DESCRIPTOR.fields else behavior
     if changes_the_robot(name):
-        inner = gateway.controls.told(name, held_to_rules, reply)
+        inner = gateway.controls.told(name, inner, reply)
 
     async def call(data: bytes, context: Context) -> bytes:
         return await inner(requests.read(data), context)
