@@ -1,0 +1,192 @@
+"""The whole gateway as a process beside a robot's processes: what operators are told is what is."""
+
+import math
+import signal
+import struct
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from omniseer_msgs.msg import VisionPerfSummary
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import BatteryState
+from yolo_msgs.msg import DetectionArray
+
+from gateway.config import DEFAULT_SOURCES
+from omniseer.gateway.v1 import source_pb2
+from tests.support.gateway_program import gateway_program
+from tests.support.ros import simulated_robot
+from tests.support.talker import Talker
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
+
+TOPICS = {source.name: source.topic for source in DEFAULT_SOURCES}
+TYPES = {
+    "odometry": Odometry,
+    "vision": VisionPerfSummary,
+    "battery": BatteryState,
+    "detections": DetectionArray,
+    "effective_command": TwistStamped,
+}
+
+
+class PlainSubscriber:
+    """What an ordinary rclpy node hears, in the ordinary way: callbacks on an executor."""
+
+    def __init__(self, node: Any) -> None:
+        self.heard: dict[str, list[Any]] = {name: [] for name in TYPES}
+        qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for name, message_type in TYPES.items():
+            node.create_subscription(message_type, TOPICS[name], self.heard[name].append, qos)
+
+    def last(self, name: str) -> Any:
+        return self.heard[name][-1]
+
+
+@contextmanager
+def plain_subscriber(talker: Talker) -> Iterator[PlainSubscriber]:
+    subscriber = PlainSubscriber(talker.node)
+    executor = SingleThreadedExecutor(context=talker.node.context)
+    executor.add_node(talker.node)
+    over = threading.Event()
+
+    def spin() -> None:
+        while not over.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=spin)
+    thread.start()
+    try:
+        yield subscriber
+    finally:
+        over.set()
+        thread.join()
+        executor.shutdown()
+
+
+def test_what_a_plain_subscriber_saw_last_is_what_is_served(talker: Talker, tmp_path: Path) -> None:
+    with (
+        simulated_robot(tmp_path, "speed_mps=0.7", "turn_rad_s=-0.3", "detection_count=5") as robot,
+        gateway_program(tmp_path) as gateway,
+        plain_subscriber(talker) as plain,
+    ):
+        wait_until(lambda: all(plain.heard.values()), "the plain subscriber to hear everything")
+        wait_until(
+            lambda: all(gateway.source(name).available for name in TYPES), "the gateway to hear everything"
+        )
+        for speed in (0.25, -0.5, 0.75):
+            robot.change(speed_mps=speed, silent=[])
+            counts = {name: len(heard) for name, heard in plain.heard.items()}
+            wait_until(
+                lambda before=counts: all(len(plain.heard[name]) > before[name] for name in TYPES),
+                "new messages of everything",
+            )
+            robot.change(silent=["odometry", "vision", "battery", "detections", "effective_command"])
+            wait_until(lambda: gateway.source("odometry").stale, "silence")
+            served = gateway.overlay()
+            twist = plain.last("odometry").twist.twist
+            health = served.status.health
+            assert (health.measured_vx_mps, health.measured_vy_mps, health.measured_wz_rad_s) == (
+                single(twist.linear.x),
+                single(twist.linear.y),
+                single(twist.angular.z),
+            )
+            assert twist.linear.x == speed
+            vision, perf = served.status.vision, plain.last("vision")
+            assert (vision.producer_fps, vision.consumer_fps, vision.last_infer_ms) == (
+                perf.producer_fps,
+                perf.consumer_fps,
+                perf.last_infer_ms,
+            )
+            lipo = served.status.platform.power.lipo_battery
+            assert lipo.voltage == plain.last("battery").voltage
+            assert lipo.percentage == pytest.approx(100 * plain.last("battery").percentage)
+            command = plain.last("effective_command").twist
+            assert served.status.effective_command.vx_mps == single(command.linear.x)
+            assert [
+                (each.track_id, each.class_name, each.bbox_center_x_px, each.bbox_width_px)
+                for each in served.detections.detections
+            ] == [
+                (each.id, each.class_name, single(each.bbox.center.position.x), single(each.bbox.size.x))
+                for each in plain.last("detections").detections
+            ]
+
+
+def single(number: float) -> float:
+    """As a 32-bit float holds it."""
+    return float(struct.unpack("f", struct.pack("f", number))[0])
+
+
+def test_a_mismatch_is_told_in_words_without_ros_names(talker: Talker, tmp_path: Path) -> None:
+    sources = [
+        {
+            **source.model_dump(mode="json", exclude_none=True),
+            "reliability": "reliable",
+            "required": source.name == "odometry",
+        }
+        for source in DEFAULT_SOURCES
+        if source.name in {"odometry", "battery"}
+    ]
+    talker.publisher(TOPICS["odometry"], Odometry, reliability=ReliabilityPolicy.BEST_EFFORT)
+    talker.publisher(TOPICS["battery"], Odometry)
+    with gateway_program(tmp_path, sources=sources, faults={"startup_grace_ms": 0}) as gateway:
+        wait_until(
+            lambda: gateway.source("odometry").state == source_pb2.SOURCE_STATE_QOS_MISMATCH, "the mismatch"
+        )
+        wait_until(
+            lambda: gateway.source("battery").state == source_pb2.SOURCE_STATE_WRONG_TYPE, "the wrong type"
+        )
+        detail = gateway.source("odometry").detail
+        assert "reliable is asked for, best effort is offered" in detail
+        wait_until(
+            lambda: (
+                {"odometry.qos_mismatch", "battery.wrong_type"} <= {it.id for it in gateway.status().faults}
+            ),
+            "both faults",
+        )
+        assert not [name for name in TOPICS.values() if name in str(gateway.overlay())]
+        log = (tmp_path / "gateway.log").read_text(encoding="utf-8")
+        assert TOPICS["odometry"] in log, "whoever looks after the robot is told the topic"
+
+
+def test_a_stopped_robot_is_stale_and_its_late_burst_is_new(ros_domain: int, tmp_path: Path) -> None:
+    """Stopped as a debugger would: the publishers stay, nothing comes; then everything goes on."""
+    with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
+        wait_until(lambda: gateway.status().health.ready, "a healthy robot")
+        with stopped(robot.process):
+            wait_until(lambda: gateway.source("odometry").stale, "staleness")
+            status = gateway.status()
+            assert status.health.summary == "odometry stale"
+            assert gateway.source("odometry").detail == "odometry stopped coming"
+            first = status.health.odom_age_ms
+            wait_until(lambda: gateway.status().health.odom_age_ms > first + 500, "the age to go on")
+        wait_until(lambda: gateway.status().health.ready, "a healthy robot again")
+
+
+@contextmanager
+def stopped(process: subprocess.Popen[str]) -> Iterator[None]:
+    process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGCONT)
+
+
+def test_ages_grow_with_the_clock_while_nothing_comes(ros_domain: int, tmp_path: Path) -> None:
+    with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
+        wait_until(lambda: gateway.status().health.ready, "a healthy robot")
+        robot.change(silent=["odometry"])
+        wait_until(lambda: gateway.source("odometry").stale, "silence")
+        before_s, first = time.monotonic(), gateway.status().health.odom_age_ms
+        wait_until(lambda: gateway.status().health.odom_age_ms > first + 1000, "a second more")
+        passed_ms = 1000 * (time.monotonic() - before_s)
+        assert math.isclose(gateway.status().health.odom_age_ms - first, passed_ms, abs_tol=400)
