@@ -43,7 +43,7 @@ def run(names: list[str]) -> list[Row]:
     rows = [
         Row(
             "idle.cpu",
-            "gateway and preview service together, preview off, 4 topics coming in",
+            "gateway and preview service together, preview off, a robot publishing on all its topics",
             "% of a core",
             gateway_cpu.whole + preview_cpu.whole,
             None,

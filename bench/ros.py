@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from bench import ros_gateway
 from bench.processes import CpuShare, cpu_share, program, resident_mib
 from bench.ros_latency import latencies_ms
 from bench.rows import Row
@@ -26,6 +27,8 @@ def run(names: list[str]) -> list[Row]:
     rows: list[Row] = []
     if not names or {"ros.intake", "ros.flat"} & set(names):
         rows += _cpu_rows()
+    if not names or "ros.gateway_cpu" in names:
+        rows.append(_gateway_row())
     if not names or "ros.value_latency_ms" in names:
         rows.append(_latency_row())
     return [row for row in rows if not names or row.name in names]
@@ -80,6 +83,22 @@ def _cost_of(way: str, rate_hz: int) -> CpuShare:
     if kept < 4 * 19 * WINDOW_S:
         raise RuntimeError(f"{way} kept {kept} values only: the figures would mean nothing")
     return cpu
+
+
+def _gateway_row() -> Row:
+    with _domain():
+        percent = ros_gateway.cpu_percent()
+    return Row(
+        name="ros.gateway_cpu",
+        what=(
+            f"the whole gateway beside 4 x {ros_gateway.FAST_HZ} Hz, commands, and detections of "
+            f"{ros_gateway.BOXES} boxes at {ros_gateway.PICTURES_HZ} Hz"
+        ),
+        unit="% of a core",
+        value=percent,
+        reference=None,
+        bar=12,
+    )
 
 
 def _latency_row() -> Row:

@@ -54,10 +54,14 @@ def clock_finding(robot_unix_s: float, own_unix_s: float, uncertainty_s: float) 
 
 
 def health_finding(status: SystemStatus) -> Finding:
-    """The robot's own verdict."""
+    """The robot's own verdict; no trouble of its own where a fault tells of the same."""
     health = status.health
     if health.ready:
         return good("health", health.summary)
+    if any(fault.active and fault.severity is FaultSeverity.ERROR for fault in status.faults):
+        return note(
+            "health", health.summary, "The robot can't take work", "The faults below say what is missing"
+        )
     return wrong(
         "health", health.summary, "The robot can't take work", "The findings below say what is missing"
     )

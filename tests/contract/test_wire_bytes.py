@@ -11,7 +11,17 @@ from typing import Any
 import pytest
 from google.protobuf.message import Message
 
-from omniseer.gateway.v1 import overlay_pb2, platform_pb2, preview_pb2, robot_gateway_pb2, system_status_pb2
+from omniseer.gateway.v1 import (
+    event_pb2,
+    fault_pb2,
+    gateway_info_pb2,
+    overlay_pb2,
+    platform_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    source_pb2,
+    system_status_pb2,
+)
 
 VARINT, LENGTH, FIXED32 = 0, 2, 5
 
@@ -318,9 +328,245 @@ CASES = [
     Case(robot_gateway_pb2.GetOverlaySnapshotRequest, b"", {}),
 ]
 
+# What was added to the locked contract: from 16 up in its messages, from 1 in messages of its own.
+ADDITIONS = [
+    Case(
+        system_status_pb2.SystemStatus,
+        uint(16, 1)
+        + sub(17, text(1, "a"))
+        + sub(17, text(1, "b"))
+        + sub(18, text(4, "exploring"))
+        + sub(19, text(1, "odometry"))
+        + sub(20, uint(3, 61_000)),
+        {
+            "insecure": True,
+            "faults": [fault_pb2.Fault(id="a"), fault_pb2.Fault(id="b")],
+            "mission": system_status_pb2.MissionStatus(mode="exploring"),
+            "sources": [source_pb2.SourceStatus(name="odometry")],
+            "gateway": gateway_info_pb2.GatewayFacts(uptime_ms=61_000),
+        },
+    ),
+    Case(system_status_pb2.VisionStatus, uint(16, 70), {"age_ms": 70}),
+    Case(
+        system_status_pb2.MissionStatus,
+        uint(1, 1) + uint(2, 1) + uint(3, 5) + text(4, "docking"),
+        {"available": True, "stale": True, "age_ms": 5, "mode": "docking"},
+    ),
+    Case(
+        preview_pb2.PreviewStatus,
+        sub(16, uint(3, 7100))
+        + sub(17, text(1, "x264"))
+        + sub(18, uint(1, 1280))
+        + uint(19, 2500)
+        + sub(20, uint(6, 2))
+        + sub(21, uint(1, 3))
+        + uint(22, 1)
+        + text(23, "RTT 180 ms"),
+        {
+            "endpoint": preview_pb2.StreamEndpoint(port=7100),
+            "encoder": preview_pb2.EncoderStatus(name="x264"),
+            "video": preview_pb2.VideoFormat(width_px=1280),
+            "target_bitrate_kbps": 2500,
+            "measured": preview_pb2.StreamMeasurement(viewer_count=2),
+            "counters": preview_pb2.PreviewCounters(starts=3),
+            "service_reachable": True,
+            "bitrate_reason": "RTT 180 ms",
+        },
+    ),
+    Case(
+        preview_pb2.StreamEndpoint,
+        uint(1, 1)
+        + text(2, "10.0.0.5")
+        + uint(3, 7100)
+        + text(4, "srt://10.0.0.5:7100")
+        + uint(5, 125)
+        + uint(6, 2)
+        + uint(7, 1)
+        + text(8, "secret")
+        + uint(9, 1),
+        {
+            "transport": 1,
+            "host": "10.0.0.5",
+            "port": 7100,
+            "uri": "srt://10.0.0.5:7100",
+            "latency_ms": 125,
+            "codec": 2,
+            "container": 1,
+            "passphrase": "secret",
+            "encrypted": True,
+        },
+    ),
+    Case(
+        preview_pb2.EncoderStatus,
+        text(1, "x264") + uint(2, 1) + text(3, "mpp-h265") + text(4, "not there") + uint(5, 1),
+        {
+            "name": "x264",
+            "hardware": True,
+            "wanted": "mpp-h265",
+            "fallback_reason": "not there",
+            "codec": 1,
+        },
+    ),
+    Case(
+        preview_pb2.VideoFormat,
+        uint(1, 1280) + uint(2, 720) + flt(3, 29.5),
+        {"width_px": 1280, "height_px": 720, "fps": 29.5},
+    ),
+    Case(
+        preview_pb2.StreamMeasurement,
+        uint(1, 1)
+        + uint(2, 1)
+        + uint(3, 400)
+        + flt(4, 29.5)
+        + flt(5, 2400.0)
+        + uint(6, 3)
+        + uint(7, 12)
+        + flt(8, 4.5)
+        + flt(9, 0.25),
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 400,
+            "fps": 29.5,
+            "bitrate_kbps": 2400.0,
+            "viewer_count": 3,
+            "last_frame_age_ms": 12,
+            "worst_rtt_ms": 4.5,
+            "worst_loss_percent": 0.25,
+        },
+    ),
+    Case(
+        preview_pb2.PreviewCounters,
+        uint(1, 4) + uint(2, 3) + uint(3, 2) + uint(4, 1),
+        {"starts": 4, "restarts": 3, "faults": 2, "fallbacks": 1},
+    ),
+    Case(
+        fault_pb2.Fault,
+        text(1, "odometry.stale")
+        + uint(2, 3)
+        + text(3, "odometry")
+        + text(4, "it stopped")
+        + text(5, "look")
+        + uint(6, 1)
+        + uint(7, 9000)
+        + uint(8, 100)
+        + uint(9, 2),
+        {
+            "id": "odometry.stale",
+            "severity": fault_pb2.FAULT_SEVERITY_ERROR,
+            "component": "odometry",
+            "message": "it stopped",
+            "remedy": "look",
+            "active": True,
+            "age_ms": 9000,
+            "cleared_age_ms": 100,
+            "times_raised": 2,
+        },
+    ),
+    Case(
+        source_pb2.SourceStatus,
+        text(1, "battery") + uint(2, 5) + uint(3, 1) + uint(4, 1) + uint(5, 7) + uint(6, 1) + text(7, "why"),
+        {
+            "name": "battery",
+            "state": source_pb2.SOURCE_STATE_QOS_MISMATCH,
+            "available": True,
+            "stale": True,
+            "age_ms": 7,
+            "required": True,
+            "detail": "why",
+        },
+    ),
+    Case(
+        gateway_info_pb2.GatewayFacts,
+        text(1, "abc")
+        + text(2, "boot")
+        + uint(3, 61_000)
+        + uint(4, 2)
+        + uint(5, 1 << 40)
+        + uint(6, 7)
+        + text(7, "run"),
+        {
+            "revision": "abc",
+            "boot_id": "boot",
+            "uptime_ms": 61_000,
+            "client_count": 2,
+            "requests_served": 1 << 40,
+            "requests_refused": 7,
+            "run_id": "run",
+        },
+    ),
+    Case(
+        event_pb2.Event,
+        text(1, "run")
+        + uint(2, 17)
+        + uint(3, 1 << 41)
+        + uint(4, 1 << 42)
+        + uint(5, 2)
+        + text(6, "preview")
+        + text(7, "passed over")
+        + sub(11, text(1, "x264") + text(2, "mpp-h265") + text(3, "not there")),
+        {
+            "run_id": "run",
+            "sequence": 17,
+            "monotonic_ns": 1 << 41,
+            "wall_clock_unix_ms": 1 << 42,
+            "severity": fault_pb2.FAULT_SEVERITY_WARNING,
+            "component": "preview",
+            "message": "passed over",
+            "encoder_fallback": event_pb2.EncoderFallback(
+                running="x264", wanted="mpp-h265", reason="not there"
+            ),
+        },
+    ),
+    Case(
+        event_pb2.ControlAction,
+        text(1, "anna")
+        + text(2, "10.0.0.9")
+        + text(3, "SetPreviewMode")
+        + text(4, "on")
+        + uint(5, 2)
+        + text(6, "no"),
+        {
+            "who": "anna",
+            "address": "10.0.0.9",
+            "method": "SetPreviewMode",
+            "request": "on",
+            "result": event_pb2.CONTROL_RESULT_REFUSED,
+            "answer": "no",
+        },
+    ),
+    Case(
+        event_pb2.EventGap,
+        uint(1, 2) + uint(2, 40) + sub(3, text(1, "run") + uint(2, 40)),
+        {
+            "reason": event_pb2.EVENT_GAP_REASON_NEW_RUN,
+            "missed_count": 40,
+            "position": event_pb2.EventPosition(run_id="run", sequence=40),
+        },
+    ),
+    Case(
+        robot_gateway_pb2.WatchSystemStatusResponse,
+        sub(1, text(1, "lab")) + uint(2, 1 << 41),
+        {"status": system_status_pb2.SystemStatus(gateway_name="lab"), "monotonic_ns": 1 << 41},
+    ),
+    Case(
+        robot_gateway_pb2.SubscribeEventsRequest,
+        sub(1, text(1, "run") + uint(2, 5)) + uint(2, 3),
+        {
+            "after": event_pb2.EventPosition(run_id="run", sequence=5),
+            "min_severity": fault_pb2.FAULT_SEVERITY_ERROR,
+        },
+    ),
+    Case(
+        robot_gateway_pb2.PingResponse,
+        uint(1, 1 << 41) + uint(2, 1 << 60) + text(3, "boot"),
+        {"monotonic_ns": 1 << 41, "wall_clock_unix_ns": 1 << 60, "boot_id": "boot"},
+    ),
+]
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.message.DESCRIPTOR.name)
-def test_bytes_by_hand_mean_what_the_locked_contract_says(case: Case) -> None:
+
+@pytest.mark.parametrize("case", [*CASES, *ADDITIONS], ids=lambda case: case.message.DESCRIPTOR.name)
+def test_bytes_by_hand_mean_what_the_contract_says(case: Case) -> None:
     message = case.message.FromString(case.wire)
 
     assert {field.name for field, _ in message.ListFields()} == set(case.fields)

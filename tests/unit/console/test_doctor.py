@@ -92,6 +92,16 @@ def test_a_source_that_is_visible_and_silent_is_named_once(double: GatewayDouble
     assert "reliability" in findings["source.battery"].remedy
 
 
+@pytest.mark.parametrize("told", [True, False])
+def test_one_trouble_is_one_finding(double: GatewayDouble, *, told: bool) -> None:
+    double.status.health.ready = False
+    double.status.health.summary = "odometry stale"
+    if told:
+        double.status.faults.add(id="odometry.stale", active=True, severity=FAULT_SEVERITY_ERROR)
+    wrong = [check for check, each in examined(double).items() if each.verdict is Verdict.WRONG]
+    assert wrong == ["fault.odometry.stale" if told else "health"]
+
+
 def test_a_fault_that_is_over_is_not_told(double: GatewayDouble) -> None:
     double.status.faults.add(id="odometry.stale", message="stopped coming", cleared_age_ms=10)
     assert "fault.odometry.stale" not in examined(double)
