@@ -4,7 +4,7 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from typing import Final
@@ -15,7 +15,7 @@ from gateway.config import GatewaySettings, LimitSettings, MetricsSettings, Secu
 from gateway.door import Door
 from gateway.knowledge import Knowledge
 from gateway.metrics.calls import Calls
-from gateway.metrics.collector import GatewayCollector
+from gateway.metrics.collector import GatewayCollector, StreamFigures
 from gateway.metrics.endpoint import serving_metrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
@@ -76,7 +76,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     board, health = knowledge.board, Health(SERVICE)
     with _ros_intake(settings.sources, board), PlatformSampler(settings.platform, board), door.recording():
         async with (
-            _metrics(settings.metrics, knowledge) as observe,
+            _metrics(settings.metrics, knowledge, partial(_stream_figures, tally, streams)) as observe,
             serving(
                 gateway,
                 settings.grpc.host,
@@ -145,19 +145,26 @@ def _ros_intake(sources: tuple[SourceSettings, ...], board: Board) -> Iterator[N
 
 
 @asynccontextmanager
-async def _metrics(settings: MetricsSettings, knowledge: Knowledge) -> AsyncIterator[Observe]:
+async def _metrics(
+    settings: MetricsSettings, knowledge: Knowledge, streams: Callable[[], StreamFigures]
+) -> AsyncIterator[Observe]:
     """Serves them while the block lasts, where they are wanted. Yields what has to be told of every call."""
     if settings.port is None:
         yield unobserved
         return
     calls, loop_delay = Calls(), LoopDelay()
-    collector = GatewayCollector(knowledge.snapshot, calls, loop_delay)
+    collector = GatewayCollector(knowledge.snapshot, calls, loop_delay, streams)
     async with serving_metrics(collector.text, settings.host, settings.port):
         measuring = asyncio.create_task(loop_delay.run(), name="loop-delay")
         try:
             yield calls
         finally:
             measuring.cancel()
+
+
+def _stream_figures(tally: Tally, streams: Streams) -> StreamFigures:
+    going_on = {method: counts.open for method, counts in tally.methods.items() if counts.open}
+    return StreamFigures(going_on, streams.watch.skipped, streams.events.gaps)
 
 
 async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying, door: Door) -> None:

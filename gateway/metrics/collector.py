@@ -1,6 +1,7 @@
 """The metrics by name. docs/metrics.md explains each; a test holds the page and this module together."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from prometheus_client import CollectorRegistry, generate_latest
@@ -19,6 +20,21 @@ from gateway.status.snapshot import Snapshot
 _PREFIX: Final = "robot_gateway"
 
 
+@dataclass(frozen=True, slots=True)
+class StreamFigures:
+    """Of the streams to operators.
+
+    Attributes:
+        open: how many go on, by method.
+        skipped: statuses that slow readers did not get, because they got newer ones.
+        gaps: how often a subscriber was told that events are missing.
+    """
+
+    open: Mapping[str, int]
+    skipped: int
+    gaps: int
+
+
 class GatewayCollector(Collector):
     """Everything that is told, of one instant.
 
@@ -26,10 +42,18 @@ class GatewayCollector(Collector):
         take: makes a snapshot of this instant.
         calls: what became of the calls.
         loop_delay: how late the event loop was.
+        streams: the figures of this instant.
     """
 
-    def __init__(self, take: Callable[[], Snapshot], calls: Calls, loop_delay: LoopDelay) -> None:
+    def __init__(
+        self,
+        take: Callable[[], Snapshot],
+        calls: Calls,
+        loop_delay: LoopDelay,
+        streams: Callable[[], StreamFigures],
+    ) -> None:
         self._take = take
+        self._streams = streams
         self._calls = calls
         self._loop_delay = loop_delay
         self._registry = CollectorRegistry()
@@ -48,6 +72,7 @@ class GatewayCollector(Collector):
         now = self._take()
         yield from _gateway(now)
         yield from self._of_calls()
+        yield from _streams(self._streams())
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
@@ -75,6 +100,21 @@ class GatewayCollector(Collector):
             buckets=delays.cumulative(),
             sum_value=delays.sum_s,
         )
+
+
+def _streams(figures: StreamFigures) -> Iterator[Metric]:
+    streams = Gauge(f"{_PREFIX}_streams", "Streams that go on.", labels=("method",))
+    for method, count in sorted(figures.open.items()):
+        streams.add_metric((method,), count)
+    yield streams
+    yield CounterFamily(
+        f"{_PREFIX}_statuses_skipped",
+        "Statuses that slow readers did not get, because they got newer ones.",
+        value=figures.skipped,
+    )
+    yield CounterFamily(
+        f"{_PREFIX}_event_gaps", "Times a subscriber was told that events are missing.", value=figures.gaps
+    )
 
 
 def _gateway(now: Snapshot) -> Iterator[Metric]:

@@ -32,6 +32,8 @@ class EventStreams:
         self._news = News()
         self._ready: dict[int, bytes] = {}
         """Serialised events by their sequence."""
+        self.gaps = 0
+        """How often a subscriber was told that events are missing."""
         log.on_event = self._news.spread
 
     async def events(self, after: Position | None, least: Severity) -> AsyncIterator[bytes]:
@@ -51,6 +53,7 @@ class EventStreams:
             reading = self._log.read(after, _AT_ONCE)
             after = here = reading.position
             if reading.gap:
+                self.gaps += 1
                 yield _gap(reading.gap)
             for event in reading.events:
                 if event.news.severity.rank >= least.rank:

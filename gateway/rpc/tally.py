@@ -24,6 +24,8 @@ class Counts:
     served: int = 0
     refused: int = 0
     failed: int = 0
+    open: int = 0
+    """Streams that go on."""
 
 
 class Tally:
@@ -85,6 +87,7 @@ class Tally:
         async def call(request: Any, context: Context) -> AsyncIterator[bytes]:
             peer, begun = context.peer(), False
             self._note(peer)
+            counts.open += 1
             try:
                 async for reply in behavior(request, context):
                     if not begun:
@@ -98,6 +101,8 @@ class Tally:
             except Exception:
                 counts.failed += 1
                 raise
+            finally:
+                counts.open -= 1
 
         return call
 

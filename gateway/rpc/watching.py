@@ -50,6 +50,8 @@ class StatusWatch:
         self._snapshot = take()
         self._essence = essence(self._snapshot)
         self._ready: dict[Caller, bytes] = {}
+        self.skipped = 0
+        """Answers that came due while the one before was still on its way: those readers got newer ones."""
 
     @property
     def watcher_count(self) -> int:
@@ -112,11 +114,9 @@ class StatusWatch:
 
     def _wake_who_is_due(self) -> None:
         """A few at a time, spread over the tick: whoever asks for something else waits for a few only."""
-        due = [
-            watcher.wake
-            for watcher in self._watchers
-            if watcher.wake is not None and watcher.pace.due(self._tick, self._version)
-        ]
+        watchers = [each for each in self._watchers if each.pace.due(self._tick, self._version)]
+        due = [each.wake for each in watchers if each.wake is not None]
+        self.skipped += len(watchers) - len(due)
         loop = asyncio.get_running_loop()
         groups = [due[begin : begin + _AT_ONCE] for begin in range(0, len(due), _AT_ONCE)]
         for number, group in enumerate(groups):

@@ -12,6 +12,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from common.errors import UserError
 from gateway.metrics.endpoint import serving_metrics
+from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusRequest
 from tests.support.eventually import eventually
 from tests.support.ports import free_tcp_port
 from tests.support.running_gateway import running_gateway
@@ -128,3 +129,14 @@ async def test_a_taken_port_is_one_line() -> None:
         with pytest.raises(UserError, match=rf"metrics can't be served at 127\.0\.0\.1:{port}"):
             async with serving_metrics(lambda: b"", "127.0.0.1", port):
                 pass
+
+
+async def test_an_open_stream_is_told_and_forgotten(tmp_path: Path) -> None:
+    port = free_tcp_port()
+    async with running_gateway(tmp_path / "preview.sock", metrics={"port": port}) as operator:
+        watching = operator.stub.WatchSystemStatus(WatchSystemStatusRequest(), timeout=LONG_S)
+        await watching.read()
+        stream = ("robot_gateway_streams", "WatchSystemStatus")
+        assert (await samples(port))[stream] == 1
+        watching.cancel()
+        await eventually(lambda: samples(port), lambda told: stream not in told, "it is closed")

@@ -13,9 +13,11 @@ from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 from gateway.metrics.calls import Calls
-from gateway.metrics.collector import GatewayCollector
+from gateway.metrics.collector import GatewayCollector, StreamFigures
 from gateway.metrics.histogram import Histogram
 from gateway.metrics.loop_delay import LoopDelay
+from gateway.rpc.caller import Caller
+from gateway.rpc.watching import StatusWatch
 from gateway.status.board import Board, SourceKind
 from gateway.status.faults.fault import Condition, Fault, Severity
 from gateway.status.preview import (
@@ -68,7 +70,8 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
 
 def families(calls: Calls, now: Snapshot | None = None) -> list[Metric]:
     """As Prometheus understands the text."""
-    collector = GatewayCollector(lambda: now or snapshot(), calls, LoopDelay())
+    streams = StreamFigures({"WatchSystemStatus": 3}, skipped=7, gaps=1)
+    collector = GatewayCollector(lambda: now or snapshot(), calls, LoopDelay(), lambda: streams)
     return list(text_string_to_metric_families(collector.text().decode()))
 
 
@@ -109,6 +112,13 @@ def test_calls_are_told_apart_by_method_and_code() -> None:
     assert told[f"{name}_sum", "method=GetSystemStatus"] == pytest.approx(0.202)
     assert told[f"{name}_bucket", "le=0.0025 method=GetSystemStatus"] == 1
     assert told[f"{name}_bucket", "le=+Inf method=GetSystemStatus"] == 2
+
+
+def test_streams_and_what_slow_readers_did_not_get() -> None:
+    told = values(Calls())
+    assert told["robot_gateway_streams", "method=WatchSystemStatus"] == 3
+    assert told["robot_gateway_statuses_skipped_total", ""] == 7
+    assert told["robot_gateway_event_gaps_total", ""] == 1
 
 
 def test_the_robot_and_its_sources() -> None:
@@ -184,3 +194,18 @@ def test_the_dashboard_asks_for_what_is_told() -> None:
     asked = set(re.findall(r"robot_gateway_\w+", " ".join(queries)))
     assert len(asked) > 10
     assert asked <= {name for name, _ in values(some_calls())}
+
+
+async def test_what_a_slow_reader_does_not_get_is_counted() -> None:
+    watch = StatusWatch(lambda: replace(snapshot(), at_s=time.monotonic()), time.monotonic)
+
+    async def skipped() -> int:
+        return watch.skipped
+
+    telling = asyncio.create_task(watch.run())
+    answers = watch.statuses(0, Caller("127.0.0.1", may_watch=True))
+    await anext(answers)
+    assert watch.skipped == 0
+    await eventually(skipped, lambda count: count > 0, "the next one came due before the reader was back")
+    await answers.aclose()
+    telling.cancel()
