@@ -12,10 +12,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from unittest.mock import patch
 
-from bench.ports import free_tcp_port, free_udp_port
 from bench.processes import CpuShare, cpu_share, resident_mib
 from bench.rows import Row
 from console.client import GatewayClient, Unreachable
+from tests.support.ports import free_tcp_port, free_udp_port
 from tests.support.ros import free_domain, simulated_robot
 
 _log = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile
 
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
-from tests.support.running_gateway import free_tcp_port
+from tests.support.ports import free_tcp_port
 
 COUNT = 400
 TOPIC = "/odometry/filtered"

@@ -3,7 +3,6 @@
 import statistics
 from pathlib import Path
 
-from bench.ports import free_udp_port
 from bench.processes import cpu_share
 from bench.rows import Row
 from bench.video import product, reference
@@ -12,6 +11,7 @@ from bench.video.progress import tell
 from bench.video.viewing import watch
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.settings import vbv_ms
+from tests.support.ports import free_udp_port
 
 ROUNDS = 5
 WINDOW_S = 5.0

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.ports import free_udp_port
 from bench.rows import Row
 from bench.video import product, reference
 from bench.video.camera import camera
 from bench.video.progress import tell
 from bench.video.viewing import Connect, first_frame_ms, watch
+from tests.support.ports import free_udp_port
 
 ROUNDS = 3
 JOINS = 4

@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.ports import free_tcp_port, free_udp_port
 from bench.video import foreign
 from bench.video.camera import Camera
 from console.client import GatewayClient, PreviewProfile, PreviewState, Unreachable
 from console.receiver.address import StreamAddress
 from console.receiver.receiver import Receiver
+from tests.support.ports import free_tcp_port, free_udp_port
 
 _UP_WITHIN_S = 20.0
 _PROGRAMS = Path(sys.executable).parent

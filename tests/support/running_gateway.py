@@ -1,7 +1,6 @@
 """A whole gateway in the test's own loop, without ROS unless the settings name sources."""
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -18,15 +17,9 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     SetPreviewModeRequest,
 )
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.ports import free_tcp_port
 
 UP_WITHIN_S = 10.0
-
-
-def free_tcp_port() -> int:
-    """A TCP port of the loopback address that was free a moment ago."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @dataclass
