@@ -1,6 +1,7 @@
 """CPU of the preview service against gst-launch-1.0 with the same encoder, told the same.
 
-Whoever sends fewer pictures needs less: a window in which too many are missing does not count, on either side.
+Whoever sends fewer pictures needs less: a window in which too many are missing does not count, on either
+side.
 """
 
 import statistics
