@@ -22,6 +22,10 @@ NAMES: Final = (
     "configuration",
     "metrics_request",
     "request_id",
+    "token",
+    "credential_list",
+    "login",
+    "known_robots",
     "long_list",
     "robots_message",
 )

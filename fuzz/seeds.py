@@ -49,6 +49,18 @@ _SEEDS: Final = {
     ],
     "metrics_request": [b"GET /metrics HTTP/1.1\r\nHost: robot\r\n\r\n"],
     "request_id": [b"shift-7:42"],
+    "token": [b"rgt-0123456789ab." + b"A" * 43],
+    "credential_list": [
+        b'{"version": 1, "credentials": [{"id": "0123456789ab", "name": "anna", "role": "operator", '
+        b'"kind": "token", "proof": "' + b"0" * 64 + b'", "made": 1, "begins": null, "ends": null, '
+        b'"revoked": null}]}'
+    ],
+    "login": [
+        b"# Robot Gateway login 1\nrobot: lab2\nname: anna\nrole: operator\ntoken: rgt-0123456789ab."
+        + b"A" * 43
+        + b"\nauthority:\n-----BEGIN CERTIFICATE-----\n"
+    ],
+    "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 
 

@@ -17,7 +17,11 @@ from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from console.client.mapping.methods import METHODS
+from console.robots.book import parse_book
+from console.robots.login import parse_login
 from fuzz.robot import robots_message
+from gateway.access.store import parse_store
+from gateway.access.token import parse_token
 from gateway.config import load_settings
 from gateway.metrics.endpoint import answer
 from gateway.preview_link.wire import UnknownSpeechError, from_wire
@@ -92,6 +96,35 @@ def request_id(data: bytes) -> None:
     assert current().isprintable()
 
 
+def token(data: bytes) -> None:
+    """What a caller shows as a token: one of ours, whole, or none."""
+    text = data.decode("utf-8", "replace")
+    found = parse_token(text)
+    assert found is None or text.isascii()
+
+
+def credential_list(data: bytes) -> None:
+    """The gateway's list of credentials. What is wrong is told without a word out of it."""
+    with suppress(ValueError):
+        parse_store(data.decode("utf-8", "replace"))
+
+
+def login(data: bytes) -> None:
+    """What an operator pastes into robotctl login. What is wrong with it is told in one line."""
+    try:
+        parse_login(data.decode("utf-8", "replace"))
+    except UserError as error:
+        _must_be_one_line(str(error))
+
+
+def known_robots(data: bytes) -> None:
+    """The file of known robots. What is wrong with it is told in one line."""
+    try:
+        parse_book(Path("config.toml"), data.decode("utf-8", "replace"))
+    except UserError as error:
+        _must_be_one_line(str(error))
+
+
 def long_list(data: bytes) -> None:
     """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
     shorter, left_out = cut(data, longest=100)
@@ -110,6 +143,10 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             configuration,
             metrics_request,
             request_id,
+            token,
+            credential_list,
+            login,
+            known_robots,
             long_list,
             robots_message,
         )

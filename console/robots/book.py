@@ -120,7 +120,8 @@ def parse_book(path: Path, text: str) -> RobotBook:
     """
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # Beside its own error, which is a ValueError, the parser lets through what endless nesting raises.
+    except (ValueError, RecursionError) as error:
         raise _wrong(path, f"not TOML: {error}", "") from error
     _only(path, "", document, _TOP_KEYS)
     tables = document.get("robots", {})
@@ -128,7 +129,7 @@ def parse_book(path: Path, text: str) -> RobotBook:
         raise _wrong(path, "'robots' is not a table", "Write [robots.NAME] above a robot's keys")
     robots = {name: _robot(path, name, table) for name, table in tables.items()}
     default = document.get("default")
-    if default is not None and default not in robots:
+    if default is not None and not (isinstance(default, str) and default in robots):
         known = ", ".join(robots) or "none"
         raise _wrong(path, f"default = {default!r} is not one of its robots", f"Known: {known}")
     return RobotBook(path, MappingProxyType(robots), default)

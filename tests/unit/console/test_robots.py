@@ -71,6 +71,9 @@ def test_no_file_is_an_empty_book(path: Path) -> None:
     ("text", "says"),
     [
         ("default = ", "not TOML"),
+        ("a = " + "[" * 3000, "not TOML"),
+        ("a = " + "9" * 5000, "not TOML"),
+        ('default = ["lab1"]', "is not one of its robots"),
         ("defualt = 'lab1'", "unknown key 'defualt'. Allowed: default, robots"),
         ("[robots.lab1]\ntarget = 'a'\ntoken = 'x'", "unknown key 'robots.lab1.token'. Allowed: target, ca_"),
         ("robots = 3", "'robots' is not a table"),
