@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
+from gateway.rpc.answers import REUSE_S
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.status import system_status
 from gateway.status.change import essence
@@ -75,6 +76,8 @@ class StatusWatch:
     async def statuses(self, min_interval_ms: int, caller: Caller) -> AsyncIterator[bytes]:
         """Serialised answers: the first at once, then whenever one is due, until the caller leaves."""
         loop = asyncio.get_running_loop()
+        # Whoever has just switched something, and then watches, sees it at once.
+        self._look_unless_newer_than(REUSE_S)
         with self._watching(min_interval_ms) as watcher:
             while True:
                 yield self._newest(caller)
@@ -103,10 +106,13 @@ class StatusWatch:
             self._essence = seen
             self._version += 1
 
-    def _newest(self, caller: Caller) -> bytes:
-        if self._clock() - self._snapshot.at_s > _TICK_S:
-            # Nobody watched until now, or the loop was held up.
+    def _look_unless_newer_than(self, seconds: float) -> None:
+        if self._clock() - self._snapshot.at_s > seconds:
             self._look()
+
+    def _newest(self, caller: Caller) -> bytes:
+        # Nobody watched until now, or the loop was held up.
+        self._look_unless_newer_than(_TICK_S)
         ready = self._ready.get(caller)
         if ready is None:
             ready = self._ready[caller] = _serialised(self._snapshot, caller)

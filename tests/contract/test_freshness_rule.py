@@ -20,6 +20,7 @@ TRIPLES = [
 
 _ITSELF = "the gateway's own, true at the moment of the answer"
 _SERVICE = "told by the preview service on every change; service_reachable says whether it still speaks"
+_EVENT = "of something that happened at an instant which is told with it; it never grows old"
 NEEDS_NO_AGE = {
     "SystemStatus.gateway_name": _ITSELF,
     "SystemStatus.gateway_version": _ITSELF,
@@ -34,6 +35,17 @@ NEEDS_NO_AGE = {
     "MethodCounts": _ITSELF,
     "GetGatewayInfoResponse": _ITSELF,
     "OperatorEvent": "an event of the gateway's own; it has an age and is never stale",
+    "Event": _EVENT,
+    "PreviewStateChanged": _EVENT,
+    "EncoderFallback": _EVENT,
+    "ClientJoined": _EVENT,
+    "ClientLeft": _EVENT,
+    "ControlAction": _EVENT,
+    "RobotModeChanged": _EVENT,
+    "EventGap": _EVENT,
+    "EventPosition": _ITSELF,
+    "PingResponse": _ITSELF,
+    "WatchSystemStatusResponse.monotonic_ns": _ITSELF,
     "SetPreviewModeResponse.accepted": _ITSELF,
     "SetPreviewModeResponse.message": _ITSELF,
 }

@@ -104,7 +104,8 @@ class _Watch:
 
     async def _follow(self) -> None:
         looks = 1
-        while looks != self._count:
+        # Python 3.11 loses a cancellation that comes as what is waited for ends.
+        while looks != self._count and not self._over.is_set():
             self._take(await self._next())
             looks += 1
         self._over.set()
@@ -121,7 +122,7 @@ class _Watch:
         self._changed.set()
 
     async def _redraw(self) -> None:
-        while True:
+        while not self._over.is_set():
             self._changed.clear()
             note = self._wishes.note()
             keys = self._wishes.help(self._look.status.preview) if self._keyboard else ()
