@@ -15,6 +15,8 @@ from console.receiver.frame import Frame, Plane
 from console.receiver.inbox import Inbox
 
 PLAIN_X264 = "x264enc tune=zerolatency speed-preset=veryfast bitrate=2500 key-int-max=30"
+KEY_FRAMES_APART_S = 1.0
+"""What that makes of 30 pictures per second."""
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from google.protobuf.descriptor import Descriptor
 from google.protobuf.message import Message
 
 from omniseer.gateway.v1 import (
@@ -20,6 +21,7 @@ from omniseer.gateway.v1 import (
     preview_pb2,
     robot_gateway_pb2,
     source_pb2,
+    states_pb2,
     system_status_pb2,
 )
 
@@ -562,6 +564,97 @@ ADDITIONS = [
         uint(1, 1 << 41) + uint(2, 1 << 60) + text(3, "boot"),
         {"monotonic_ns": 1 << 41, "wall_clock_unix_ns": 1 << 60, "boot_id": "boot"},
     ),
+    Case(robot_gateway_pb2.PingRequest, b"", {}),
+    Case(robot_gateway_pb2.GetGatewayInfoRequest, b"", {}),
+    Case(
+        robot_gateway_pb2.GetGatewayInfoResponse,
+        text(1, "lab")
+        + text(2, "1.2.3")
+        + sub(3, text(1, "abc"))
+        + uint(4, 1 << 42)
+        + sub(5, text(1, "Ping"))
+        + text(6, "{}"),
+        {
+            "gateway_name": "lab",
+            "gateway_version": "1.2.3",
+            "gateway": gateway_info_pb2.GatewayFacts(revision="abc"),
+            "wall_clock_unix_ms": 1 << 42,
+            "methods": [gateway_info_pb2.MethodCounts(method="Ping")],
+            "configuration_json": "{}",
+        },
+    ),
+    Case(
+        gateway_info_pb2.MethodCounts,
+        text(1, "Ping") + uint(2, 1 << 40) + uint(3, 3) + uint(4, 2),
+        {"method": "Ping", "served": 1 << 40, "refused": 3, "failed": 2},
+    ),
+    Case(robot_gateway_pb2.WatchSystemStatusRequest, uint(1, 200), {"min_interval_ms": 200}),
+    Case(event_pb2.EventPosition, text(1, "run") + uint(2, 5), {"run_id": "run", "sequence": 5}),
+    Case(
+        robot_gateway_pb2.SubscribeEventsResponse,
+        sub(1, uint(2, 5)),
+        {"event": event_pb2.Event(sequence=5)},
+    ),
+    Case(
+        robot_gateway_pb2.SubscribeEventsResponse,
+        sub(2, uint(2, 5)),
+        {"gap": event_pb2.EventGap(missed_count=5)},
+    ),
+    Case(
+        robot_gateway_pb2.SubscribeEventsResponse,
+        sub(3, uint(2, 5)),
+        {"caught_up": event_pb2.EventPosition(sequence=5)},
+    ),
+    Case(
+        event_pb2.Event,
+        sub(8, sub(1, text(1, "a"))),
+        {"fault_raised": event_pb2.FaultRaised(fault=fault_pb2.Fault(id="a"))},
+    ),
+    Case(
+        event_pb2.Event,
+        sub(9, sub(1, text(1, "a"))),
+        {"fault_cleared": event_pb2.FaultCleared(fault=fault_pb2.Fault(id="a"))},
+    ),
+    Case(
+        event_pb2.Event,
+        sub(10, uint(1, 5)),
+        {"preview_state_changed": event_pb2.PreviewStateChanged(state=states_pb2.PREVIEW_FAULTED)},
+    ),
+    Case(
+        event_pb2.Event,
+        sub(12, text(1, "10.0.0.9")),
+        {"client_joined": event_pb2.ClientJoined(address="10.0.0.9")},
+    ),
+    Case(
+        event_pb2.Event,
+        sub(13, text(1, "10.0.0.9")),
+        {"client_left": event_pb2.ClientLeft(address="10.0.0.9")},
+    ),
+    Case(event_pb2.Event, sub(14, text(1, "anna")), {"control_action": event_pb2.ControlAction(who="anna")}),
+    Case(
+        event_pb2.Event,
+        sub(15, text(1, "idle")),
+        {"robot_mode_changed": event_pb2.RobotModeChanged(mode="idle")},
+    ),
+    Case(event_pb2.FaultRaised, sub(1, text(1, "a")), {"fault": fault_pb2.Fault(id="a")}),
+    Case(event_pb2.FaultCleared, sub(1, text(1, "a")), {"fault": fault_pb2.Fault(id="a")}),
+    Case(
+        event_pb2.PreviewStateChanged,
+        uint(1, 5) + uint(2, 3) + text(3, "no camera"),
+        {
+            "state": states_pb2.PREVIEW_FAULTED,
+            "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY,
+            "last_error": "no camera",
+        },
+    ),
+    Case(
+        event_pb2.EncoderFallback,
+        text(1, "x264") + text(2, "mpp-h265") + text(3, "not there"),
+        {"running": "x264", "wanted": "mpp-h265", "reason": "not there"},
+    ),
+    Case(event_pb2.ClientJoined, text(1, "10.0.0.9"), {"address": "10.0.0.9"}),
+    Case(event_pb2.ClientLeft, text(1, "10.0.0.9"), {"address": "10.0.0.9"}),
+    Case(event_pb2.RobotModeChanged, text(1, "idle"), {"mode": "idle"}),
 ]
 
 
@@ -579,6 +672,27 @@ def test_bytes_by_hand_mean_what_the_contract_says(case: Case) -> None:
 def test_every_locked_field_has_its_byte_string(case: Case) -> None:
     locked = {field.name for field in case.message.DESCRIPTOR.fields if field.number < 16}
     assert set(case.fields) == locked
+
+
+def messages_below(message: Descriptor, found: dict[str, Descriptor]) -> None:
+    """Adds a message of this package and all that stand in it."""
+    if message.full_name in found or message.file.package != robot_gateway_pb2.DESCRIPTOR.package:
+        return
+    found[message.full_name] = message
+    for field in message.fields:
+        if field.message_type:
+            messages_below(field.message_type, found)
+
+
+def test_every_field_of_every_message_has_its_byte_string() -> None:
+    reachable: dict[str, Descriptor] = {}
+    for method in robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods:
+        messages_below(method.input_type, reachable)
+        messages_below(method.output_type, reachable)
+    written: dict[str, set[str]] = {}
+    for case in [*CASES, *ADDITIONS]:
+        written.setdefault(case.message.DESCRIPTOR.full_name, set()).update(case.fields)
+    assert written == {name: {field.name for field in message.fields} for name, message in reachable.items()}
 
 
 @pytest.mark.parametrize(

@@ -418,11 +418,15 @@ def connections_to(port: int) -> int:
 
 
 def test_many_clients_leave_no_thread_and_no_socket(face: type[Face], port: int) -> None:
+    closed: list[Face] = []
+
     def use_some(count: int) -> None:
         nobody = at(free_tcp_port())
         for _ in range(count):
             with face(at(port)) as robot:
                 robot.status()
+            # Kept, so that closing is what frees them, not the end of the last reference.
+            closed.append(robot)
             with face(nobody, HURRIED) as robot, pytest.raises(Unreachable):
                 robot.status()
 

@@ -12,16 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from omniseer_msgs.msg import VisionPerfSummary
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState
+from std_msgs.msg import String
 from yolo_msgs.msg import DetectionArray
 
 from gateway.config import DEFAULT_SOURCES
-from omniseer.gateway.v1 import source_pb2
+from omniseer.gateway.v1 import fault_pb2, source_pb2
 from tests.support.gateway_program import gateway_program
 from tests.support.ros import simulated_robot
 from tests.support.talker import Talker
@@ -92,33 +94,111 @@ def test_what_a_plain_subscriber_saw_last_is_what_is_served(talker: Talker, tmp_
             )
             robot.change(silent=["odometry", "vision", "battery", "detections", "effective_command"])
             wait_until(lambda: gateway.source("odometry").stale, "silence")
-            served = gateway.overlay()
-            twist = plain.last("odometry").twist.twist
-            health = served.status.health
-            assert (health.measured_vx_mps, health.measured_vy_mps, health.measured_wz_rad_s) == (
-                single(twist.linear.x),
-                single(twist.linear.y),
-                single(twist.angular.z),
-            )
-            assert twist.linear.x == speed
-            vision, perf = served.status.vision, plain.last("vision")
-            assert (vision.producer_fps, vision.consumer_fps, vision.last_infer_ms) == (
-                perf.producer_fps,
-                perf.consumer_fps,
-                perf.last_infer_ms,
-            )
-            lipo = served.status.platform.power.lipo_battery
-            assert lipo.voltage == plain.last("battery").voltage
-            assert lipo.percentage == pytest.approx(100 * plain.last("battery").percentage)
-            command = plain.last("effective_command").twist
-            assert served.status.effective_command.vx_mps == single(command.linear.x)
+            overlay = gateway.overlay()
+            for status in (gateway.status(), overlay.status):
+                is_what_was_heard(status, plain)
+            assert plain.last("odometry").twist.twist.linear.x == speed
             assert [
                 (each.track_id, each.class_name, each.bbox_center_x_px, each.bbox_width_px)
-                for each in served.detections.detections
+                for each in overlay.detections.detections
             ] == [
                 (each.id, each.class_name, single(each.bbox.center.position.x), single(each.bbox.size.x))
                 for each in plain.last("detections").detections
             ]
+
+
+def is_what_was_heard(status: Any, plain: PlainSubscriber) -> None:
+    """The values of a status are those of the last messages; silence keeps both as they are."""
+    twist = plain.last("odometry").twist.twist
+    health = status.health
+    assert (health.measured_vx_mps, health.measured_vy_mps, health.measured_wz_rad_s) == (
+        single(twist.linear.x),
+        single(twist.linear.y),
+        single(twist.angular.z),
+    )
+    vision, perf = status.vision, plain.last("vision")
+    assert (vision.producer_fps, vision.consumer_fps, vision.last_infer_ms) == (
+        perf.producer_fps,
+        perf.consumer_fps,
+        perf.last_infer_ms,
+    )
+    assert vision.infer_error_count == perf.infer_error_count
+    assert vision.capture_fatal_error_count == perf.capture_fatal_error_count
+    lipo = status.platform.power.lipo_battery
+    assert lipo.voltage == plain.last("battery").voltage
+    assert lipo.percentage == pytest.approx(100 * plain.last("battery").percentage)
+    command, seen = plain.last("effective_command").twist, status.effective_command
+    assert (seen.vx_mps, seen.vy_mps, seen.wz_rad_s) == (
+        single(command.linear.x),
+        single(command.linear.y),
+        single(command.angular.z),
+    )
+
+
+MODE = {
+    "kind": "mode",
+    "topic": "/mission/mode",
+    "type": "std_msgs/msg/String",
+    "stale_after_ms": 60_000,
+    "reliability": "reliable",
+    "durability": "transient_local",
+}
+
+
+def test_the_mode_and_the_components_a_plain_subscriber_heard_are_served(
+    talker: Talker, tmp_path: Path
+) -> None:
+    """What arrives as a fault or a word instead of a number, in both answers."""
+    heard: dict[str, Any] = {}
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    talker.node.create_subscription(String, MODE["topic"], lambda it: heard.update(mode=it.data), latched)
+    talker.node.create_subscription(
+        DiagnosticArray, TOPICS["diagnostics"], lambda it: heard.update(components=it.status), 10
+    )
+    sources = [*(each.model_dump(mode="json", exclude_none=True) for each in DEFAULT_SOURCES), MODE]
+    with (
+        simulated_robot(tmp_path, "--diagnostics-hz", "20") as robot,
+        gateway_program(tmp_path, sources=sources, faults={"clear_after_ms": 100}) as gateway,
+        plain_subscriber(talker),
+    ):
+        for mode, levels in (
+            ("docking", {"drive": "error", "lidar": "stale"}),
+            ("exploring", {"lidar": "error"}),
+            ("idle", {}),
+        ):
+            robot.change(mode=mode, components=levels)
+            wait_until(
+                lambda mode=mode, levels=levels: (
+                    heard.get("mode") == mode and len(in_trouble(heard["components"])) == len(levels)
+                ),
+                f"the plain subscriber to hear {mode} and {levels}",
+            )
+            for answer in (gateway.status, lambda: gateway.overlay().status):
+                wait_until(
+                    lambda answer=answer: (
+                        (status := answer()).mission.mode == heard["mode"]
+                        and component_faults(status) == in_trouble(heard["components"])
+                    ),
+                    f"{heard['mode']} and {in_trouble(heard['components'])} to be served",
+                )
+
+
+def in_trouble(components: Any) -> set[tuple[str, int]]:
+    """Words and severity of every component that a message calls wrong."""
+    severities = {
+        DiagnosticStatus.ERROR: fault_pb2.FAULT_SEVERITY_ERROR,
+        DiagnosticStatus.STALE: fault_pb2.FAULT_SEVERITY_WARNING,
+    }
+    return {(each.message, severities[each.level]) for each in components if each.level in severities}
+
+
+def component_faults(status: Any) -> set[tuple[str, int]]:
+    """The same of the faults that are served: a fault's words end with the component's own."""
+    return {
+        (fault.message.partition(": ")[2], fault.severity)
+        for fault in status.faults
+        if fault.active and fault.id.startswith("diagnostics.")
+    }
 
 
 def single(number: float) -> float:
