@@ -106,6 +106,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
 def _limits(settings: LimitSettings) -> Limits:
     return Limits(
         connections=settings.connections,
+        connections_per_address=settings.connections_per_address,
         streams_per_connection=settings.streams_per_connection,
         requests_per_s=settings.requests_per_s,
         burst=settings.burst,

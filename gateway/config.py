@@ -195,6 +195,8 @@ class LimitSettings(Section):
 
     connections: int = Field(default=256, ge=1, le=10_000)
     """How many may be served at once."""
+    connections_per_address: int = Field(default=128, ge=1, le=10_000)
+    """How many of them may come from one address: one computer can't take them all."""
     streams_per_connection: int = Field(default=16, ge=1, le=1000)
     requests_per_s: float = Field(default=500.0, gt=0)
     """How often one connection may ask in the long run."""

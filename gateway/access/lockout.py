@@ -6,7 +6,6 @@ router) goes on working, and so does Anna anywhere else. Guesses that name no cr
 one entry per address, which locks nobody who has a credential.
 """
 
-import ipaddress
 import math
 import time
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from typing import Final, TypeAlias
 
 from common.errors import TooMuchError
 from common.reasons import Reason
+from gateway.access.site import site_of
 
 FREE: Final = 5
 """Wrong credentials that cost nothing: people mistype, and programs start with an old token."""
@@ -25,8 +25,6 @@ FORGOTTEN_AFTER_S: Final = 600.0
 MOST: Final = 1024
 """Entries; of more than that, the one that failed longest ago is forgotten. Who has a thousand addresses is
 not held up by this, and still has to guess 256 bits."""
-_IPV6_SITE: Final = 64
-"""Bits of an IPv6 address that one site can't choose."""
 
 Key: TypeAlias = tuple[str, str]
 
@@ -96,14 +94,3 @@ class Lockout:
         """An attempt was right: what failed before it is forgotten."""
         if self._entries:
             self._entries.pop((site_of(host), credential_id), None)
-
-
-def site_of(host: str) -> str:
-    """What one sender can't change at will: an IPv4 address, the first half of an IPv6 address."""
-    try:
-        address = ipaddress.ip_address(host.partition("%")[0])
-    except ValueError:
-        return host
-    if address.version == 6 and address.ipv4_mapped is None:
-        return str(ipaddress.ip_network((address, _IPV6_SITE), strict=False).network_address)
-    return str(getattr(address, "ipv4_mapped", None) or address)

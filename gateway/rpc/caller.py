@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from ipaddress import ip_address
 from typing import Final
-from urllib.parse import unquote
 
 from gateway.rpc.identity import caller
+from gateway.rpc.peer import ip_of
 
 _log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class Caller:
 
 
 class Callers:
-    """Tells callers apart by gRPC's peer strings, "ipv4:10.0.0.5:41234" for example.
+    """Tells callers apart by gRPC's peer strings.
 
     Args:
         advertised_host: what `robot_host` is for everybody; None to find it out per connection.
@@ -48,26 +48,10 @@ class Callers:
         return self._remembered(peer, caller() is not None)
 
     def _of(self, peer: str, known: bool) -> Caller:
-        address = _address(peer)
+        address = ip_of(peer)
         local = address is None or ip_address(address.partition("%")[0]).is_loopback
         host = self._advertised_host or (_LOOPBACK if address is None or local else _our_side(address))
         return Caller(robot_host=host, may_watch=local or known)
-
-
-@lru_cache(maxsize=_REMEMBERED_CONNECTIONS)
-def address_of(peer: str) -> str:
-    """Where a call came from, for people: address and port of a connection, "local socket" for a Unix one."""
-    scheme, _, rest = unquote(peer).partition(":")
-    return rest if scheme in {"ipv4", "ipv6"} else "local socket"
-
-
-def _address(peer: str) -> str | None:
-    """The peer's IP address; None for a Unix socket."""
-    scheme, _, rest = unquote(peer).partition(":")
-    if scheme not in {"ipv4", "ipv6"}:
-        return None
-    host = rest.rpartition(":")[0].strip("[]")
-    return host.removeprefix("::ffff:") if "." in host else host
 
 
 def _our_side(address: str) -> str:

@@ -9,7 +9,7 @@ from google.protobuf.message import Message
 
 from common.errors import DomainError
 from common.rpc import Context
-from gateway.rpc.caller import address_of
+from gateway.rpc.peer import address_of
 from gateway.rpc.tally import Behavior
 from gateway.status.event import ControlAction, ControlResult, News
 from gateway.status.faults.fault import Severity

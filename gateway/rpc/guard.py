@@ -18,9 +18,9 @@ from gateway.access.credential import Principal
 from gateway.access.keyring import Keyring, both
 from gateway.access.lockout import Lockout
 from gateway.access.role import Role
-from gateway.rpc.caller import address_of
 from gateway.rpc.identity import begin, fingerprint_of, token_of
 from gateway.rpc.method_roles import Needed, Open, needed_for
+from gateway.rpc.peer import address_of, host_of
 
 _log = logging.getLogger(__name__)
 
@@ -206,12 +206,6 @@ class Guard(grpc.aio.ServerInterceptor):
             pass
         finally:
             stream.task.cancel()
-
-
-def host_of(peer: str) -> str:
-    """The address of a gRPC peer without its port; "local socket" for a Unix socket."""
-    address = address_of(peer)
-    return address.rpartition(":")[0].strip("[]") or address
 
 
 def _hold_to(needed: Needed, principal: Principal, method: str) -> None:

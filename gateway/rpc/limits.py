@@ -2,17 +2,20 @@
 
 A connection's requests are tokens: it has up to `burst` of them, gets `requests_per_s` new ones, and spends
 one per call. gRPC tells nobody here of connections that come and go, so one counts while it has a stream open
-or has asked lately; the quietest gives way to a new one.
+or has asked lately; the quietest gives way to a new one. One computer may have a part of them only.
 """
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from common.errors import TooMuchError
 from common.reasons import Reason
+from gateway.access.site import site_of
+from gateway.rpc.peer import host_of
 
 QUIET_AFTER_S: Final = 1.0
 """A connection without streams that has not asked for so long gives way when room is needed."""
@@ -35,6 +38,7 @@ class Limits:
     """What a connection may have, and how many there may be."""
 
     connections: int = 256
+    connections_per_address: int = 128
     streams_per_connection: int = 16
     requests_per_s: float = 500.0
     burst: int = 1000
@@ -43,6 +47,7 @@ class Limits:
 
 @dataclass(slots=True)
 class _Connection:
+    site: str
     tokens: float
     at_s: float
     streams: int = 0
@@ -63,6 +68,8 @@ class Admission:
         self._clock = clock
         self._connections: dict[str, _Connection] = {}
         """By peer, the one that asked last at the end."""
+        self._sites: Counter[str] = Counter()
+        """How many of them come from where."""
         self._refusal_at_s = 0.0
         """When the last refusal that waits will leave."""
 
@@ -78,10 +85,7 @@ class Admission:
             TooMuchError: it may not; try again later.
         """
         limits, now_s = self._limits, self._clock()
-        connection = self._connections.pop(peer, None)
-        if connection is None:
-            self._make_room(now_s)
-            connection = _Connection(limits.burst, now_s)
+        connection = self._connections.pop(peer, None) or self._new(peer, now_s)
         self._connections[peer] = connection
         most = self._most_saved(connection, now_s)
         tokens = min(most, connection.tokens + (now_s - connection.at_s) * limits.requests_per_s)
@@ -130,16 +134,32 @@ class Admission:
             return limits.burst
         return max(1.0, min(limits.burst, limits.requests_per_s * _HARDLY_ANYTHING_S))
 
-    def _make_room(self, now_s: float) -> None:
-        if len(self._connections) < self._limits.connections:
-            return
-        for peer, connection in self._connections.items():
-            if connection.streams == 0 and now_s - connection.at_s >= QUIET_AFTER_S:
+    def _new(self, peer: str, now_s: float) -> _Connection:
+        limits, site = self._limits, site_of(host_of(peer))
+        if self._sites[site] >= limits.connections_per_address and not self._put_out(now_s, site):
+            raise TooMuchError(
+                f"this gateway serves {limits.connections_per_address} connections of one address at once, "
+                "and yours are taken; close one, or raise limits.connections_per_address",
+                Reason.TOO_MANY_CONNECTIONS,
+                _SOON_S,
+            )
+        if len(self._connections) >= limits.connections and not self._put_out(now_s):
+            raise TooMuchError(
+                f"this gateway serves {limits.connections} connections at once, and all are taken; "
+                "close one, or raise limits.connections",
+                Reason.TOO_MANY_CONNECTIONS,
+                _SOON_S,
+            )
+        self._sites[site] += 1
+        return _Connection(site, limits.burst, now_s)
+
+    def _put_out(self, now_s: float, site: str | None = None) -> bool:
+        """Forgets the quietest connection, of this site or of all; False when none is quiet enough."""
+        for peer, each in self._connections.items():
+            if site in (None, each.site) and each.streams == 0 and now_s - each.at_s >= QUIET_AFTER_S:
                 del self._connections[peer]
-                return
-        raise TooMuchError(
-            f"this gateway serves {self._limits.connections} connections at once, and all are taken; "
-            "close one, or raise limits.connections",
-            Reason.TOO_MANY_CONNECTIONS,
-            _SOON_S,
-        )
+                self._sites[each.site] -= 1
+                if not self._sites[each.site]:
+                    del self._sites[each.site]
+                return True
+        return False

@@ -16,10 +16,10 @@ from grpc_reflection.v1alpha.reflection import enable_server_reflection
 from common.health import Health
 from common.listen import bind_tcp, bind_unix, bracketed
 from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
-from gateway.rpc.caller import address_of
 from gateway.rpc.guard import Guard
 from gateway.rpc.limiting import LimitInterceptor
 from gateway.rpc.limits import MOST_REQUEST_BYTES, Admission, Limits
+from gateway.rpc.peer import address_of
 from gateway.rpc.requests import Requests, hold_to_rules
 from gateway.rpc.servicer import RobotGateway
 from gateway.rpc.tally import Behavior, StreamBehavior

@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from contextlib import AsyncExitStack
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,45 @@ async def test_streams_beyond_the_share_are_refused(tmp_path: Path) -> None:
                     await asyncio.sleep(0.05)
         again.cancel()
         events.cancel()
+
+
+@asynccontextmanager
+async def detour(address: str, port: int) -> AsyncIterator[int]:
+    """A port whose connections go on to `port`, from another address of this machine."""
+
+    async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            while data := await reader.read(65_536):
+                writer.write(data)
+        finally:
+            writer.close()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        there, back = await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0))
+        await asyncio.gather(carry(reader, back), carry(there, writer))
+
+    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
+        yield server.sockets[0].getsockname()[1]
+
+
+async def test_one_computer_that_takes_all_it_can_get_leaves_room_for_others(tmp_path: Path) -> None:
+    limits = {"connections": 4, "connections_per_address": 2}
+    async with (
+        running_gateway(tmp_path / "p.sock", limits=limits) as operator,
+        detour("127.0.0.2", operator.port) as port,
+        AsyncExitStack() as stack,
+    ):
+        greedy = [await connected(stack, operator) for _ in range(3)]
+        streams = [each.stub.WatchSystemStatus(WatchSystemStatusRequest()) for each in greedy]
+        answers = await asyncio.gather(*(stream.read() for stream in streams), return_exceptions=True)
+        refused = [each for each in answers if isinstance(each, grpc.aio.AioRpcError)]
+        assert [reason_of(each) for each in refused] == [
+            (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.TOO_MANY_CONNECTIONS)
+        ]
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}", options=OWN_CONNECTION) as channel:
+            assert (await Operator(channel, port).status()).gateway_name
+        for stream in streams:
+            stream.cancel()
 
 
 async def test_connections_beyond_the_bound_are_refused_until_one_is_free(tmp_path: Path) -> None:

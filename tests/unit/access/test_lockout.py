@@ -4,7 +4,8 @@ import pytest
 
 from common.errors import TooMuchError
 from common.reasons import Reason
-from gateway.access.lockout import FORGOTTEN_AFTER_S, FREE, LONGEST_WAIT_S, MOST, Lockout, site_of
+from gateway.access.lockout import FORGOTTEN_AFTER_S, FREE, LONGEST_WAIT_S, MOST, Lockout
+from gateway.access.site import site_of
 
 
 class Clock:

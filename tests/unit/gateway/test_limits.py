@@ -89,6 +89,46 @@ def test_a_new_connection_takes_the_place_of_the_quietest(admission: Admission, 
     assert refusal(admission, "b").reason is Reason.TOO_MANY_CONNECTIONS, "b was the quietest"
 
 
+def test_one_address_may_take_its_part_of_the_connections_and_no_more(clock: Clock) -> None:
+    admission = Admission(Limits(connections=4, connections_per_address=2), clock)
+    for peer in ("ipv4:10.0.0.5:1", "ipv4:10.0.0.5:2"):
+        admission.request(peer)
+    error = refusal(admission, "ipv4:10.0.0.5:3")
+    assert error.reason is Reason.TOO_MANY_CONNECTIONS
+    assert "of one address" in str(error)
+    for peer in ("ipv4:10.0.0.6:1", "ipv6:[2001:db8::5]:1"):
+        admission.request(peer)
+    assert "all are taken" in str(refusal(admission, "ipv4:10.0.0.7:1"))
+    clock.now_s += QUIET_AFTER_S
+    for peer in ("ipv4:10.0.0.5:2", "ipv4:10.0.0.6:1"):
+        admission.request(peer)
+    admission.request("ipv4:10.0.0.5:3")
+    assert "of one address" in str(refusal(admission, "ipv4:10.0.0.5:1")), (
+        "its quietest gave way, not another's"
+    )
+    admission.request("ipv4:10.0.0.7:1")
+    assert admission.connection_count == 4
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.floats(0, 3)), max_size=60))
+def test_no_address_ever_has_more_than_its_part(asked: list[tuple[int, int, float]]) -> None:
+    clock = Clock()
+    admission = Admission(Limits(connections=6, connections_per_address=3), clock)
+    served: dict[str, float] = {}
+    for host, port, pause_s in asked:
+        clock.now_s += pause_s
+        peer = f"ipv4:10.0.0.{host}:{port}"
+        try:
+            admission.request(peer)
+        except TooMuchError:
+            busy = [each for each, at_s in served.items() if clock.now_s - at_s < QUIET_AFTER_S]
+            same = [each for each in busy if each.rpartition(":")[0] == peer.rpartition(":")[0]]
+            assert len(same) >= 3 or len(busy) >= 6, "refused only where its part, or everything, is taken"
+            continue
+        served[peer] = clock.now_s
+        assert admission.connection_count <= 6
+
+
 def test_who_has_a_stream_open_is_never_put_out(admission: Admission, clock: Clock) -> None:
     for peer in ("a", "b", "c"):
         admission.request(peer)
