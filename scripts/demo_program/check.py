@@ -1,17 +1,16 @@
 """The main job, once, from status to video and back: one line per step with the measured time."""
 
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
 from common.errors import UserError
+from common.free import udp_port_is_free
 from console.client import GatewayClient, PreviewProfile, PreviewState, PreviewStatus, SystemStatus
 from console.client.results import Freshness
 from console.receiver.address import StreamAddress
 from console.receiver.receiver import Receiver
-from demo_program.free import is_free
 from demo_program.ground import Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
@@ -171,13 +170,13 @@ def _video(preview: PreviewStatus) -> str:
 
 def _preview_off(ground: Ground, programs: Programs, robot: GatewayClient) -> str:
     # Against the case that the port was never bound: then being free at the end would prove nothing.
-    if is_free(socket.SOCK_DGRAM, ground.srt_port):
+    if udp_port_is_free(ground.srt_port):
         raise UserError(f"UDP port {ground.srt_port} is not bound although the preview runs")
     change = robot.disable_preview(settle_within_s=_PREVIEW_WITHIN_S)
     if change.preview.state is not PreviewState.DISABLED:
         raise UserError(f"the preview is {change.preview.state.value}: {change.message}")
     programs.wait_until(
-        lambda: is_free(socket.SOCK_DGRAM, ground.srt_port) or None,
+        lambda: udp_port_is_free(ground.srt_port) or None,
         _FREE_WITHIN_S,
         f"UDP port {ground.srt_port} is free again",
     )

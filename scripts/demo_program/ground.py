@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import UserError
-from demo_program.free import free_domain, free_port, is_free
+from common.free import free_domain, free_port, port_is_free
 from demo_program.sources import Source
 
 DEFAULT_GRPC_PORT: Final = 50051
@@ -112,7 +112,7 @@ def _port(wishes: Wishes, what: str, given: int | None, usual: int, kind: socket
     if given is None and wishes.any_free_port:
         return free_port(kind)
     port = given or usual
-    if is_free(kind, port):
+    if port_is_free(kind, port):
         return port
     protocol, option = ("TCP", "--grpc-port") if kind is socket.SOCK_STREAM else ("UDP", "--srt-port")
     raise UserError(

@@ -9,6 +9,7 @@ from typing import Any
 
 import grpc
 
+from common.free import free_tcp_port
 from gateway.access.authority import Pair
 from gateway.access.bundle import Bundle
 from gateway.access.credential import Credential, Kind
@@ -17,7 +18,6 @@ from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
 from gateway.app import serve
 from gateway.config import GatewaySettings
-from tests.support.ports import free_tcp_port
 
 HOSTS = ("localhost", "127.0.0.1")
 UP_WITHIN_S = 10.0

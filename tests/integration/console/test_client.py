@@ -18,6 +18,7 @@ import psutil
 import pytest
 
 from common.errors import ExitCode
+from common.free import free_tcp_port
 from console.client import (
     Backoff,
     Cancelled,
@@ -38,7 +39,6 @@ from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import Relay, black_hole
 from tests.support.clients import FACES, Blocking, Face
 from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving
-from tests.support.ports import free_tcp_port
 from tests.support.waiting import wait_until
 
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "the robot is starting")

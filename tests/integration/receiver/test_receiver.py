@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from common.free import free_udp_port
 from console.receiver.address import StreamAddress
 from console.receiver.errors import (
     NoPictureError,
@@ -14,7 +15,6 @@ from console.receiver.errors import (
     UndecodableError,
 )
 from console.receiver.receiver import Receiver, Reconnect
-from tests.support.ports import free_udp_port
 from tests.support.streams import SrtSender, encode
 from tests.support.waiting import wait_until
 

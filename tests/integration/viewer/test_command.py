@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from common.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.judges import decoded_pictures
-from tests.support.ports import free_tcp_port
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl
 from tests.support.robotctl_docs import documented, holds
 from tests.support.video_ground import VideoGround, video_ground

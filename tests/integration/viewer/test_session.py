@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from common.free import free_udp_port
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.frame import PixelFormat
@@ -15,7 +16,6 @@ from console.viewer.session import VideoSession
 from console.viewer.state import Phase
 from tests.integration.viewer.conftest import following
 from tests.support.judges import decoded_pictures
-from tests.support.ports import free_udp_port
 from tests.support.streams import SrtSender, encode
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from bench.viewer import extra_latency_ms, on_screen
+from common.free import free_tcp_port
 from console.receiver.recording import Recording
 from console.viewer.account import Bookkeeper
 from console.viewer.geometry import Box
 from console.viewer.state import Phase
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.ports import free_tcp_port
 from tests.support.qt import KEPT_IN, application, let_pass, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
