@@ -175,7 +175,7 @@ async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying, do
         now = knowledge.snapshot()
         knowledge.observe(now)
         staying.look()
-        await link.news.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
+        await link.changes.wait_until(partial(_differs, link, now.preview), OBSERVE_EVERY_S)
 
 
 async def _tell_health(link: PreviewLink, health: Health) -> None:
@@ -183,7 +183,7 @@ async def _tell_health(link: PreviewLink, health: Health) -> None:
     while True:
         seen = link.view
         health.set_serving(PREVIEW_HEALTH, serving=seen.service_reachable)
-        await link.news.wait_until(partial(_differs, link, seen), OBSERVE_EVERY_S)
+        await link.changes.wait_until(partial(_differs, link, seen), OBSERVE_EVERY_S)
 
 
 def _differs(link: PreviewLink, seen: PreviewView) -> bool:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, NoReturn
 import grpc
 
 from common import request_id
-from gateway.preview_link.news import News
+from common.broadcast import Broadcast
 from gateway.preview_link.reconciler import Reconciler
 from gateway.preview_link.wire import UnknownSpeechError, from_wire, to_wire
 from gateway.preview_link.wish import Wish
@@ -70,7 +70,7 @@ class PreviewLink:
         self._reconciler = reconciler
         self._clock = clock
         self._failures_in_a_row = 0
-        self.news = News()
+        self.changes = Broadcast()
 
     @property
     def view(self) -> PreviewView:
@@ -88,7 +88,7 @@ class PreviewLink:
         _log.info(
             "wish %d: %s", wish.revision, f"on, {wish.profile.value}" if wish.profile and enabled else "off"
         )
-        self.news.spread()
+        self.changes.wake_all()
         return wish
 
     def settled(self, wish: Wish) -> bool:
@@ -97,7 +97,7 @@ class PreviewLink:
 
     async def wait_until_settled(self, wish: Wish, timeout_s: float) -> None:
         """Waits for that, `timeout_s` at most."""
-        await self.news.wait_until(lambda: self.settled(wish), timeout_s)
+        await self.changes.wait_until(lambda: self.settled(wish), timeout_s)
 
     async def run(self) -> NoReturn:
         """Until cancelled: a session until it breaks, a pause that grows and that a new wish cuts short."""
@@ -108,13 +108,13 @@ class PreviewLink:
                 _log.warning("preview service lost: %s", trouble.in_full)
             elif self._failures_in_a_row == 1:
                 _log.warning("preview service not reached at %s: %s", self._socket, trouble.in_full)
-            self.news.spread()
+            self.changes.wake_all()
             await self._pause(self._failures_in_a_row)
 
     async def _pause(self, failures: int) -> None:
         revision = self._reconciler.wish.revision
         pause_s = min(LONGEST_PAUSE_S, FIRST_PAUSE_S * 2 ** min(failures - 1, 10))
-        await self.news.wait_until(lambda: self._reconciler.wish.revision != revision, pause_s)
+        await self.changes.wait_until(lambda: self._reconciler.wish.revision != revision, pause_s)
 
     async def _session(self) -> _Trouble:
         """One connection, until it breaks; returns what broke it."""
@@ -138,7 +138,7 @@ class PreviewLink:
     async def _keep_applied(self, stub: "PreviewServiceAsyncStub") -> None:
         rounds = 0
         while True:
-            await self.news.wait_until(lambda: self._reconciler.pending() is not None)
+            await self.changes.wait_until(lambda: self._reconciler.pending() is not None)
             wish = self._reconciler.pending()
             if wish is None:
                 continue
@@ -157,7 +157,7 @@ class PreviewLink:
                 raise
             _log.error("preview service refused revision %d: %s", wish.revision, _in_full(error))
             self._reconciler.refused(wish, error.details() or error.code().name)
-            self.news.spread()
+            self.changes.wake_all()
             return
         self._take(reply.actual)
 
@@ -169,7 +169,7 @@ class PreviewLink:
                 self._failures_in_a_row,
             )
             self._failures_in_a_row = 0
-        self.news.spread()
+        self.changes.wake_all()
 
 
 async def _next_word(stream: Any) -> object | None:

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 from functools import partial
 from typing import Final
 
-from gateway.preview_link.news import News
+from common.broadcast import Broadcast
 from gateway.rpc.mapping.events import event_message, gap_message, position_message
 from gateway.status.event import Event
 from gateway.status.events import EventLog, Gap, Position
@@ -29,12 +29,12 @@ class EventStreams:
 
     def __init__(self, log: EventLog) -> None:
         self._log = log
-        self._news = News()
+        self._appended = Broadcast()
         self._ready: dict[int, bytes] = {}
         """Serialised events by their sequence."""
         self.gaps = 0
         """How often a subscriber was told that events are missing."""
-        log.on_event = self._news.spread
+        log.on_event = self._appended.wake_all
 
     async def events(self, after: Position | None, least: Severity) -> AsyncIterator[bytes]:
         """Serialised answers, until the caller leaves.
@@ -63,7 +63,7 @@ class EventStreams:
             if loop.time() - told_s >= SIGN_OF_LIFE_S:
                 told_s = loop.time()
                 yield _caught_up(here)
-            await self._news.wait_until(
+            await self._appended.wait_until(
                 partial(self._goes_on_after, here),
                 max(0.0, told_s + SIGN_OF_LIFE_S - loop.time()),
             )

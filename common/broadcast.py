@@ -4,13 +4,13 @@ import asyncio
 from collections.abc import Callable
 
 
-class News:
+class Broadcast:
     """Belongs to one event loop."""
 
     def __init__(self) -> None:
         self._event = asyncio.Event()
 
-    def spread(self) -> None:
+    def wake_all(self) -> None:
         """Something has changed."""
         self._event.set()
         self._event = asyncio.Event()
