@@ -14,6 +14,7 @@ from preview.encoder_note import EncoderNote
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.probe import Prober
 from preview.manager import Manager
+from preview.planner import Planner
 from preview.rpc.servicer import SERVICE, PreviewServicer
 from preview.selection import Selection
 from preview.values import Target
@@ -34,7 +35,8 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     selection = Selection(allowed(settings), settings.encoders.forgive_after_s)
     note.tell(selection, crash=CrashReport(settings.runtime_dir).begin())
     prober = new_prober(settings)
-    manager = Manager(settings, prober, selection, note, on_hung=lambda name, why: _end_hung(note, name, why))
+    planner = Planner(settings, prober, selection)
+    manager = Manager(settings, planner, note, on_hung=lambda name, why: _end_hung(note, name, why))
     server = rpc.new_server()
     servicer = PreviewServicer(manager, prober, preference(settings))
     servicer.register(server)

@@ -19,17 +19,15 @@ from dataclasses import replace
 from typing import Final
 
 from common.errors import UserError
-from preview import sources
 from preview.adaptive import BitrateController
 from preview.config import PreviewSettings
+from preview.drawing import keep_drawing
 from preview.encoder_note import EncoderNote
-from preview.encoders.probe import Prober
 from preview.lifecycle import Event, Lifecycle, State
-from preview.pipeline.crossing import in_thread
 from preview.pipeline.faults import Blame, Fault
 from preview.pipeline.runner import HungError, Runner
-from preview.plan import ListenerPlan, Plan
-from preview.selection import Selection
+from preview.plan import Plan
+from preview.planner import Planner
 from preview.status import Status, StreamStatus
 from preview.values import EncoderChoice, Wish
 
@@ -37,10 +35,8 @@ _log = logging.getLogger(__name__)
 
 _STEADY_AFTER_S: Final = 15.0
 """A pipeline that ran this long has left its last fault behind."""
-_DRAW_DEADLINE_S: Final = 0.3
 _PATIENCE_WITH_FAULTED_S: Final = 0.3
 """How long the next pipeline waits for the encoder of the last one; it may go on stopping meanwhile."""
-DRAWING: Final = "last-fault.dot"
 
 
 class Manager:
@@ -48,8 +44,7 @@ class Manager:
 
     Args:
         settings: the service's.
-        prober: knows which encoders work.
-        selection: knows which of them failed since.
+        planner: decides what each pipeline is made of.
         note: tells the next process, should this one die of an encoder.
         on_hung: called when a driver hangs so that only the end of the process frees it; told the name of
             the encoder to pass over next time (empty: not the encoder's doing) and why.
@@ -58,15 +53,12 @@ class Manager:
     def __init__(
         self,
         settings: PreviewSettings,
-        prober: Prober,
-        selection: Selection,
+        planner: Planner,
         note: EncoderNote,
         on_hung: Callable[[str, str], None],
     ) -> None:
         self._settings = settings
-        self._targets = settings.profiles.targets
-        self._prober = prober
-        self._selection = selection
+        self._planner = planner
         self._note = note
         self._on_hung = on_hung
         self._instance_id = uuid.uuid4().hex
@@ -203,8 +195,7 @@ class Manager:
         self._last_error = fault.sentence
         self._move(Event.FAILURE)
         if fault.blame is Blame.ENCODER and self._runner:
-            name = self._runner.plan.encoder.name
-            self._selection.pass_over(name, fault.sentence, time.monotonic())
+            self._planner.pass_over(self._runner.plan.encoder.name, fault.sentence)
             self._passed_over = True
 
     def _retry(self) -> None:
@@ -268,8 +259,8 @@ class Manager:
             await self._tear_down()
         if self._passed_over:
             self._passed_over = False
-            await self._try_encoders()
-            if self._selection.has_another(self._prober.verdicts):
+            await self._planner.try_encoders()
+            if self._planner.has_another:
                 self._lifecycle.note_fallback()
                 self._retry_now = True
         if not self._wish.enabled:
@@ -287,10 +278,12 @@ class Manager:
         return True
 
     async def _start(self) -> None:
+        await self._planner.try_encoders()
+        if self._lifecycle.state is not State.STARTING:
+            return
         try:
-            plan = await self._plan()
-            if plan is None:
-                return
+            plan = self._planner.plan(self._wish)
+            self._tell_software(plan.choice)
             runner = self._runner = self._new_runner(plan)
         except UserError as error:
             self._failed(Fault(Blame.OTHER, str(error)))
@@ -312,50 +305,9 @@ class Manager:
             else None,
         )
 
-    async def _plan(self) -> Plan | None:
-        """Decides what to build; None when it is not wanted any more.
-
-        Raises:
-            UserError: the source can't be used, or no encoder works.
-        """
-        await self._try_encoders()
-        if self._lifecycle.state is not State.STARTING:
-            return None
-        verdicts = self._prober.verdicts
-        found = self._selection.choose(verdicts, time.monotonic())
-        if found is None:
-            raise UserError(
-                self._selection.why_none(verdicts),
-                "'robot-preview encoders' lists what works: add one to encoders.order",
-            )
-        encoder, choice = found
-        self._tell_software(choice)
-        fastest = max(target.fps for target in self._targets.values())
-        return Plan(
-            source=sources.plan(self._settings.source, fastest),
-            encoder=encoder,
-            choice=choice,
-            profile=self._wish.profile,
-            target=self._targets[self._wish.profile],
-            highest_kbps=max(target.bitrate_kbps for target in self._targets.values()),
-            listener=self._listener(),
-            key_frame_interval_s=self._settings.encoders.key_frame_interval_s,
-        )
-
-    async def _try_encoders(self) -> None:
-        """Waits until one is known that works and has not failed, or all are known."""
-        for encoder in self._selection.order:
-            await self._prober.verdict(encoder)
-            if self._selection.has_another(self._prober.verdicts):
-                return
-
-    def _listener(self) -> ListenerPlan:
-        srt = self._settings.srt
-        return ListenerPlan(srt.bind, srt.port, srt.latency_ms, srt.key_length_bytes, self._wish.passphrase)
-
     def _tell_software(self, choice: EncoderChoice) -> None:
         """A robot that is meant to encode in hardware and doesn't has a fault, even though pictures flow."""
-        if self._selection.order[0].hardware and not choice.hardware:
+        if self._planner.wants_hardware and not choice.hardware:
             sentence = (
                 f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
             )
@@ -364,9 +316,8 @@ class Manager:
 
     async def _switch(self, runner: Runner) -> None:
         profile = self._wish.profile
-        target = self._targets[profile]
         _log.info("profile %s -> %s", runner.plan.profile.value, profile.value)
-        await runner.switch(profile, target)
+        await runner.switch(profile, self._settings.profiles.targets[profile])
 
     async def _tear_down(self) -> None:
         """Stops the pipeline. After a fault it does not wait long for the encoder: a viewer waits, too."""
@@ -375,7 +326,7 @@ class Manager:
             return
         faulted = self._lifecycle.state is State.FAULTED
         if faulted:
-            await self._keep_drawing(runner)
+            await keep_drawing(runner, self._settings.runtime_dir)
         try:
             rest = await runner.stop()
         except HungError as error:
@@ -396,19 +347,6 @@ class Manager:
         self._stopping.clear()
         if hung:
             self._on_hung(hung[0], "it hung when it was stopped")
-
-    async def _keep_drawing(self, runner: Runner) -> None:
-        """Keeps the pipeline that failed as a drawing, for whoever looks for the reason."""
-        path = self._settings.runtime_dir / DRAWING
-
-        def draw() -> None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(runner.draw(), encoding="utf-8")
-
-        try:
-            await in_thread(draw, _DRAW_DEADLINE_S)
-        except (TimeoutError, OSError) as error:
-            _log.warning("no drawing of the failed pipeline in %s: %s", path, error)
 
 
 def _is_over(rest: "asyncio.Task[bool]") -> bool:
