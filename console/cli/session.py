@@ -10,8 +10,8 @@ from typing import Any
 from rich.console import Console
 
 from common.errors import ExitCode, UserError
-from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError
-from console.robots import Robot, choose, read_credentials
+from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
+from console.robots import Robot, choose, read_book, read_credentials
 
 # Where nobody looks at columns, lines are left long rather than broken.
 _WIDTH_OF_A_FILE = 160
@@ -25,11 +25,13 @@ class Session:
         robot: how the robot is reached.
         as_json: print JSON instead of tables.
         out: standard output; without colours where it is no terminal or NO_COLOR is set.
+        name: as the file of known robots calls it; None when only an address was given.
     """
 
     robot: Robot
     as_json: bool
     out: Console
+    name: str | None = None
 
     @property
     def target(self) -> str:
@@ -45,12 +47,15 @@ class Session:
         return AsyncGatewayClient(self.target, credentials=self.credentials())
 
     def credentials(self) -> Credentials:
-        """What proves to the robot who asks.
+        """What proves to the robot who asks, as it is stored at this moment.
 
         Raises:
-            UserError: a file is missing, or others may read a secret.
+            UserError: a file is missing, others may read a secret, or it would be sent in the clear.
         """
-        return read_credentials(self.robot)
+        shown = read_credentials(read_book().find(self.name) if self.name else self.robot)
+        # A window would learn that these won't do only in a thread of its own, too late for one line.
+        shown.channel_credentials(parse_target(self.target))
+        return shown
 
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
         """One JSON document, out at once."""
@@ -63,7 +68,8 @@ def open_session(target: str | None, robot: str | None, as_json: bool) -> Sessio
     Raises:
         UserError: no robot has this name, or the file of known robots is wrong.
     """
-    return Session(choose(target, robot, os.environ).robot, as_json, standard_output())
+    choice = choose(target, robot, os.environ)
+    return Session(choice.robot, as_json, standard_output(), choice.name)
 
 
 def standard_output() -> Console:

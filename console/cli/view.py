@@ -10,8 +10,10 @@ import typer
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
 from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.qt import needing_qt
 from console.cli.stopping import until_stopped
-from console.client import Credentials, parse_target
+from console.client import parse_target
+from console.monitor.renewed import Login
 from console.receiver.recording import Recording
 from console.viewer.account import Account
 from console.viewer.headless import watch_headless
@@ -65,7 +67,7 @@ def view(
     show = None if headless else _window()
     recording = Recording(record) if record else None
     if show:
-        account = show(address, recording, session.credentials())
+        account = show(address, recording, session.credentials)
     else:
         with until_stopped(_nothing) as stopped:
             account = watch_headless(
@@ -74,7 +76,7 @@ def view(
                 patience_s=patience_s,
                 recording=recording,
                 stop=stopped.event,
-                credentials=session.credentials(),
+                login=session.credentials,
             )
     if session.as_json:
         session.print_json(json_form(account))
@@ -95,14 +97,7 @@ def _need_gstreamer() -> None:
         raise UserError(f"video needs GStreamer: {error.what}", _GSTREAMER) from error
 
 
-def _window() -> Callable[[str, Recording | None, Credentials], Account]:
-    try:
+def _window() -> Callable[[str, Recording | None, Login], Account]:
+    with needing_qt("--headless works without"):
         from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
-    except ImportError as error:
-        if not (error.name or str(error)).startswith(("PySide6", "shiboken6", "lib")):
-            raise
-        raise UserError(
-            f"the window needs Qt, which can't be loaded ({error}); --headless works without",
-            "Type, in a clone of the project: scripts/install-console",
-        ) from error
     return run_view

@@ -21,7 +21,7 @@ _MS_PER_S = 1000
 
 
 class Robot(Protocol):
-    """What the monitor needs of a client; `AsyncGatewayClient` is one."""
+    """What the monitor needs of a client; `console.monitor.renewed.RenewedClient` is one."""
 
     async def overlay(self) -> OverlaySnapshot:
         """Status, detections and the newest events."""
@@ -38,6 +38,9 @@ class Robot(Protocol):
 
     async def disable_preview(self, *, settle_within_s: float = ...) -> PreviewChange:
         """Turns it off."""
+
+    async def renew(self) -> bool:
+        """Takes over a login that was stored meanwhile. Whether there was one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from enum import Enum
 
 from console.cli.rows import Tone
 from console.cli.words import age
-from console.client import DeadlineExceeded, GatewayError, Unreachable
+from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
 
 _MS_PER_S = 1000
 
@@ -73,7 +73,7 @@ def link_words(link: Link, target: str, now_s: float) -> LinkWords:
         case Phase.LOST:
             trouble = str(link.trouble or f"{target} does not answer")
             banner = trouble[:1].upper() + trouble[1:]
-            retry = f"No answer for {lasting}. {_retry(link, now_s)}"
+            retry = f"{_lack(link.trouble)} for {lasting}. {_retry(link, now_s)}"
             return LinkWords(_trouble_mark(link.trouble), Tone.BAD, f"for {lasting}", banner, retry)
 
 
@@ -84,7 +84,14 @@ def _trouble_mark(trouble: GatewayError | None) -> str:
     return "no answer" if trouble is None else trouble.kind.replace("_", " ")
 
 
+def _lack(trouble: GatewayError | None) -> str:
+    return "No access" if isinstance(trouble, NotAllowed | NotTrusted) else "No answer"
+
+
 def _retry(link: Link, now_s: float) -> str:
     if link.next_try_s is None:
         return f"Attempt {link.attempts + 1} is under way."
-    return f"Attempt {link.attempts + 1} in {max(1, math.ceil(link.next_try_s - now_s))} s."
+    when = f"in {max(1, math.ceil(link.next_try_s - now_s))} s"
+    if isinstance(link.trouble, NotAllowed | NotTrusted):
+        when = f"{when}, or as soon as another login is stored"
+    return f"Attempt {link.attempts + 1} {when}."

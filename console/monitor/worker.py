@@ -8,32 +8,34 @@ from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-from console.client import (
-    AsyncGatewayClient,
-    Backoff,
-    ClientOptions,
-    Credentials,
-    GatewayFailed,
-    parse_target,
-)
+from console.client import Backoff, ClientOptions, Credentials, GatewayFailed, parse_target
 from console.monitor.conversation import Conversation
 from console.monitor.feed import PollingFeed, Robot
 from console.monitor.link import Link, Phase
 from console.monitor.newest import Newest
+from console.monitor.renewed import Login, RenewedClient
 from console.monitor.state import MonitorState, Wish
 
 EVERY_S: Final = 0.2
 """From one look to the next: 5 a second."""
 _RETRY: Final = Backoff(first_s=0.5, factor=2.0, longest_s=2.0)
+# A refused login becomes good again by the robot's keeper or its clock, not by being shown often.
+_REFUSED: Final = Backoff(first_s=5.0, factor=2.0, longest_s=60.0)
 # One attempt is short here: the worker goes on trying by itself, and says so.
 _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_after_s=0.3))
 
 Connect: TypeAlias = Callable[[str], AbstractAsyncContextManager[Robot]]
 
 
-def connecting(credentials: Credentials | None = None) -> Connect:
-    """Makes clients that show these credentials."""
-    return lambda target: AsyncGatewayClient(target, _OPTIONS, credentials)
+def connecting(login: Login | None = None) -> Connect:
+    """Makes clients that show what is stored for the robot; by default nothing.
+
+    Raises:
+        UserError: what is stored can't be used.
+    """
+    login = login or Credentials
+    shown = login()
+    return lambda target: RenewedClient(target, _OPTIONS, login, shown)
 
 
 class Worker:
@@ -44,6 +46,7 @@ class Worker:
         on_news: called in the worker's thread whenever `newest()` has changed; must only hand over.
         connect: makes the client, inside the worker's loop; by default one without credentials.
         retry: the pauses between attempts while the robot does not answer; they never end by themselves.
+        refused: the pauses between attempts with a login that the robot refuses.
 
     Raises:
         UserError: the target is not an address.
@@ -55,12 +58,13 @@ class Worker:
         on_news: Callable[[], None],
         connect: Connect | None = None,
         retry: Backoff = _RETRY,
+        refused: Backoff = _REFUSED,
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(phase=Phase.CONNECTING, since_s=time.monotonic()))
         self._newest = Newest(first, on_news)
         self._connect = connect or connecting()
-        self._retry = retry
+        self._retry, self._refused = retry, refused
         self._thread = threading.Thread(target=self._run, name="gateway-worker", daemon=True)
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
@@ -120,7 +124,8 @@ class Worker:
 
     async def _work(self) -> None:
         async with self._connect(self.target) as robot:
-            said = Conversation(robot, PollingFeed(robot, EVERY_S), self._newest, self._retry)
+            feed = PollingFeed(robot, EVERY_S)
+            said = Conversation(robot, feed, self._newest, self._retry, self._refused)
             self._conversation = said
             if self.newest().request:
                 said.pass_on_wish()

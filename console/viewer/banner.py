@@ -5,6 +5,7 @@ from typing import Final
 
 from console.cli.rows import Tone
 from console.viewer.state import Phase, ViewState
+from console.viewer.words import joined_sentences
 
 _TITLES: Final = {
     Phase.CONNECTING: ("Connecting", Tone.QUIET),
@@ -12,6 +13,7 @@ _TITLES: Final = {
     Phase.OFF: ("Preview is off", Tone.QUIET),
     Phase.FAULTED: ("Preview faulted", Tone.BAD),
     Phase.UNREACHABLE: ("Robot unreachable", Tone.BAD),
+    Phase.NO_ACCESS: ("No access to the robot", Tone.BAD),
     Phase.BLOCKED: ("This computer can't show the stream", Tone.BAD),
 }
 
@@ -39,11 +41,11 @@ def banner(state: ViewState) -> Banner | None:
     if state.still_s is not None:
         frozen = f"rozen for {_seconds(state.still_s)}"
         title = f"F{frozen}" if state.phase is Phase.FROZEN else f"{title} - picture f{frozen}"
-    detail = ". ".join(part.strip().rstrip(".") for part in (state.reason, state.remedy) if part.strip())
+    detail = joined_sentences(state.reason, state.remedy)
     if state.redials and state.phase in (Phase.CONNECTING, Phase.FROZEN):
         calls = f"called again {state.redials} times" if state.redials > 1 else "called again once"
-        detail = f"{detail} ({calls})" if detail else calls
-    return Banner(title, detail[:1].upper() + detail[1:], tone)
+        detail = f"{detail} ({calls})" if detail else calls.capitalize()
+    return Banner(title, detail, tone)
 
 
 def _seconds(duration_s: float) -> str:

@@ -5,8 +5,9 @@ import time
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from console.client import Credentials, PreviewState, PreviewStatus
+from console.client import PreviewState, PreviewStatus
 from console.monitor.link import Phase as LinkPhase
+from console.monitor.renewed import Login
 from console.monitor.state import MonitorState
 from console.monitor.video import pass_on
 from console.monitor.worker import Worker, connecting
@@ -26,7 +27,7 @@ def watch_headless(
     patience_s: float,
     recording: Recording | None,
     stop: threading.Event,
-    credentials: Credentials | None = None,
+    login: Login | None = None,
 ) -> Account:
     """Watches until there were enough pictures.
 
@@ -36,7 +37,7 @@ def watch_headless(
         patience_s: how long no picture may come before it gives up.
         recording: keeps the encoded stream, too.
         stop: ends it early.
-        credentials: what proves to the gateway who asks.
+        login: what proves to the gateway who asks, as it is stored then.
 
     Raises:
         GatewayError: the gateway was not reached at all.
@@ -45,7 +46,7 @@ def watch_headless(
     """
     books = Bookkeeper()
     session = VideoSession(pixels=PixelFormat.I420, on_picture=books.note, recording=recording)
-    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(credentials))
+    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(login))
     try:
         session.start()
         worker.start()

@@ -5,7 +5,7 @@ from enum import Enum
 from typing import Final
 
 from common.errors import UserError
-from console.client import GatewayError, PreviewState, PreviewStatus
+from console.client import GatewayError, NotAllowed, NotTrusted, PreviewState, PreviewStatus
 
 STILL_AFTER_S: Final = 0.4
 """A picture older than this is a still one. Pictures come every 67 ms at the slowest profile."""
@@ -25,6 +25,8 @@ class Phase(Enum):
     """The robot says that its preview does not work, and why. It tries again by itself."""
     UNREACHABLE = "unreachable"
     """Neither the gateway nor the stream is heard."""
+    NO_ACCESS = "no access"
+    """The gateway refuses this login, or can't prove that it is the robot's; and there is no stream."""
     BLOCKED = "blocked"
     """This computer can't show the stream: wrong passphrase, unknown codec, something not installed."""
 
@@ -81,7 +83,8 @@ def _judged(facts: Facts, still_s: float | None) -> tuple[Phase, str, str]:
     if still_s is not None and still_s <= STILL_AFTER_S:
         return Phase.LIVE, *_words(facts.gateway_trouble)
     if facts.gateway_trouble:
-        return Phase.UNREACHABLE, *_words(facts.gateway_trouble)
+        refused = isinstance(facts.gateway_trouble, NotAllowed | NotTrusted)
+        return Phase.NO_ACCESS if refused else Phase.UNREACHABLE, *_words(facts.gateway_trouble)
     if facts.preview and not _wanted(facts.preview):
         return Phase.OFF, "", "Press P to switch it on"
     if facts.preview and facts.preview.state is PreviewState.FAULTED:

@@ -3,6 +3,7 @@
 from console.cli.words import joined, plural
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
+from console.viewer.state import Phase, ViewState
 
 _MIB = 1 << 20
 
@@ -15,6 +16,17 @@ def figures_line(newest: Frame | None, fps: float, redials: int) -> str:
     return joined(
         f"{newest.width}x{newest.height} {newest.codec} by {newest.decoder}", f"{fps:.0f} fps", again
     )
+
+
+def beside_the_picture(state: ViewState) -> str:
+    """What is wrong although pictures come; where none do, it is written over the picture."""
+    return joined_sentences(state.reason, state.remedy) if state.phase is Phase.LIVE else ""
+
+
+def joined_sentences(*sentences: str) -> str:
+    """One after the other; the last one ends without a full stop."""
+    text = ". ".join(part.strip().rstrip(".") for part in sentences if part.strip())
+    return text[:1].upper() + text[1:]
 
 
 def recording_line(recording: Recording | None) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from console.client import Credentials
+from console.monitor.renewed import Login
 from console.monitor.video import overlay_of, pass_on
 from console.monitor.worker import Worker, connecting
 from console.viewer.session import VideoSession
@@ -17,22 +17,22 @@ _HANG_UP_WITHIN_S = 0.8
 """Each of the two that work in threads of their own: all is over in less than 2 s."""
 
 
-def run_monitor(target: str, credentials: Credentials | None = None) -> None:
+def run_monitor(target: str, login: Login | None = None) -> None:
     """Shows the window until it is closed.
 
     Args:
         target: the robot's gateway.
-        credentials: what proves to it who asks.
+        login: what proves to it who asks, as it is stored then.
 
     Raises:
-        UserError: the target is no address, or there is no display.
+        UserError: the target is no address, the login can't be used, or there is no display.
     """
-    with application("Robot monitor") as app, monitor(target, credentials):
+    with application("Robot monitor") as app, monitor(target, login):
         app.exec()
 
 
 @contextmanager
-def monitor(target: str, credentials: Credentials | None = None) -> Iterator[MonitorWindow]:
+def monitor(target: str, login: Login | None = None) -> Iterator[MonitorWindow]:
     """The window and all that works behind it; at the end of the block everything has hung up."""
     news, session = News(), VideoSession()
 
@@ -40,7 +40,7 @@ def monitor(target: str, credentials: Credentials | None = None) -> Iterator[Mon
         pass_on(worker.newest(), session)
         news.tell()
 
-    worker = Worker(target, on_news, connecting(credentials))
+    worker = Worker(target, on_news, connecting(login))
     video = VideoView(session, lambda: overlay_of(worker.newest()))
     window = MonitorWindow(worker, news, video, Remembered())
     try:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from console.client import Credentials
+from console.monitor.renewed import Login
 from console.monitor.video import overlay_of, pass_on
 from console.monitor.worker import Worker, connecting
 from console.receiver.frame import Frame
@@ -28,25 +28,25 @@ class Viewing:
     worker: Worker
 
 
-def run_view(target: str, recording: Recording | None, credentials: Credentials | None = None) -> Account:
+def run_view(target: str, recording: Recording | None, login: Login | None = None) -> Account:
     """Shows the window until it is closed; returns what was seen.
 
     Raises:
-        UserError: the target is no address, or there is no display.
+        UserError: the target is no address, the login can't be used, or there is no display.
     """
     books = Bookkeeper()
-    with application("Robot view") as app, viewing(target, recording, books, credentials) as now:
+    with application("Robot view") as app, viewing(target, recording, books, login) as now:
         app.exec()
     return books.account(now.session.figures().redials, recording)
 
 
 @contextmanager
 def viewing(
-    target: str, recording: Recording | None, books: Bookkeeper, credentials: Credentials | None = None
+    target: str, recording: Recording | None, books: Bookkeeper, login: Login | None = None
 ) -> Iterator[Viewing]:
     """At the end of the block everything has hung up."""
     session = VideoSession(recording=recording)
-    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(credentials))
+    worker = Worker(target, lambda: pass_on(worker.newest(), session), connecting(login))
     video = VideoView(session, lambda: overlay_of(worker.newest()))
 
     def on_picture(frame: Frame) -> None:

@@ -10,7 +10,7 @@ from console.monitor.preview_controls import controls
 from console.monitor.worker import Worker
 from console.receiver.recording import Recording
 from console.viewer.session import VideoSession
-from console.viewer.words import figures_line, recording_line
+from console.viewer.words import beside_the_picture, figures_line, recording_line
 from console.window.labels import ElidedLabel, set_text, word_label
 from console.window.look import DimLabel
 from console.window.video_view import VideoView
@@ -85,7 +85,8 @@ class ViewWindow(QWidget):
         set_text(self.figures, figures_line(self._session.latest(), fps, self._session.figures().redials))
         state = self._worker.newest()
         notes = [note.text for note in controls(state, None, now_s).notes]
-        set_text(self.said, "   ".join(filter(None, (recording_line(self._recording), *notes))))
+        said = (recording_line(self._recording), *notes, beside_the_picture(self._session.state()))
+        set_text(self.said, "   ".join(filter(None, said)))
         name = state.snapshot.status.gateway_name if state.snapshot else ""
         self.setWindowTitle(f"{name} {self._worker.target}".strip())
 

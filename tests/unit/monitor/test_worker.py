@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import replace
@@ -17,6 +18,7 @@ from console.client import (
     EventPosition,
     FaultSeverity,
     GatewayError,
+    NotAllowed,
     Outage,
     OverlaySnapshot,
     PreviewChange,
@@ -49,6 +51,7 @@ class PlayedRobot:
         self.open = 0
         self.streamed: list[Event | EventGap | CaughtUp | Outage | GatewayError] = []
         self.asked_after: list[EventPosition | None] = []
+        self.another_login = False
 
     @asynccontextmanager
     async def connect(self, target: str) -> AsyncIterator["PlayedRobot"]:
@@ -84,6 +87,12 @@ class PlayedRobot:
             yield item
         await asyncio.Event().wait()
 
+    async def renew(self) -> bool:
+        if self.another_login:
+            self.another_login, self.trouble = False, None
+            return True
+        return False
+
     async def _take(self, wish: Wish) -> PreviewChange:
         self.wishes.append(wish)
         if self.wishes_hang:
@@ -102,7 +111,7 @@ def robot() -> PlayedRobot:
 def following(
     robot: PlayedRobot, on_news: Callable[[], None] = lambda: None, retry: Backoff = NEVER
 ) -> Iterator[Worker]:
-    worker = Worker("robot", on_news, robot.connect, retry)
+    worker = Worker("robot", on_news, robot.connect, retry, refused=NEVER)
     worker.start()
     try:
         yield worker
@@ -154,6 +163,22 @@ def test_the_operator_need_not_wait_for_the_next_attempt(robot: PlayedRobot) -> 
         robot.trouble = None
         worker.retry_now()
         reached(worker, Phase.CONNECTED)
+
+
+def test_a_login_that_is_refused_is_not_shown_again_and_again(robot: PlayedRobot) -> None:
+    robot.trouble = NotAllowed("the token of anna was revoked")
+    robot.streamed = [robot.trouble]
+    with following(robot, retry=AT_ONCE) as worker:
+        lost = reached(worker, Phase.LOST)
+        assert lost.link.next_try_s
+        assert lost.link.next_try_s > time.monotonic() + 1e5
+        worker.retry_now()
+        wait_until(lambda: robot.looks == 2, "it is, when the operator wants it")
+        assert len(robot.asked_after) == 1, "who asks for events waits until there is an answer at all"
+        robot.streamed = []
+        robot.another_login = True
+        assert reached(worker, Phase.CONNECTED).link.attempts == 0
+        wait_until(lambda: len(robot.asked_after) == 2, "events are asked for again")
 
 
 def test_a_wish_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> None:

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from common.errors import UserError
-from console.client import Unreachable
+from console.client import NotAllowed, NotTrusted, Unreachable
 from console.client.results import PreviewState
 from console.viewer.banner import banner
 from console.viewer.state import STILL_AFTER_S, Facts, Phase, view_state
@@ -11,6 +11,7 @@ from tests.unit.viewer.previews import preview
 
 NOW_S = 1000.0
 GONE = Unreachable("no robot gateway at robot:50051")
+OVER = NotAllowed("the token of anna was revoked")
 SILENT = UserError("the stream from srt://robot:7100 fell silent")
 RUNNING = preview(PreviewState.RUNNING)
 FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it in")
@@ -28,6 +29,13 @@ FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it 
         pytest.param({"preview": preview(PreviewState.STARTING)}, Phase.CONNECTING, id="starting"),
         pytest.param({"preview": FAULTED, "picture_s": NOW_S - 5}, Phase.FAULTED, id="the robot says why"),
         pytest.param({"gateway_trouble": GONE}, Phase.UNREACHABLE, id="nobody there"),
+        pytest.param({"gateway_trouble": OVER}, Phase.NO_ACCESS, id="the login is over"),
+        pytest.param({"gateway_trouble": NotTrusted("a stranger")}, Phase.NO_ACCESS, id="a stranger"),
+        pytest.param(
+            {"preview": RUNNING, "gateway_trouble": OVER, "picture_s": NOW_S - 0.1},
+            Phase.LIVE,
+            id="pictures although the login is over",
+        ),
         pytest.param(
             {"preview": RUNNING, "gateway_trouble": GONE, "picture_s": NOW_S - 2},
             Phase.UNREACHABLE,

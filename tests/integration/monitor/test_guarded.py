@@ -1,0 +1,135 @@
+"""The monitor window at a robot that asks who calls: roles, a login that is over, and a new one."""
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from console.window.monitor_program import monitor
+from console.window.monitor_window import MonitorWindow
+from gateway.access.role import Role
+from tests.support.guarded_program import Guarded, guarded_video
+from tests.support.qt import keep_picture, let_pass, until
+
+pytestmark = pytest.mark.gst
+
+TOLD_WITHIN_S = 10.0
+"""Revoking counts within a second on the robot, a new login within half a second here; machines are busy."""
+WATCHED_S = 6.0
+MOST_ATTEMPTS = 3
+"""In WATCHED_S: at once, and after 5 s; one more on a machine that is slow to look. As if nobody answered it
+would be 5."""
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
+    with guarded_video(tmp_path_factory.mktemp("robot"), tmp_path_factory.mktemp("laptop")) as robot:
+        yield robot
+
+
+@dataclass
+class Person:
+    """In front of the window."""
+
+    window: MonitorWindow
+
+    def link_is(self, word: str) -> None:
+        until(lambda: self.window.header.link.word.text() == word, f"the connection is {word}", TOLD_WITHIN_S)
+
+    def preview_is(self, word: str) -> None:
+        until(lambda: self.window.preview.state.word.text() == word, f"the preview is {word}")
+
+    def press_p(self) -> None:
+        until(self.window.preview.switch.isEnabled, "the controls may be touched")
+        QTest.keyClick(self.window, Qt.Key.Key_P)
+
+    def notes(self) -> str:
+        return " ".join(line.text.text() for line in self.window.preview.notes.shown)  # type: ignore[attr-defined]
+
+    def events(self) -> str:
+        return "\n".join(self.window.side.events.lines)
+
+    def pictures_come(self) -> None:
+        painted: list[float] = []
+        connection = self.window.video.painted.connect(lambda: painted.append(time.monotonic()))
+        until(lambda: len(painted) >= 15, "15 pictures are painted")
+        self.window.video.painted.disconnect(connection)
+
+
+@contextmanager
+def in_front_of(robot: Guarded) -> Iterator[Person]:
+    """The window, with the login that the laptop has."""
+    with monitor(robot.target, robot.stored) as window:
+        person = Person(window)
+        person.link_is("connected")
+        yield person
+
+
+def test_an_operator_sees_everything_and_switches(robot: Guarded) -> None:
+    robot.log_in("anna", Role.OPERATOR)
+    with in_front_of(robot) as anna:
+        assert anna.window.header.name.text() == "lab-1"
+        anna.press_p()
+        anna.preview_is("RUNNING")
+        anna.pictures_come()
+        until(lambda: "anna" in anna.events(), "who switched it on is an event")
+        anna.press_p()
+        anna.preview_is("DISABLED")
+
+
+def test_a_viewer_is_told_what_is_missing_and_goes_on_watching(robot: Guarded) -> None:
+    robot.switch_on()
+    robot.log_in("ben", Role.VIEWER)
+    with in_front_of(robot) as ben:
+        ben.preview_is("RUNNING")
+        ben.press_p()
+        until(lambda: "ben is viewer, and SetPreviewMode needs operator" in ben.notes(), "what is missing")
+        ben.pictures_come()
+        ben.link_is("connected")
+        ben.preview_is("RUNNING")
+        keep_picture(ben.window, "viewer-only")
+
+
+def test_a_login_that_is_over_is_told_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
+    robot.log_in("carla", Role.OPERATOR)
+    with in_front_of(robot) as carla:
+        robot.keeper.revoke("carla")
+        carla.link_is("not allowed")
+        banner = carla.window.banner
+        assert banner.isVisible()
+        assert "was revoked. Ask whoever keeps this robot" in banner.text.text()
+        assert "robotctl login" in banner.text.text()
+        assert not carla.window.preview.switch.isEnabled()
+        let_pass(WATCHED_S)
+        next_try = re.search(r"No access for .* Attempt (\d+) ", banner.next_try.text())
+        assert next_try
+        assert 1 < int(next_try[1]) <= MOST_ATTEMPTS + 1
+        keep_picture(carla.window, "not-allowed")
+
+        robot.log_in("carla", Role.OPERATOR)
+        carla.link_is("connected")
+        assert not banner.isVisible()
+        carla.press_p()
+        until(lambda: carla.notes().strip(), "the robot answers a wish again")
+        robot.switch_off()
+        carla.preview_is("DISABLED")
+        until(lambda: "the-test" in carla.events(), "events go on")
+
+
+def test_a_wrong_token_does_not_lock_out_the_right_one(robot: Guarded) -> None:
+    robot.log_in("dora", Role.VIEWER)
+    kept = next(robot.home.rglob("token"))
+    right = kept.read_text()
+    kept.write_text(right[:-2] + ("AA" if right[-2:] != "AA" else "BA"))
+    with monitor(robot.target, robot.stored) as window:
+        dora = Person(window)
+        dora.link_is("not allowed")
+        let_pass(WATCHED_S)
+        kept.write_text(right)
+        dora.link_is("connected")
+    assert "is locked out" not in robot.log()

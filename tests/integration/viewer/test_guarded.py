@@ -1,0 +1,93 @@
+"""`robotctl view` at a robot that asks who calls: by the robot's name, with an encrypted stream."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from console.viewer.account import Bookkeeper
+from console.viewer.banner import banner
+from console.viewer.state import Phase
+from gateway.access.role import Role
+from tests.support.guarded_program import ROBOT, Guarded, guarded_video
+from tests.support.qt import application, until
+from tests.support.robotctl import only_line, robotctl
+from tests.support.robotctl_docs import documented, holds
+from tests.support.waiting import wait_until
+
+from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
+from PySide6.QtTest import QTest  # isort: skip
+
+from console.window.view_program import viewing
+
+pytestmark = [pytest.mark.gst, pytest.mark.usefixtures("application")]
+__all__ = ["application"]
+
+TOLD_WITHIN_S = 10.0
+"""Revoking counts within a second on the robot, a new login within half a second here; machines are busy."""
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
+    """The preview is off at first."""
+    with guarded_video(tmp_path_factory.mktemp("robot"), tmp_path_factory.mktemp("laptop")) as robot:
+        yield robot
+
+
+def view(robot: Guarded, *words: str) -> tuple[int, str, str]:
+    done = robot.robotctl("--robot", ROBOT, "view", "--headless", "--frames", "30", *words)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_viewer_by_the_robots_name_sees_an_encrypted_stream(robot: Guarded) -> None:
+    robot.switch_on()
+    robot.log_in("ben", Role.VIEWER)
+    status = json.loads(robot.robotctl("--robot", ROBOT, "--json", "status").stdout)
+    assert status["preview"]["endpoint"]["encrypted"]
+    code, said, complaints = view(robot, "--json")
+    assert (code, complaints) == (0, "")
+    document = json.loads(said)
+    holds(documented("view --json"), document, complete=False)
+    assert document["pictures"] >= 30
+    assert document["recording"] is None
+
+
+def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded) -> None:
+    robot.switch_on()
+    robot.log_in("carl", Role.VIEWER)
+    robot.keeper.revoke("carl")
+    wait_until(lambda: view(robot)[0] == 1, "carl is refused", TOLD_WITHIN_S)
+    code, said, complaints = view(robot)
+    assert (code, said) == (1, "")
+    assert "was revoked" in only_line(complaints)
+    assert complaints.endswith("then type: robotctl login\n")
+    stranger = robotctl("--target", robot.target, "view", "--headless", "--frames", "1")
+    assert (stranger.returncode, stranger.stdout) == (3, "")
+    assert "robotctl login" in only_line(stranger.stderr)
+
+
+def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: Guarded) -> None:
+    robot.switch_off()
+    robot.log_in("dora", Role.VIEWER)
+    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
+        until(lambda: window.session.state().phase is Phase.OFF, "the preview is off")
+        QTest.keyClick(window.window, Qt.Key.Key_P)
+        until(
+            lambda: "dora is viewer, and SetPreviewMode needs operator" in window.window.said.text(),
+            "what is missing",
+        )
+        robot.keeper.revoke("dora")
+        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
+        card = banner(window.session.state())
+        assert card
+        assert (
+            "was revoked. Ask whoever keeps this robot for access, then type: robotctl login" in card.detail
+        )
+        robot.log_in("dora", Role.OPERATOR)
+        until(lambda: window.session.state().phase is Phase.OFF, "the new login counts", TOLD_WITHIN_S)
+        QTest.keyClick(window.window, Qt.Key.Key_P)
+        until(lambda: window.session.state().phase is Phase.LIVE, "video")
+        robot.keeper.revoke("dora")
+        # The stream's passphrase is the preview's, not the person's: it goes on, and the line below tells.
+        until(lambda: "was revoked" in window.window.said.text(), "it is told", TOLD_WITHIN_S)
+        assert window.session.state().phase is Phase.LIVE

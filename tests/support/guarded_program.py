@@ -1,0 +1,141 @@
+"""A gateway program that asks who calls, and a laptop: what `robotctl login` has stored there."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from common.free import free_tcp_port
+from console.client import Credentials, GatewayClient, PreviewState, Unreachable
+from console.robots import read_book, read_credentials
+from gateway.access.credential import Kind
+from gateway.access.directory import CredentialDirectory
+from gateway.access.keeping import Keeper, Wanted
+from gateway.access.role import Role
+from tests.support.guarded_gateway import HOSTS
+from tests.support.robotctl import robotctl
+from tests.support.running_preview import RunningPreview
+from tests.support.waiting import wait_until
+
+_ROOT = Path(__file__).parents[2]
+_UP_WITHIN_S = 20.0
+ROBOT = "lab"
+"""As the laptop calls it."""
+
+
+@dataclass
+class Guarded:
+    """A guarded gateway in another process, and a laptop.
+
+    Args:
+        keeper: adds and revokes, as on the robot.
+        target: the gateway's address.
+        home: the laptop's configuration directory.
+        own: an admin's credentials, for the test itself.
+        log_file: where the gateway writes.
+    """
+
+    keeper: Keeper
+    target: str
+    home: Path
+    own: Credentials
+    log_file: Path
+
+    def log_in(self, person: str, role: Role) -> dict[str, Any]:
+        """Hands a new token over, which the laptop keeps from now on; what `robotctl login --json` said."""
+        _, bundle = self.keeper.add(Wanted(person, role, Kind.TOKEN))
+        file = self.home / f"{person}.login"
+        file.write_text(bundle.text(), encoding="utf-8")
+        done = self.robotctl("login", ROBOT, self.target, str(file), "--json")
+        assert done.returncode == 0, done.stderr
+        said: dict[str, Any] = json.loads(done.stdout)
+        return said
+
+    def robotctl(self, *words: str) -> "subprocess.CompletedProcess[str]":
+        """Typed on the laptop."""
+        return robotctl(*words, XDG_CONFIG_HOME=str(self.home))
+
+    def stored(self) -> Credentials:
+        """What the laptop has kept last."""
+        return read_credentials(read_book(self.home / "robotctl/config.toml").find(ROBOT))
+
+    def client(self) -> GatewayClient:
+        """The test's own connection."""
+        return GatewayClient(self.target, credentials=self.own)
+
+    def log(self) -> str:
+        """What the gateway has written so far."""
+        return self.log_file.read_text(encoding="utf-8")
+
+    def switch_on(self) -> None:
+        """Frames leave when this returns."""
+        with self.client() as client:
+            change = client.enable_preview()
+        assert change.preview.state is PreviewState.RUNNING, change
+
+    def switch_off(self) -> None:
+        """The preview is off when this returns."""
+        with self.client() as client:
+            assert client.disable_preview().preview.state is PreviewState.DISABLED
+
+    def answers(self) -> bool:
+        """Whether the gateway is up."""
+        with suppress(Unreachable), self.client() as client:
+            client.status()
+            return True
+        return False
+
+
+@contextmanager
+def guarded_program(directory: Path, home: Path, **settings: Any) -> Iterator[Guarded]:
+    """Up when the block begins, gone when it ends.
+
+    Args:
+        directory: the robot's files.
+        home: the laptop's configuration directory.
+        settings: keys of the gateway's configuration.
+    """
+    credentials, port = CredentialDirectory(directory / "credentials"), free_tcp_port()
+    keeper = Keeper(credentials, ROBOT)
+    keeper.begin(HOSTS)
+    _, bundle = keeper.add(Wanted("the-test", Role.ADMIN, Kind.TOKEN))
+    config = directory / "gateway.yaml"
+    values = {
+        "name": "lab-1",
+        "grpc": {"port": port},
+        "sources": [],
+        "security": {"credentials": str(credentials.path)},
+        "preview": {"socket": str(directory / "preview.sock")},
+        **settings,
+    }
+    config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+    command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", str(config)]
+    log_file = directory / "gateway.log"
+    with log_file.open("wb") as log:
+        process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
+    own = Credentials(ca_certificate=bundle.authority, token=bundle.token)
+    robot = Guarded(keeper, f"127.0.0.1:{port}", home, own, log_file)
+    try:
+        wait_until(lambda: process.poll() is not None or robot.answers(), "the gateway is up", _UP_WITHIN_S)
+        assert process.poll() is None, robot.log()
+        yield robot
+    finally:
+        process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(5)
+        process.kill()
+        process.wait()
+
+
+@contextmanager
+def guarded_video(directory: Path, home: Path) -> Iterator[Guarded]:
+    """The same with the real preview service behind it; the preview is off at first."""
+    with (
+        RunningPreview(directory) as preview,
+        guarded_program(directory, home, preview={"socket": str(preview.socket)}) as robot,
+    ):
+        yield robot
