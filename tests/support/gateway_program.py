@@ -39,9 +39,9 @@ class GatewayProgram:
 
 
 @contextmanager
-def gateway_program(directory: Path, **settings: Any) -> Iterator[GatewayProgram]:
-    """Up when the block begins, gone when it ends; its log is in `directory`."""
-    port = free_tcp_port()
+def gateway_program(directory: Path, port: int = 0, **settings: Any) -> Iterator[GatewayProgram]:
+    """Up when the block begins, gone when it ends; its log is in `directory`. Without a port, at any."""
+    port = port or free_tcp_port()
     config = directory / "gateway.yaml"
     values = {"grpc": {"port": port}, "preview": {"socket": str(directory / "preview.sock")}, **settings}
     config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
