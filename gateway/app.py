@@ -54,10 +54,10 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         UserError: a part can't start.
     """
     _tell_who_gets_in(settings.security)
-    door = Door(settings.security)
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview_encrypted))
     tally = Tally()
     knowledge = Knowledge(settings, lambda: link.view, tally)
+    door = Door(settings.security, knowledge.note)
     streams = Streams(
         StatusWatch(knowledge.snapshot, time.monotonic),
         EventStreams(knowledge.events),

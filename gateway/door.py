@@ -1,8 +1,9 @@
 """The gateway's door: put together from the settings, guarded or not."""
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Final
 
 import grpc
@@ -14,11 +15,12 @@ from gateway.access.keyring import Keyring
 from gateway.access.lockout import Lockout
 from gateway.access.watch import AccessWatch, Loaded, TlsFiles
 from gateway.config import SecuritySettings
+from gateway.rpc.controls import action_news
 from gateway.rpc.guard import Guard
 from gateway.rpc.identity import caller
 from gateway.rpc.tls import ServerTls
 from gateway.status.access import AccessView
-from gateway.status.event import ControlAction
+from gateway.status.event import ControlAction, ControlResult, News
 
 _KIB: Final = 1024
 _AUDIT_FILE: Final = "audit.jsonl"
@@ -29,12 +31,14 @@ class Door:
 
     Args:
         settings: who may call, and how.
+        tell: takes the news of control actions that were refused here.
 
     Raises:
         UserError: credentials or certificates can't be read.
     """
 
-    def __init__(self, settings: SecuritySettings) -> None:
+    def __init__(self, settings: SecuritySettings, tell: Callable[[News], None]) -> None:
+        self._tell = tell
         where = settings.credentials
         file = settings.audit.file or (where / _AUDIT_FILE if where else None)
         self._audit = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
@@ -48,7 +52,7 @@ class Door:
         self._watch = watch = AccessWatch(files.read_store, files.store_file, tls_files, self._take_over)
         self._keyring = Keyring(watch.loaded.store)
         asked = tls_files is not None and tls_files.client_authority is not None
-        self.guard = Guard(self._keyring, Lockout(), self._audit.note, certificates=asked)
+        self.guard = Guard(self._keyring, Lockout(), self._note_refused, certificates=asked)
         self._tls = ServerTls(watch.loaded.tls) if watch.loaded.tls else None
 
     def credentials(self) -> grpc.ServerCredentials | None:
@@ -77,6 +81,18 @@ class Door:
             )
         )
 
+    def _note_refused(self, record: AuditRecord) -> None:
+        self._audit.note(record)
+        action = ControlAction(
+            who=record.who,
+            address=record.address,
+            method=record.action,
+            request=record.request,
+            result=ControlResult.REFUSED,
+            answer=record.answer,
+        )
+        self._tell(action_news(action))
+
     @contextmanager
     def recording(self) -> Iterator[None]:
         """The audit log is written while the block lasts."""
@@ -96,6 +112,20 @@ class Door:
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         self._audit.note(_changed_note(len(loaded.store.credentials)))
+
+
+def read_access(settings: SecuritySettings, where: Path) -> Loaded:
+    """Everything by which callers are asked who they are, read as a gateway does that starts.
+
+    Args:
+        settings: who may call, and how.
+        where: the directory of the credentials.
+
+    Raises:
+        UserError: credentials or certificates can't be read.
+    """
+    files = CredentialDirectory(where)
+    return AccessWatch(files.read_store, files.store_file, tls_files_of(settings, files)).loaded
 
 
 def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:

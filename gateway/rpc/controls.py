@@ -52,7 +52,7 @@ class Controls:
 
         async def call(request: Any, context: Context) -> bytes:
             def tell(result: ControlResult, answer: str) -> None:
-                asked = _shortened(text_format.MessageToString(request, as_one_line=True))
+                asked = _shortened(_words(request))
                 address = address_of(context.peer())
                 self._tell(
                     ControlAction(self._who(context), address, method, asked, result, _shortened(answer))
@@ -76,10 +76,26 @@ class Controls:
 
     def _tell(self, action: ControlAction) -> None:
         self._record(action)
-        who, asked = action.who or action.address, action.request or "nothing more"
-        words = f"{who} asked for {action.method} ({asked}), {action.result.value}: {action.answer}"
-        severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING
-        self._note(News(severity, _COMPONENT, words, action))
+        self._note(action_news(action))
+
+
+def action_news(action: ControlAction) -> News:
+    """What operators are told of it."""
+    who, asked = action.who or action.address, action.request or "nothing more"
+    words = f"{who} asked for {action.method} ({asked}), {action.result.value}: {action.answer}"
+    severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING
+    return News(severity, _COMPONENT, words, action)
+
+
+def _words(request: Message) -> str:
+    """As text. What is at its default is left out, but for what is false: to switch off is an order, too."""
+    orders = [
+        f"{each.name}: false"
+        for each in request.DESCRIPTOR.fields
+        if each.type == each.TYPE_BOOL and not (each.has_presence or getattr(request, each.name))
+    ]
+    rest = text_format.MessageToString(request, as_one_line=True)
+    return " ".join([*orders, rest] if rest else orders)
 
 
 def _shortened(words: str) -> str:

@@ -13,11 +13,13 @@ from common.error_details import metadata_of
 from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.reasons import Reason
 from common.rpc import STATUS_CODES, Context, Handler, rewrapped
+from gateway.access.attempts import Attempts
 from gateway.access.audit import AuditRecord
 from gateway.access.credential import Principal
 from gateway.access.keyring import Keyring, both
 from gateway.access.lockout import Lockout
 from gateway.access.role import Role
+from gateway.access.site import site_of
 from gateway.rpc.identity import begin, fingerprint_of, token_of
 from gateway.rpc.method_roles import Needed, Open, needed_for
 from gateway.rpc.peer import address_of, host_of
@@ -46,7 +48,7 @@ class Guard(grpc.aio.ServerInterceptor):
     Args:
         keyring: knows the credentials.
         lockout: remembers who showed wrong ones.
-        audit: takes the record of a control action that was refused here.
+        refused: takes the record of a control action that was refused here.
         certificates: whether connections show certificates.
     """
 
@@ -54,13 +56,14 @@ class Guard(grpc.aio.ServerInterceptor):
         self,
         keyring: Keyring,
         lockout: Lockout,
-        audit: Callable[[AuditRecord], None],
+        refused: Callable[[AuditRecord], None],
         *,
         certificates: bool,
     ) -> None:
         self._keyring = keyring
         self._lockout = lockout
-        self._audit = audit
+        self._refused = refused
+        self._attempts = Attempts()
         self._certificates = certificates
         self._streams: set[_OpenStream] = set()
 
@@ -169,21 +172,26 @@ class Guard(grpc.aio.ServerInterceptor):
         principal: Principal | None,
         error: NotAuthenticatedError | NotAllowedError | TooMuchError,
     ) -> None:
-        # A flood of guesses must not push what matters out of a log that has an end.
-        if needed in (Role.OPERATOR, Role.ADMIN) and not isinstance(error, TooMuchError):
-            self._audit(
-                AuditRecord(
-                    who=principal.name if principal else "",
-                    role=principal.role.value if principal else "",
-                    credential=principal.credential_ids[0] if principal else "",
-                    address=address_of(context.peer()),
-                    action=method.rpartition("/")[2],
-                    request="",
-                    result="refused",
-                    answer=str(error),
-                    request_id=request_id.current(),
-                )
+        if needed not in (Role.OPERATOR, Role.ADMIN) or isinstance(error, TooMuchError):
+            return
+        peer = context.peer()
+        left_out = self._attempts.left_out(principal.name if principal else site_of(host_of(peer)))
+        if left_out is None:
+            return
+        more = f" ({left_out} attempts before this one are left out)" if left_out else ""
+        self._refused(
+            AuditRecord(
+                who=principal.name if principal else "",
+                role=principal.role.value if principal else "",
+                credential=principal.credential_ids[0] if principal else "",
+                address=address_of(peer),
+                action=method.rpartition("/")[2],
+                request="",
+                result="refused",
+                answer=f"{error}{more}",
+                request_id=request_id.current(),
             )
+        )
 
     async def _end(self, stream: _OpenStream) -> None:
         """Tells the caller why, and ends the stream on our side whether or not they listen."""

@@ -13,6 +13,7 @@ import pytest
 
 from common.reasons import Reason
 from console.client.refusal import refusal_in
+from gateway.access.attempts import FREE
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from gateway.rpc.mapping.enums import SEVERITIES
@@ -244,6 +245,34 @@ async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) ->
         each["address"].startswith("127.0.0.1:") and each["time"].endswith("+00:00") for each in records
     )
     assert robot.audit_file.stat().st_mode & 0o777 == 0o600
+
+
+async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.OPERATOR)
+    _, viewer_login = robot.add(Role.VIEWER, name="ben")
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        events = calls.SubscribeEvents(SubscribeEventsRequest(), metadata=login.metadata())
+        tries = [(viewer_login, 1), (NOTHING, 50), (viewer_login, 1)]
+        for refused, count in tries:
+            for _ in range(count):
+                with pytest.raises(grpc.aio.AioRpcError):
+                    await calls.SetPreviewMode(
+                        SetPreviewModeRequest(enabled=True), metadata=refused.metadata(), timeout=5
+                    )
+        expected = ["ben", *["a stranger"] * FREE, "ben"]
+
+        told = []
+        async with asyncio.timeout(20):
+            while len(told) < len(expected):
+                answer = await events.read()
+                if answer.event.HasField("control_action"):
+                    told.append(answer.event.control_action.who or "a stranger")
+        assert told == expected
+        events.cancel()
+    records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
+    assert [each["who"] or "a stranger" for each in records] == expected
 
 
 async def test_who_guesses_waits_and_others_at_the_same_address_do_not(tmp_path: Path) -> None:
