@@ -69,8 +69,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
 FROM system
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
-# Volumes take over whose these are.
-RUN install -d -m 0700 -o 10001 -g 10000 /var/lib/robot-gateway/credentials /var/lib/robot-gateway/audit
+# Volumes take over whose these are; so does a tmpfs on /tmp, whatever mode it is given, before runc 1.1.8.
+RUN install -d -m 0700 -o 10001 -g 10000 /tmp /var/lib/robot-gateway/credentials /var/lib/robot-gateway/audit
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     GATEWAY__LOG_FORMAT=json \
     GRPC_VERBOSITY=ERROR \

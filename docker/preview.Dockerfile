@@ -40,6 +40,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
 
 FROM system
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
+# A tmpfs on it takes over these rights, whatever mode it is given, before runc 1.1.8.
+RUN install -d -m 0700 -o 10002 -g 10000 /tmp
 # The registry is made anew by every container: one made where the encoder's device was missing keeps hiding it.
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     PREVIEW__LOG_FORMAT=json \

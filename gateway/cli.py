@@ -10,16 +10,20 @@ from common import logs
 from common.findings import exit_code, print_findings
 from common.program import run, run_to_exit
 from gateway.app import serve as serve_until
-from gateway.config import load_settings
+from gateway.config import CONFIG_VARIABLE, load_settings
 from gateway.credentials_cli import app as credentials_app
 from gateway.doctor.examination import examine
+from gateway.door import read_access
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 app.add_typer(credentials_app, name="credentials")
 
 Config = Annotated[
     Path | None,
-    typer.Option(help="YAML file; without it the defaults and the GATEWAY__* environment variables count."),
+    typer.Option(
+        envvar=CONFIG_VARIABLE,
+        help="YAML file; without it the defaults and the GATEWAY__* environment variables count.",
+    ),
 ]
 
 
@@ -33,8 +37,10 @@ def serve(config: Config = None) -> None:
 
 @app.command()
 def check(config: Config = None) -> None:
-    """Say whether the configuration is good, and end."""
+    """Say whether the configuration is good, and what it names to ask callers who they are, and end."""
     settings = load_settings(config)
+    if settings.security.credentials is not None:
+        read_access(settings.security, settings.security.credentials)
     count = len(settings.sources)
     where = f"{settings.grpc.host}:{settings.grpc.port}"
     typer.echo(f"configuration good: '{settings.name}' serves at {where} and reads {count} sources")

@@ -3,7 +3,7 @@
 import ipaddress
 from collections import Counter
 from pathlib import Path
-from typing import Literal, Self
+from typing import Final, Literal, Self
 
 from pydantic import Field, model_validator
 from pydantic_settings import SettingsConfigDict
@@ -13,6 +13,9 @@ from common.errors import ExitCode, UserError
 from gateway.fault_settings import FaultSettings
 from gateway.status.board import SourceKind
 from gateway.status.values import CommandSource
+
+CONFIG_VARIABLE: Final = "ROBOT_GATEWAY_CONFIG"
+"""Names the file where the command line does not."""
 
 
 class SourceSettings(Section):

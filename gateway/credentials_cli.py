@@ -14,11 +14,12 @@ from rich.table import Table
 from common.errors import ExitCode, UserError
 from common.private import write_private
 from gateway.access.bundle import Bundle
+from gateway.access.command import to_type
 from gateway.access.credential import Credential, Kind
 from gateway.access.directory import CredentialDirectory
 from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
-from gateway.config import GatewaySettings, load_settings
+from gateway.config import CONFIG_VARIABLE, GatewaySettings, is_loopback, load_settings
 from gateway.platform.hosts import hosts_found, with_local
 
 app = typer.Typer(help="Who may call this robot, and with what.", no_args_is_help=True)
@@ -26,7 +27,10 @@ app = typer.Typer(help="Who may call this robot, and with what.", no_args_is_hel
 _MS_PER_S: Final = 1000
 
 Config: TypeAlias = Annotated[
-    Path | None, typer.Option(help="The gateway's configuration: security.credentials says where they are.")
+    Path | None,
+    typer.Option(
+        envvar=CONFIG_VARIABLE, help="The gateway's configuration: security.credentials says where they are."
+    ),
 ]
 Directory: TypeAlias = Annotated[
     Path | None, typer.Option(help="Where they are, in place of security.credentials.")
@@ -61,10 +65,13 @@ def init(
         f"{where.path}: authority, certificate and an empty list are made.",
         f"The certificate is good for {', '.join(hosts)}.",
         "",
-        "In the gateway's configuration:",
-        f"  grpc: {{host: 0.0.0.0}}\n  security: {{credentials: {where.path}}}",
-        "Then, for each person:  robot-gateway credentials add NAME --role viewer|operator|admin",
     )
+    if not _asked_for(settings, where):
+        _say(
+            "In the gateway's configuration:",
+            f"  grpc: {{host: 0.0.0.0}}\n  security: {{credentials: {where.path}}}",
+        )
+    _say(f"Then, for each person:  {to_type('add NAME --role viewer|operator|admin')}")
 
 
 @app.command()
@@ -171,6 +178,11 @@ def _place(config: Path | None, directory: Path | None) -> tuple[GatewaySettings
             exit_code=ExitCode.USAGE,
         )
     return settings, CredentialDirectory(where)
+
+
+def _asked_for(settings: GatewaySettings, where: CredentialDirectory) -> bool:
+    """Whether a gateway with these settings asks a network's callers for these credentials already."""
+    return settings.security.credentials == where.path and not is_loopback(settings.grpc.host)
 
 
 def _hand_over(credential: Credential, bundle: Bundle, out: Path | None, settings: GatewaySettings) -> None:

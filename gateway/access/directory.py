@@ -18,10 +18,15 @@ from typing import Final
 from common.errors import ExitCode, UserError
 from common.private import alone_in, write_private
 from gateway.access.authority import Pair
+from gateway.access.command import to_type
 from gateway.access.store import Store, parse_store, store_text
 
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 _LARGEST_BYTES: Final = 1 << 20
+_STORE: Final = "credentials.json"
+_AUTHORITY: Final = ("ca.pem", "ca-key.pem")
+_SERVER: Final = ("server.pem", "server-key.pem")
+_MADE_BY_INIT: Final = frozenset({_STORE, *_AUTHORITY, *_SERVER})
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,17 +38,19 @@ class CredentialDirectory:
     @property
     def store_file(self) -> Path:
         """Who may call."""
-        return self.path / "credentials.json"
+        return self.path / _STORE
 
     @property
     def authority_files(self) -> tuple[Path, Path]:
         """Certificate and key of the robot's authority."""
-        return self.path / "ca.pem", self.path / "ca-key.pem"
+        certificate, key = _AUTHORITY
+        return self.path / certificate, self.path / key
 
     @property
     def server_files(self) -> tuple[Path, Path]:
         """Certificate and key that the gateway shows."""
-        return self.path / "server.pem", self.path / "server-key.pem"
+        certificate, key = _SERVER
+        return self.path / certificate, self.path / key
 
     def read_store(self) -> Store:
         """Who may call.
@@ -57,7 +64,7 @@ class CredentialDirectory:
         except ValueError as error:
             raise UserError(
                 f"the list of credentials {self.store_file} is damaged: {error}",
-                "Restore it from a copy, or begin anew: robot-gateway credentials init --again",
+                f"Restore it from a copy, or begin anew: {to_type('init --again', self.path)}",
                 exit_code=ExitCode.USAGE,
             ) from error
 
@@ -166,9 +173,16 @@ def _read(path: Path, what: str) -> tuple[bytes, int]:
     except OSError as error:
         raise UserError(
             f"the {what} {path} can't be read: {error.strerror}",
-            f"Type: robot-gateway credentials init --directory {path.parent}",
+            _remedy(path, error),
             exit_code=ExitCode.USAGE,
         ) from error
     if len(content) > _LARGEST_BYTES:
         raise UserError(f"the {what} {path} is larger than 1 MiB", exit_code=ExitCode.USAGE)
     return content, mode
+
+
+def _remedy(path: Path, error: OSError) -> str:
+    """Making credentials is the way out only where there are none."""
+    if isinstance(error, FileNotFoundError) and path.name in _MADE_BY_INIT:
+        return f"Type: {to_type('init', path.parent)}"
+    return "Look at its path and its rights: the gateway's user must be able to read it"

@@ -15,6 +15,7 @@ from gateway.access.authority import (
     server_certificate,
 )
 from gateway.access.bundle import Bundle
+from gateway.access.command import to_type
 from gateway.access.credential import Credential, Kind, State
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
@@ -76,7 +77,7 @@ class Keeper:
             if directory.store_file.exists() and not again:
                 raise UserError(
                     f"{directory.path} has credentials already",
-                    "Type: robot-gateway credentials list; with --again all of them are thrown away",
+                    f"Type: {to_type('list')}; with --again all of them are thrown away",
                 )
             directory.path.chmod(0o700)
             authority = new_authority(self._robot, AUTHORITY_DAYS)

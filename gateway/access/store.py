@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from common.errors import UserError
+from gateway.access.command import to_type
 from gateway.access.credential import Credential, Kind, State
 from gateway.access.role import Role
 
@@ -56,7 +57,7 @@ class Store:
         if not meant:
             raise UserError(
                 f"no credential in force has the name or the id '{name_or_id}'",
-                "robot-gateway credentials list has all of them",
+                f"{to_type('list')} has all of them",
             )
         return meant
 

@@ -14,6 +14,7 @@ from typing import Final, NoReturn
 
 from common.errors import UserError
 from gateway.access.authority import Pair, belongs_together, certificate_facts
+from gateway.access.command import to_type
 from gateway.access.directory import read_pair, read_plain
 from gateway.access.store import Store
 from gateway.status.access import AccessView, CertificateEnd
@@ -164,7 +165,7 @@ def _material(tls: TlsFiles) -> tuple[TlsMaterial, dict[str, int]]:
     if not matches:
         raise UserError(
             f"{tls.key} is not the key of {tls.certificate}",
-            "Type: robot-gateway credentials rotate server",
+            f"Type: {to_type('rotate server')}",
         )
     return TlsMaterial(server, authority), ends_s
 
@@ -176,5 +177,5 @@ def _ending(which: str, ends_s: int, now_s: float) -> CertificateEnd:
         words=words,
         ends_on=datetime.fromtimestamp(ends_s, UTC).date().isoformat(),
         left_s=ends_s - now_s,
-        remedy=f"On the robot: robot-gateway credentials rotate {rotate}",
+        remedy=f"On the robot: {to_type(f'rotate {rotate}')}",
     )

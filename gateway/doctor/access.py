@@ -5,19 +5,17 @@ from datetime import UTC, datetime
 
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
+from gateway.access.command import to_type
 from gateway.access.credential import State
-from gateway.access.directory import CredentialDirectory
-from gateway.access.watch import AccessWatch
 from gateway.config import SecuritySettings
-from gateway.door import tls_files_of
+from gateway.door import read_access
 
 
 def access_finding(settings: SecuritySettings) -> Finding:
     """Reads the credentials as the gateway does."""
     assert settings.credentials is not None, "there is nothing to look at without them"
-    files = CredentialDirectory(settings.credentials)
     try:
-        loaded = AccessWatch(files.read_store, files.store_file, tls_files_of(settings, files)).loaded
+        loaded = read_access(settings, settings.credentials)
     except UserError as error:
         return wrong("access", error.what, "The gateway does not start with it", error.remedy)
     now_s = time.time()
@@ -27,7 +25,7 @@ def access_finding(settings: SecuritySettings) -> Finding:
             "access",
             f"no credential in {settings.credentials} is valid: nobody can call",
             "Whoever calls must show one",
-            "Type: robot-gateway credentials add NAME --role operator",
+            f"Type: {to_type('add NAME --role operator')}",
         )
     ends = [datetime.fromtimestamp(each, UTC).date().isoformat() for each in loaded.ends_s.values()]
     until = f"; the certificate is good until {min(ends)}" if ends else ""

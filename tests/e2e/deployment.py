@@ -14,12 +14,15 @@ from testcontainers.compose import DockerCompose
 
 from common.free import free_domain, free_tcp_port, free_udp_port
 from console.client.blocking import GatewayClient
+from console.client.credentials import Credentials
 from console.client.errors import Unreachable
 from console.client.results import SystemStatus
 from tests.support.engine import ROOT, TAG
 from tests.support.waiting import wait_until
 
 SERVICES = ("gateway", "preview")
+# Devices, and the kernel's own trees.
+_RUNTIME = ("/proc", "/sys", "/dev")
 
 
 class Deployment:
@@ -41,9 +44,14 @@ class Deployment:
         self.preview_port = preview_port
         self.domain = domain
 
-    def client(self) -> GatewayClient:
-        """An operator."""
-        return GatewayClient(f"127.0.0.1:{self.gateway_port}")
+    @property
+    def target(self) -> str:
+        """Where operators call."""
+        return f"127.0.0.1:{self.gateway_port}"
+
+    def client(self, shown: Credentials | None = None) -> GatewayClient:
+        """An operator, and what they show."""
+        return GatewayClient(self.target, credentials=shown)
 
     def run(self, *words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
         """`docker compose ...` on this project."""
@@ -162,6 +170,21 @@ def demo_overlay() -> str:
 def docker(*words: str) -> str:
     """The output of a docker command."""
     return subprocess.run(["docker", *words], capture_output=True, text=True, timeout=120, check=True).stdout
+
+
+def mounts(pid: int) -> dict[str, set[str]]:
+    """Where a process has something mounted, and with which options."""
+    lines = Path(f"/proc/{pid}/mountinfo").read_text(encoding="ascii").splitlines()
+    return {fields[4]: set(fields[5].split(",")) for fields in map(str.split, lines)}
+
+
+def writable(pid: int) -> set[str]:
+    """What of it can be written; without what every container has from the runtime."""
+    return {
+        path
+        for path, options in mounts(pid).items()
+        if "rw" in options and (path == "/dev/shm" or not path.startswith(_RUNTIME))
+    }
 
 
 def udp_ports(deployment: Deployment, service: str) -> set[int]:

@@ -13,11 +13,11 @@ pytestmark = pytest.mark.docker
 OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded")
 
 
-def config(*overlays: str) -> dict[str, Any]:
+def config(*overlays: str, profile: str = "") -> dict[str, Any]:
     files = ["compose.yaml", *(f"compose.{name}.yaml" for name in overlays if name)]
     words = [word for name in files for word in ("-f", name)]
     done = subprocess.run(
-        ["docker", "compose", *words, "config", "--format", "json"],
+        ["docker", "compose", *words, "--profile", profile, "config", "--format", "json"],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -32,7 +32,7 @@ def config(*overlays: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("overlay", OVERLAYS)
 def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) -> None:
-    services = config(overlay)["services"]
+    services = config(overlay, profile="*")["services"]
     for name, service in services.items():
         assert service["read_only"], name
         assert service["cap_drop"] == ["ALL"], name
@@ -62,6 +62,12 @@ def test_a_guarded_gateway_reads_credentials_that_it_can_not_change() -> None:
     assert mounts["/var/lib/robot-gateway/credentials"]["read_only"]
     assert not mounts["/var/lib/robot-gateway/audit"].get("read_only")
     assert "credentials" not in services, "it runs when the robot's keeper asks for it, never by itself"
+
+
+def test_what_a_robot_without_credentials_accepted_ends_with_the_overlay() -> None:
+    """In whatever order somebody names the files."""
+    for order in (("demo", "guarded"), ("guarded",)):
+        assert config(*order)["services"]["gateway"]["environment"]["GATEWAY__SECURITY__INSECURE"] == "false"
 
 
 def test_the_gateway_is_where_the_robots_nodes_are() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.deployment import Deployment, demo_overlay, deployed
+from tests.e2e.deployment import Deployment, demo_overlay, deployed, mounts, writable
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
 
@@ -18,8 +18,6 @@ WRITABLE = {
     "preview": {"/tmp", "/run/robot-gateway", "/dev/shm"},
     "robot": {"/tmp", "/dev/shm"},
 }
-# What every container has from the runtime: devices, and the kernel's own trees.
-_RUNTIME = ("/proc", "/sys", "/dev")
 _LISTENING = "0A"
 
 
@@ -54,17 +52,17 @@ def test_every_process_is_an_ordinary_user_without_privileges(running: Deploymen
 @pytest.mark.parametrize("service", SERVICES)
 def test_nothing_can_be_written_beyond_what_is_declared(running: Deployment, service: str) -> None:
     pid = running.program_pid(service)
-    mounts = [
-        line.split() for line in Path(f"/proc/{pid}/mountinfo").read_text(encoding="ascii").splitlines()
-    ]
-    writable = {fields[4] for fields in mounts if "rw" in fields[5].split(",")}
-    beyond = {path for path in writable - WRITABLE[service] if not path.startswith(_RUNTIME)}
-    assert not beyond
-    root = next(fields for fields in mounts if fields[4] == "/")
-    assert "ro" in root[5].split(",")
+    assert writable(pid) == WRITABLE[service]
+    mounted = mounts(pid)
+    assert "ro" in mounted["/"]
     for path in WRITABLE[service] - {"/dev/shm"}:
-        options = next(fields for fields in mounts if fields[4] == path)[5].split(",")
-        assert {"noexec", "nosuid", "nodev"} <= set(options), path
+        assert {"noexec", "nosuid", "nodev"} <= mounted[path], path
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_temporary_files_are_the_programs_own(running: Deployment, service: str) -> None:
+    found = Path(f"/proc/{running.program_pid(service)}/root/tmp").stat()
+    assert (found.st_mode & 0o7777, found.st_uid, found.st_gid) == (0o700, USERS[service], GROUP)
 
 
 def test_the_gateway_cannot_write_where_the_preview_listens(running: Deployment) -> None:

@@ -9,7 +9,11 @@ from common.errors import NotNowError
 from gateway.rpc.controls import Controls
 from gateway.status.event import ControlAction, ControlResult, News
 from gateway.status.faults.fault import Severity
-from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
+from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
+from omniseer.gateway.v1.robot_gateway_pb2 import (
+    SetPreviewModeRequest,
+    SetPreviewModeResponse,
+)
 
 REQUEST = SetPreviewModeRequest(enabled=True)
 
@@ -51,6 +55,28 @@ async def test_an_accepted_action_has_the_robots_answer() -> None:
         ControlResult.ACCEPTED,
         "preview is running",
     )
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        (SetPreviewModeRequest(), "enabled: false"),
+        (
+            SetPreviewModeRequest(profile=PREVIEW_PROFILE_LOW_BW),
+            "enabled: false profile: PREVIEW_PROFILE_LOW_BW",
+        ),
+        (
+            SetPreviewModeRequest(enabled=True, profile=PREVIEW_PROFILE_LOW_BW),
+            "enabled: true profile: PREVIEW_PROFILE_LOW_BW",
+        ),
+    ],
+)
+async def test_to_switch_off_is_told_as_plainly_as_to_switch_on(
+    request_: SetPreviewModeRequest, words: str
+) -> None:
+    detail = (await told(b"", request_)).detail
+    assert isinstance(detail, ControlAction)
+    assert detail.request == words
 
 
 @pytest.mark.parametrize(
