@@ -16,8 +16,8 @@ from console.monitor.newest import Newest
 from console.monitor.renewed import Login, RenewedClient
 from console.monitor.state import MonitorState, Wish
 
-EVERY_S: Final = 0.2
-"""From one look to the next: 5 a second."""
+EVERY_S: Final = 0.1
+"""From one look to the next: boxes over the picture are at most so much older than need be."""
 _RETRY: Final = Backoff(first_s=0.5, factor=2.0, longest_s=2.0)
 # A refused login becomes good again by the robot's keeper or its clock, not by being shown often.
 _REFUSED: Final = Backoff(first_s=5.0, factor=2.0, longest_s=60.0)

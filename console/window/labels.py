@@ -1,4 +1,4 @@
-"""Labels that are told the same thing five times a second, and do nothing unless it has changed."""
+"""Labels that are told the same thing ten times a second, and do nothing unless it has changed."""
 
 from typing import Final
 
