@@ -58,13 +58,23 @@ def test_json_has_exactly_the_documented_keys(
     holds(said, json.loads(done.stdout), complete=known == "everything")
 
 
-def test_json_of_a_lost_robot_has_exactly_the_documented_keys(target: str, double: GatewayDouble) -> None:
+@pytest.mark.parametrize(
+    "code",
+    [
+        grpc.StatusCode.UNAVAILABLE,
+        grpc.StatusCode.DEADLINE_EXCEEDED,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+    ],
+)
+def test_json_of_a_lost_robot_has_exactly_the_documented_keys(
+    target: str, double: GatewayDouble, code: grpc.StatusCode
+) -> None:
     command = [ROBOTCTL, "--target", target, "--json", "watch", "--interval", "0.1"]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as watching:
         try:
             assert watching.stdout
             watching.stdout.readline()
-            double.failures.extend([(grpc.StatusCode.UNAVAILABLE, "gone")] * 100)
+            double.failures.extend([(code, "gone")] * 100)
             lost: Any = next(look for look in map(json.loads, watching.stdout) if look["error"])
         finally:
             watching.terminate()
