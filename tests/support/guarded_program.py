@@ -12,6 +12,7 @@ from typing import Any
 from common.free import free_tcp_port
 from console.client import Credentials, GatewayClient, PreviewState, Unreachable
 from console.robots import read_book, read_credentials
+from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.directory import CredentialDirectory
 from gateway.access.keeping import Keeper, Wanted
@@ -37,6 +38,7 @@ class Guarded:
         home: the laptop's configuration directory.
         own: an admin's credentials, for the test itself.
         log_file: where the gateway writes.
+        kind: of all credentials here.
     """
 
     keeper: Keeper
@@ -44,10 +46,11 @@ class Guarded:
     home: Path
     own: Credentials
     log_file: Path
+    kind: Kind = Kind.TOKEN
 
     def log_in(self, person: str, role: Role) -> dict[str, Any]:
-        """Hands a new token over, which the laptop keeps from now on; what `robotctl login --json` said."""
-        _, bundle = self.keeper.add(Wanted(person, role, Kind.TOKEN))
+        """Hands a new login over, which the laptop keeps from now on; what `robotctl login --json` said."""
+        _, bundle = self.keeper.add(Wanted(person, role, self.kind))
         file = self.home / f"{person}.login"
         file.write_text(bundle.text(), encoding="utf-8")
         done = self.robotctl("login", ROBOT, self.target, str(file), "--json")
@@ -91,24 +94,30 @@ class Guarded:
 
 
 @contextmanager
-def guarded_program(directory: Path, home: Path, **settings: Any) -> Iterator[Guarded]:
+def guarded_program(
+    directory: Path, home: Path, kind: Kind = Kind.TOKEN, **settings: Any
+) -> Iterator[Guarded]:
     """Up when the block begins, gone when it ends.
 
     Args:
         directory: the robot's files.
         home: the laptop's configuration directory.
+        kind: how its callers prove who they are.
         settings: keys of the gateway's configuration.
     """
     credentials, port = CredentialDirectory(directory / "credentials"), free_tcp_port()
     keeper = Keeper(credentials, ROBOT)
     keeper.begin(HOSTS)
-    _, bundle = keeper.add(Wanted("the-test", Role.ADMIN, Kind.TOKEN))
+    _, bundle = keeper.add(Wanted("the-test", Role.ADMIN, kind))
     config = directory / "gateway.yaml"
     values = {
         "name": "lab-1",
         "grpc": {"port": port},
         "sources": [],
-        "security": {"credentials": str(credentials.path)},
+        "security": {
+            "credentials": str(credentials.path),
+            "tls": {"client_certificates": kind is Kind.CERTIFICATE},
+        },
         "preview": {"socket": str(directory / "preview.sock")},
         **settings,
     }
@@ -117,8 +126,8 @@ def guarded_program(directory: Path, home: Path, **settings: Any) -> Iterator[Gu
     log_file = directory / "gateway.log"
     with log_file.open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
-    own = Credentials(ca_certificate=bundle.authority, token=bundle.token)
-    robot = Guarded(keeper, f"127.0.0.1:{port}", home, own, log_file)
+    own = parse_login(bundle.text()).credentials
+    robot = Guarded(keeper, f"127.0.0.1:{port}", home, own, log_file, kind)
     try:
         wait_until(lambda: process.poll() is not None or robot.answers(), "the gateway is up", _UP_WITHIN_S)
         assert process.poll() is None, robot.log()
