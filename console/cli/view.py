@@ -65,6 +65,8 @@ def view(
     address = parse_target(session.target)
     _need_gstreamer()
     show = None if headless else _window()
+    # Whatever is wrong with the login is said before a file is made.
+    session.credentials()
     recording = Recording(record) if record else None
     if show:
         account = show(address, recording, session.credentials)

@@ -77,7 +77,10 @@ class Recording:
             self._gaps += 1
 
     def close(self, within_s: float = _END_WITHIN_S) -> None:
-        """Writes down what has come; no connection may use it any more. Closing again does nothing."""
+        """Writes down what has come; no connection may use it any more. Closing again does nothing.
+
+        Where nothing came there is no file: the next attempt may have its name.
+        """
         if self._closed:
             return
         self._closed = True
@@ -111,6 +114,8 @@ class Recording:
 
     def _close_target(self) -> None:
         try:
+            if self._bytes == 0 and stat.S_ISREG(os.fstat(self._target).st_mode):
+                self.file.unlink(missing_ok=True)
             os.close(self._target)
         except OSError as error:
             # Some file systems say only now that there was no room.

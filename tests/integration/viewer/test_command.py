@@ -126,10 +126,32 @@ def test_a_place_that_cannot_be_written_is_one_line_and_1() -> None:
     assert "/nowhere/kept.ts can't be written" in only_line(done.stderr)
 
 
-def test_nobody_there_is_one_line_and_3() -> None:
-    done = robotctl("--target", f"127.0.0.1:{free_tcp_port()}", "view", "--headless", "--frames", "3")
+def test_nobody_there_is_one_line_and_3_and_leaves_no_file(tmp_path: Path) -> None:
+    file = tmp_path / "kept.ts"
+    command = ["view", "--headless", "--frames", "3", "--record", str(file)]
+    done = robotctl("--target", f"127.0.0.1:{free_tcp_port()}", *command)
     assert done.returncode == 3
     assert "nothing listens there" in only_line(done.stderr)
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("words", [["--headless"], []], ids=["headless", "window"])
+def test_a_login_that_can_not_be_used_is_one_line_and_2_and_leaves_no_file(
+    tmp_path: Path, words: list[str]
+) -> None:
+    book, token, file = tmp_path / "robotctl/config.toml", tmp_path / "token", tmp_path / "kept.ts"
+    token.write_text("x")
+    token.chmod(0o644)
+    book.parent.mkdir()
+    book.write_text(f'[robots.lab]\ntarget = "127.0.0.1"\ntoken_file = "{token}"\n')
+    done = robotctl(
+        *("--robot", "lab", "view", *words, "--record", str(file)),
+        XDG_CONFIG_HOME=str(tmp_path),
+        QT_QPA_PLATFORM="offscreen",
+    )
+    assert done.returncode == 2
+    assert f"chmod 600 {token}" in only_line(done.stderr)
+    assert not file.exists()
 
 
 def test_a_preview_that_is_off_is_one_line_and_1() -> None:

@@ -55,6 +55,15 @@ def test_a_pipe_or_a_directory_is_not_written_to(tmp_path: Path) -> None:
             Recording(there)
 
 
+def test_where_nothing_came_the_name_is_free_again(tmp_path: Path) -> None:
+    file = tmp_path / "drive.ts"
+    Recording(file).close()
+    assert not file.exists()
+    with Recording(file) as recording:
+        os.write(recording.pipe, b"x")
+    assert file.read_bytes() == b"x"
+
+
 def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "drive.ts")
     recording.close()
