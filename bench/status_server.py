@@ -119,7 +119,7 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
         events.add(_mode("an event"), time.monotonic())
         return b""
 
-    door = Door(SecuritySettings(credentials=credentials), lambda _news: None)
+    door = Door(SecuritySettings(credentials=credentials), lambda _news: None, lambda: None)
     guards = [door.guard] if door.guard else []
     server = new_server([LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits())), *guards])
     server.add_generic_rpc_handlers(

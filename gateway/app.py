@@ -57,7 +57,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     link = PreviewLink(settings.preview.socket, _reconciler(settings.preview_encrypted))
     tally = Tally()
     knowledge = Knowledge(settings, lambda: link.view, tally)
-    door = Door(settings.security, knowledge.note)
+    door = Door(settings.security, knowledge.note, link.renew_passphrase)
     streams = Streams(
         StatusWatch(knowledge.snapshot, time.monotonic),
         EventStreams(knowledge.events),

@@ -32,12 +32,18 @@ class Door:
     Args:
         settings: who may call, and how.
         tell: takes the news of control actions that were refused here.
+        somebody_is_out: called when one who was let in would not be any more.
 
     Raises:
         UserError: credentials or certificates can't be read.
     """
 
-    def __init__(self, settings: SecuritySettings, tell: Callable[[News], None]) -> None:
+    def __init__(
+        self,
+        settings: SecuritySettings,
+        tell: Callable[[News], None],
+        somebody_is_out: Callable[[], None],
+    ) -> None:
         self._tell = tell
         where = settings.credentials
         file = settings.audit.file or (where / _AUDIT_FILE if where else None)
@@ -52,7 +58,7 @@ class Door:
         self._watch = watch = AccessWatch(files.read_store, files.store_file, tls_files, self._take_over)
         self._keyring = Keyring(watch.loaded.store)
         asked = tls_files is not None and tls_files.client_authority is not None
-        self.guard = Guard(self._keyring, Lockout(), self._note_refused, certificates=asked)
+        self.guard = Guard(self._keyring, Lockout(), self._note_refused, somebody_is_out, certificates=asked)
         self._tls = ServerTls(watch.loaded.tls) if watch.loaded.tls else None
 
     def credentials(self) -> grpc.ServerCredentials | None:

@@ -91,6 +91,12 @@ class PreviewLink:
         self.changes.wake_all()
         return wish
 
+    def renew_passphrase(self) -> None:
+        """Who knows the present one watches no longer; whoever may watch finds the next one in the view."""
+        if self._reconciler.renew_passphrase():
+            _log.info("wish %d: another passphrase", self.wish.revision)
+            self.changes.wake_all()
+
     def settled(self, wish: Wish) -> bool:
         """Whether the wish has come to something or was replaced."""
         return self._reconciler.settled(wish)

@@ -63,6 +63,14 @@ class Reconciler:
         self._publish()
         return self._wish
 
+    def renew_passphrase(self) -> bool:
+        """Another passphrase for the running session, if it has one; returns whether it has."""
+        if not (self._wish.enabled and self._wish.passphrase and self._new_passphrase):
+            return False
+        self._wish = replace(self._wish, passphrase="")
+        self.ask(enabled=True, profile=None)
+        return True
+
     def heard(self, actual: Actual, now_s: float) -> bool:
         """Takes in what the service says; returns whether there was no contact before."""
         if self._is_overtaken(actual):

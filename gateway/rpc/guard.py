@@ -49,6 +49,7 @@ class Guard(grpc.aio.ServerInterceptor):
         keyring: knows the credentials.
         lockout: remembers who showed wrong ones.
         refused: takes the record of a control action that was refused here.
+        somebody_is_out: called when one who was let in would not be any more: what they know is to change.
         certificates: whether connections show certificates.
     """
 
@@ -57,12 +58,16 @@ class Guard(grpc.aio.ServerInterceptor):
         keyring: Keyring,
         lockout: Lockout,
         refused: Callable[[AuditRecord], None],
+        somebody_is_out: Callable[[], None],
         *,
         certificates: bool,
     ) -> None:
         self._keyring = keyring
         self._lockout = lockout
         self._refused = refused
+        self._somebody_is_out = somebody_is_out
+        self._let_in: dict[tuple[str, ...], Principal] = {}
+        """By their credentials, of which the robot has a list."""
         self._attempts = Attempts()
         self._certificates = certificates
         self._streams: set[_OpenStream] = set()
@@ -93,7 +98,12 @@ class Guard(grpc.aio.ServerInterceptor):
             await self.end_what_is_over()
 
     async def end_what_is_over(self) -> None:
-        """Ends every stream whose caller would not be let in any more."""
+        """Ends every stream whose caller would not be let in any more, and tells of those callers."""
+        out = [key for key, each in self._let_in.items() if not self._keyring.still_valid(each)]
+        for key in out:
+            del self._let_in[key]
+        if out:
+            self._somebody_is_out()
         over = [each for each in self._streams if not self._keyring.still_valid(each.principal)]
         await asyncio.gather(*(self._end(each) for each in over))
 
@@ -133,6 +143,7 @@ class Guard(grpc.aio.ServerInterceptor):
         except (NotAuthenticatedError, NotAllowedError, TooMuchError) as error:
             self._note_refusal(context, method, needed, principal, error)
             raise
+        self._let_in[principal.credential_ids] = principal
         return principal
 
     def _identify(self, context: Context) -> Principal:

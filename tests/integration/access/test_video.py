@@ -74,6 +74,37 @@ async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Pa
         await server.stop(None)
 
 
+async def test_who_is_let_in_no_more_knows_a_passphrase_that_is_worth_nothing(tmp_path: Path) -> None:
+    robot, double = new_robot(tmp_path / "c"), PreviewDouble()
+    shown = robot.add(Role.OPERATOR)[1].metadata()
+    ben, bens = robot.add(Role.VIEWER, name="ben")
+    never_here, _ = robot.add(Role.VIEWER, name="carla")
+    server = await serve_double(robot.directory.path / "preview.sock", double)
+    try:
+        async with guarded_gateway(robot):
+            calls: Any = RobotGatewayStub(robot.channel())
+
+            async def status() -> Any:
+                return await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=shown, timeout=5)
+
+            await eventually(status, lambda it: it.preview.service_reachable, "they have met")
+            await calls.SetPreviewMode(SetPreviewModeRequest(enabled=True), metadata=shown, timeout=5)
+            await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=bens.metadata(), timeout=5)
+
+            async def wishes() -> list[Any]:
+                return list(double.wishes)
+
+            (before,) = await eventually(wishes, len, "the wish has arrived")
+            robot.keeper.revoke(never_here.credential_id)
+            robot.keeper.revoke(ben.credential_id)
+            known = await eventually(wishes, lambda seen: len(seen) > 1, "another wish")
+            assert [each.enabled for each in known] == [True, True], "once, not for whoever was never let in"
+            assert known[1].passphrase not in {"", before.passphrase}
+            assert (await status()).preview.endpoint.passphrase == known[1].passphrase
+    finally:
+        await server.stop(None)
+
+
 async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, own_address: str) -> None:
     double = PreviewDouble()
     server = await serve_double(tmp_path / "p.sock", double)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from console.client import GatewayClient
 from console.viewer.account import Bookkeeper
 from console.viewer.banner import banner
 from console.viewer.state import Phase
@@ -88,6 +89,32 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         QTest.keyClick(window.window, Qt.Key.Key_P)
         until(lambda: window.session.state().phase is Phase.LIVE, "video")
         robot.keeper.revoke("dora")
-        # The stream's passphrase is the preview's, not the person's: it goes on, and the line below tells.
-        until(lambda: "was revoked" in window.window.said.text(), "it is told", TOLD_WITHIN_S)
-        assert window.session.state().phase is Phase.LIVE
+        # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
+        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
+
+
+def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselves(robot: Guarded) -> None:
+    robot.log_in("emil", Role.VIEWER)
+    emils = robot.stored()
+    robot.log_in("frida", Role.VIEWER)
+    robot.switch_on()
+    with GatewayClient(robot.target, credentials=emils) as client:
+        known = client.status().preview.endpoint
+    assert known
+    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
+        until(lambda: window.session.state().phase is Phase.LIVE, "video")
+        robot.keeper.revoke("emil")
+        with robot.client() as client:
+            wait_until(
+                lambda: (
+                    (endpoint := client.status().preview.endpoint) is not None
+                    and endpoint.passphrase not in {"", known.passphrase}
+                ),
+                "another passphrase",
+                TOLD_WITHIN_S,
+            )
+        until(
+            lambda: (now := window.session.state()).phase is Phase.LIVE and now.redials > 0,
+            "her video is back",
+            TOLD_WITHIN_S,
+        )

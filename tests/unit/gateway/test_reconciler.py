@@ -198,6 +198,23 @@ def test_an_unreachable_service_settles_a_wish_after_one_more_attempt() -> None:
     assert reconciler.settled(wish)
 
 
+def test_a_running_session_gets_another_passphrase_and_stays_what_it_is() -> None:
+    numbers = iter(range(10))
+    reconciler = Reconciler(FIRST, new_passphrase=lambda: f"passphrase-{next(numbers)}")
+    assert not reconciler.renew_passphrase(), "nobody watches"
+    before = reconciler.ask(enabled=True, profile=Profile.LOW_BW)
+    assert reconciler.renew_passphrase()
+    after = reconciler.wish
+    assert (before.passphrase, after.passphrase) == ("passphrase-0", "passphrase-1")
+    assert (after.enabled, after.profile) == (True, Profile.LOW_BW)
+    assert after.revision > before.revision
+    assert reconciler.view.passphrase == "passphrase-1"
+    plain = Reconciler(FIRST)
+    wish = plain.ask(enabled=True, profile=None)
+    assert not plain.renew_passphrase()
+    assert plain.wish == wish
+
+
 def test_a_passphrase_lasts_for_a_session_and_shows_in_no_text() -> None:
     numbers = iter(range(10))
     reconciler = Reconciler(FIRST, new_passphrase=lambda: f"passphrase-{next(numbers)}")
