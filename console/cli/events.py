@@ -13,9 +13,9 @@ from console.cli.json_form import json_form
 from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
-from console.cli.words import plural
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
+from console.words import plural
 
 Item = Event | EventGap | CaughtUp | Outage
 

@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from console.cli.json_form import json_form
-from console.cli.words import UNKNOWN, age
 from console.client import GatewayInfo
+from console.words import UNKNOWN, age
 
 _MS_PER_S: Final = 1000
 

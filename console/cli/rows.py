@@ -2,9 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
 
-from console.cli.words import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
 from console.client.results import (
     Battery,
     Compute,
@@ -25,15 +23,8 @@ from console.client.results import (
     TeleopState,
     Vision,
 )
-
-
-class Tone(Enum):
-    """How much a row wants to be noticed. The word in the row says the same without colour."""
-
-    GOOD = "good"
-    QUIET = "quiet"
-    WARNING = "warning"
-    BAD = "bad"
+from console.tone import Tone
+from console.words import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from console.cli.rows import Row, Tone, status_rows
-from console.cli.words import age
+from console.cli.rows import Row, status_rows
 from console.client.results import Detections, Freshness, OverlaySnapshot, SystemStatus
+from console.tone import Tone
+from console.words import age
 
 STYLES: Final = {Tone.GOOD: "green", Tone.QUIET: "dim", Tone.WARNING: "bold yellow", Tone.BAD: "bold red"}
 

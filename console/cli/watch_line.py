@@ -1,7 +1,7 @@
 """A status on one line: for logs and pipes."""
 
-from console.cli.words import age, plural, quantity, signed
 from console.client.results import Freshness, PreviewState, PreviewStatus, Sample, SystemStatus
+from console.words import age, plural, quantity, signed
 
 
 def watch_line(status: SystemStatus) -> str:

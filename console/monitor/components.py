@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from console.cli.rows import Tone
-from console.cli.words import age, joined, plural, quantity, signed
 from console.client import OverlaySnapshot, SystemStatus
 from console.client.results import (
     Battery,
@@ -22,6 +20,8 @@ from console.client.results import (
     Vision,
 )
 from console.monitor.state import MonitorState
+from console.tone import Tone
+from console.words import age, joined, plural, quantity, signed
 
 _MARKS = {
     Freshness.FRESH: ("fresh", Tone.GOOD),

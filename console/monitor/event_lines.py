@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from console.cli.rows import Tone
-from console.cli.words import plural
 from console.client import CaughtUp, Event, EventGap, FaultSeverity, Outage
 from console.client.results import EventKind, GapReason
+from console.tone import Tone
+from console.words import plural
 
 KEPT: Final = 200
 """Older lines go."""

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from console.cli.rows import Tone
-from console.cli.words import age
 from console.client.results import Fault, FaultSeverity
 from console.monitor.state import MonitorState
+from console.tone import Tone
+from console.words import age
 
 _TONES = {
     FaultSeverity.ERROR: Tone.BAD,

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from console.cli.rows import Tone
-from console.cli.words import age
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
+from console.tone import Tone
+from console.words import age
 
 _MS_PER_S = 1000
 

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from console.cli.rows import Tone
-from console.cli.words import joined
 from console.client import GatewayError, PreviewProfile, PreviewState, PreviewStatus
 from console.monitor.link import Phase
 from console.monitor.state import MonitorState, Request, Wish
+from console.tone import Tone
+from console.words import joined
 
 PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 """In the order of the keys 1 to 3."""

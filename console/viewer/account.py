@@ -5,9 +5,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from console.cli.words import joined, plural
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
+from console.words import joined, plural
 
 _MS_PER_S = 1000
 _MIB = 1 << 20

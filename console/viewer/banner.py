@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from console.cli.rows import Tone
+from console.tone import Tone
 from console.viewer.state import Phase, ViewState
 from console.viewer.words import joined_sentences
 

@@ -1,9 +1,9 @@
 """The line below the picture. Pure text."""
 
-from console.cli.words import joined, plural
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.state import Phase, ViewState
+from console.words import joined, plural
 
 _MIB = 1 << 20
 

@@ -6,8 +6,8 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
-from console.cli.rows import Tone
 from console.monitor.event_lines import KEPT, EventLine, EventTrail
+from console.tone import Tone
 
 _LINES_SHOWN: Final = 8
 

@@ -3,14 +3,14 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from console.cli.rows import Tone
-from console.cli.words import UNKNOWN, joined
 from console.client.results import HealthState
 from console.monitor.link import LinkWords
 from console.monitor.state import MonitorState
+from console.tone import Tone
 from console.window.labels import ElidedLabel, WrappedLabel, scale_font, set_bold, set_text, word_label
 from console.window.lines import TintedLine
 from console.window.look import DimLabel, Marker
+from console.words import UNKNOWN, joined
 
 _HEALTH = {HealthState.OK: Tone.GOOD, HealthState.DEGRADED: Tone.WARNING, HealthState.UNKNOWN: Tone.QUIET}
 

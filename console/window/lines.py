@@ -4,9 +4,9 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QFrame, QGridLayout
 
-from console.cli.rows import Tone
 from console.monitor.components import Component
 from console.monitor.faults import FaultLine
+from console.tone import Tone
 from console.window.labels import RIGHT, TOP, WrappedLabel, set_bold, set_text, width_of, word_label
 from console.window.look import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 

@@ -7,7 +7,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
-from console.cli.rows import Tone
+from console.tone import Tone
 
 COLOURS: Final[Mapping[Tone, QColor]] = {
     Tone.GOOD: QColor("#009E73"),

@@ -3,9 +3,9 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from console.cli.rows import Tone
 from console.client import PreviewProfile
 from console.monitor.preview_controls import PROFILES, Controls, Note
+from console.tone import Tone
 from console.window.header import MarkedWord
 from console.window.labels import WrappedLabel, set_text, word_label
 from console.window.line_list import LineList

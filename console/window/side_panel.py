@@ -3,15 +3,15 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from console.cli.rows import Tone
-from console.cli.words import age
 from console.monitor.components import Component, components
 from console.monitor.faults import FaultLine, fault_lines
 from console.monitor.state import MonitorState
+from console.tone import Tone
 from console.window.event_list import EventList
 from console.window.labels import set_bold, set_text
 from console.window.line_list import LineList
 from console.window.lines import ComponentLine, FaultWidget
+from console.words import age
 
 _SMALLEST_WIDTH = 34
 """In average letters."""

@@ -74,8 +74,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
         ("console/robots/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
-        ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window")),
-        ("console/monitor/", (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window")),
+        ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window", "console.cli")),
+        (
+            "console/monitor/",
+            (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window", "console.cli"),
+        ),
+        ("console/window/", ("console.cli",)),
     ],
 )
 def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) -> None:

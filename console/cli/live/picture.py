@@ -13,7 +13,7 @@ from console.cli.live.wishes import Note
 from console.cli.look import Look
 from console.cli.rows import status_rows
 from console.cli.tables import STYLES, headline, rows_table
-from console.cli.words import age, plural
+from console.words import age, plural
 
 
 @dataclass(frozen=True, slots=True)

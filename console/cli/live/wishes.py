@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from console.cli.live.keys import PROFILES, Key
-from console.cli.rows import Tone
 from console.client import GatewayError, PreviewChange, PreviewProfile, PreviewState, PreviewStatus
+from console.tone import Tone
 
 _GOOD_NEWS_FOR_S: Final = 5.0
 _BAD_NEWS_FOR_S: Final = 15.0

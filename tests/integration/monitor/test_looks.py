@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from console.cli.rows import Tone
+from console.tone import Tone
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
 from console.window.look import draw_shape

@@ -5,11 +5,12 @@ import io
 import pytest
 from rich.console import Console, RenderableType
 
-from console.cli.rows import Tone, status_rows
+from console.cli.rows import status_rows
 from console.cli.tables import overlay_view, status_view
 from console.cli.watch_line import watch_line
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STATUS
 from console.client.results import SystemStatus
+from console.tone import Tone
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR

@@ -11,9 +11,9 @@ from rich.text import Text
 from console.cli.live.keys import Key, keys_in
 from console.cli.live.picture import Fitted
 from console.cli.live.wishes import Wish, Wishes
-from console.cli.rows import Tone
 from console.client import PreviewChange, PreviewProfile, PreviewState, PreviewStatus, Unreachable
 from console.client.mapping.methods import GET_SYSTEM_STATUS
+from console.tone import Tone
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
 PREVIEW = GET_SYSTEM_STATUS.decode(SystemStatus().SerializeToString()).preview

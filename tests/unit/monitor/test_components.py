@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from console.cli.rows import Tone
 from console.client import Unreachable
 from console.monitor.components import Component, components
 from console.monitor.link import Link, Phase
 from console.monitor.state import MonitorState
+from console.tone import Tone
 from omniseer.gateway.v1 import overlay_pb2, source_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.snapshots import NOW_S, heard, snapshot

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from console.cli.rows import Tone
 from console.client import CaughtUp, DeadlineExceeded, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import ControlAction, ControlResult, EventKind, GapReason
 from console.monitor.event_lines import KEPT, EventLine, EventTrail, line_of
+from console.tone import Tone
 
 HERE = EventPosition("run", 7)
 

@@ -1,7 +1,7 @@
 """Faults with their remedies."""
 
-from console.cli.rows import Tone
 from console.monitor.faults import FaultLine, fault_lines
+from console.tone import Tone
 from omniseer.gateway.v1 import fault_pb2, overlay_pb2
 from tests.support.snapshots import NOW_S, heard, snapshot
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from console.cli.rows import Tone
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, Unreachable
 from console.monitor.link import Link, Phase, link_words
+from console.tone import Tone
 
 TARGET = "lab-1:50051"
 

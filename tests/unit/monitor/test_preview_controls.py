@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from console.cli.rows import Tone
 from console.client import DeadlineExceeded, OverlaySnapshot, PreviewChange, PreviewProfile, Unreachable
 from console.monitor.link import Link, Phase
 from console.monitor.preview_controls import Controls, Note, controls
 from console.monitor.state import MonitorState, Request, Wish
+from console.tone import Tone
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.snapshots import NOW_S, heard, snapshot
