@@ -26,6 +26,7 @@ from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
+from gateway.rpc.counting import CountingInterceptor
 from gateway.rpc.limiting import LimitInterceptor
 from gateway.rpc.limits import Admission, Limits
 from gateway.rpc.server import SERVICE, method_handlers
@@ -121,10 +122,13 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
 
     door = Door(SecuritySettings(credentials=credentials), lambda _news: None, lambda: None)
     guards = [door.guard] if door.guard else []
-    server = new_server([LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits())), *guards])
+    handlers = method_handlers(gateway)
+    counting = CountingInterceptor(gateway.tally, SERVICE, handlers)
+    limiting = LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits()))
+    server = new_server([counting, limiting, *guards])
     server.add_generic_rpc_handlers(
         (
-            grpc.method_handlers_generic_handler(SERVICE, method_handlers(gateway)),
+            grpc.method_handlers_generic_handler(SERVICE, handlers),
             grpc.method_handlers_generic_handler(
                 "bench.Reference",
                 {

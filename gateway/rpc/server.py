@@ -16,6 +16,7 @@ from grpc_reflection.v1alpha.reflection import enable_server_reflection
 from common.health import Health
 from common.listen import bind_tcp, bind_unix, bracketed
 from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
+from gateway.rpc.counting import CountingInterceptor
 from gateway.rpc.guard import Guard
 from gateway.rpc.limiting import LimitInterceptor
 from gateway.rpc.limits import MOST_REQUEST_BYTES, Admission, Limits
@@ -34,7 +35,7 @@ SERVICE: Final = _CONTRACT.full_name
 
 
 def method_handlers(gateway: RobotGateway, most_bytes: int = MOST_REQUEST_BYTES) -> dict[str, Handler]:
-    """The contract's method names and who answers them, counted. Total: a test compares with the schema.
+    """The contract's method names and who answers them. Total: a test compares with the schema.
 
     Args:
         gateway: answers them.
@@ -90,8 +91,10 @@ async def serving(
         UserError: the address can't be bound.
     """
     limits = limits or Limits()
-    server = new_server([LimitInterceptor(Admission(limits)), *([guard] if guard else [])], observe)
     handlers = method_handlers(gateway, limits.request_bytes)
+    counting = CountingInterceptor(gateway.tally, SERVICE, handlers)
+    limiting = LimitInterceptor(Admission(limits))
+    server = new_server([counting, limiting, *([guard] if guard else [])], observe)
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     (health or Health(SERVICE)).register(server)
     enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)
@@ -123,9 +126,10 @@ def _unary(gateway: RobotGateway, name: str, behavior: Behavior, most_bytes: int
         inner = gateway.controls.told(name, inner, reply)
 
     async def call(data: bytes, context: Context) -> bytes:
+        gateway.tally.note(context.peer())
         return await inner(requests.read(data), context)
 
-    return grpc.unary_unary_rpc_method_handler(gateway.tally.counted(name, call), None, None)
+    return grpc.unary_unary_rpc_method_handler(call, None, None)
 
 
 def _stream(gateway: RobotGateway, name: str, behavior: StreamBehavior, most_bytes: int) -> Handler:
@@ -134,13 +138,15 @@ def _stream(gateway: RobotGateway, name: str, behavior: StreamBehavior, most_byt
     requests, staying = Requests(request, most_bytes), gateway.streams.staying
 
     async def call(data: bytes, context: Context) -> AsyncIterator[bytes]:
+        peer = context.peer()
+        gateway.tally.note(peer)
         message = requests.read(data)
         hold_to_rules(message)
-        with staying.stream(address_of(context.peer())):
+        with staying.stream(address_of(peer)):
             async for reply in behavior(message, context):
                 yield reply
 
-    return grpc.unary_stream_rpc_method_handler(gateway.tally.counted_stream(name, call), None, None)
+    return grpc.unary_stream_rpc_method_handler(call, None, None)
 
 
 def changes_the_robot(method: str) -> bool:

@@ -1,7 +1,7 @@
 """Counts what is asked, and who asks."""
 
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -61,12 +61,24 @@ class Tally:
             count += 1
         return count
 
+    def note(self, peer: str) -> None:
+        """This connection asks for something, or is told something."""
+        asked = self._asked_at_s
+        asked.pop(peer, None)
+        asked[peer] = self._clock()
+        if len(asked) > _MOST_REMEMBERED:
+            del asked[next(iter(asked))]
+
+    def expect(self, methods: Iterable[str]) -> None:
+        """These methods have counts from now on, also before their first call."""
+        for method in methods:
+            self.methods.setdefault(method, Counts())
+
     def counted(self, method: str, behavior: Behavior) -> Behavior:
         """The same behavior, counted under the method's name."""
         counts = self.methods.setdefault(method, Counts())
 
         async def call(request: Any, context: Context) -> bytes:
-            self._note(context.peer())
             try:
                 reply = await behavior(request, context)
             except DomainError:
@@ -86,14 +98,13 @@ class Tally:
 
         async def call(request: Any, context: Context) -> AsyncIterator[bytes]:
             peer, begun = context.peer(), False
-            self._note(peer)
             counts.open += 1
             try:
                 async for reply in behavior(request, context):
                     if not begun:
                         begun = True
                         counts.served += 1
-                    self._note(peer)
+                    self.note(peer)
                     yield reply
             except DomainError:
                 counts.refused += 1
@@ -105,10 +116,3 @@ class Tally:
                 counts.open -= 1
 
         return call
-
-    def _note(self, peer: str) -> None:
-        asked = self._asked_at_s
-        asked.pop(peer, None)
-        asked[peer] = self._clock()
-        if len(asked) > _MOST_REMEMBERED:
-            del asked[next(iter(asked))]

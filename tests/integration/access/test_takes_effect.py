@@ -232,7 +232,8 @@ async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) ->
                 metadata=login.metadata(),
                 timeout=5,
             )
-        await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=5)
+        status = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=5)
+        assert (status.gateway.requests_served, status.gateway.requests_refused) == (1, 3)
     records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
     assert [(each["who"], each["role"], each["credential"], each["result"]) for each in records] == [
         ("anna", "operator", operator.credential_id, "accepted"),

@@ -49,7 +49,7 @@ async def test_requests_beyond_the_share_are_refused_with_the_time_to_try_again(
             assert retry_after_s is not None
             assert 0 < retry_after_s <= 0.2
         await asyncio.sleep(0.5)
-        assert (await greedy.status()).gateway_name
+        assert (await greedy.status()).gateway.requests_refused == len(refused)
 
 
 async def test_streams_beyond_the_share_are_refused(tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ async def ask(tally: Tally, peer: str = "ipv4:10.0.0.1:1", raises: type[Exceptio
         return b"answer"
 
     context: Any = Call(peer)
+    tally.note(peer)
     return await tally.counted("Get", behavior)(None, context)
 
 

@@ -44,8 +44,9 @@ class GatewayFacts(_message.Message):
     requests_served: _builtins.int
     """Calls answered since the gateway started."""
     requests_refused: _builtins.int
-    """Calls answered with a refusal since then: the request made no sense or came at the wrong time.
-    Calls turned away because too many were under way are not counted.
+    """Calls answered with a refusal since then: the request made no sense, came at the wrong time, too
+    often, or from somebody who may not. Calls turned away because too many were under way are not
+    counted.
     """
     run_id: _builtins.str
     """Another one after each start of the gateway program; numbers the events (see EventPosition)."""
