@@ -8,4 +8,5 @@ pytest_plugins = ["tests.support.engine", "tests.support.ros"]
 def pytest_configure() -> None:
     """A run in the background inherits ignored signals and would pass them on to the programs under test."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_DFL)

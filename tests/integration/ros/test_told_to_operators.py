@@ -169,7 +169,9 @@ def test_the_mode_and_the_components_a_plain_subscriber_heard_are_served(
             robot.change(mode=mode, components=levels)
             wait_until(
                 lambda mode=mode, levels=levels: (
-                    heard.get("mode") == mode and len(in_trouble(heard["components"])) == len(levels)
+                    heard.get("mode") == mode
+                    and "components" in heard
+                    and len(in_trouble(heard["components"])) == len(levels)
                 ),
                 f"the plain subscriber to hear {mode} and {levels}",
             )
@@ -195,7 +197,7 @@ def in_trouble(components: Any) -> set[tuple[str, int]]:
 def component_faults(status: Any) -> set[tuple[str, int]]:
     """The same of the faults that are served: a fault's words end with the component's own."""
     return {
-        (fault.message.partition(": ")[2], fault.severity)
+        (fault.message.rpartition(": ")[2], fault.severity)
         for fault in status.faults
         if fault.active and fault.id.startswith("diagnostics.")
     }
