@@ -66,6 +66,19 @@ REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
 )
 """Total. What a gateway says counts more than the code; a word of a newer one leaves the code to speak."""
 
+_ADVICE: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        Reason.TOO_MANY_CONNECTIONS: "Close a program that watches this robot, or wait a little",
+        Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
+        Reason.CREDENTIAL_EXPIRED: "Ask whoever keeps this robot for a new login, then type: robotctl login",
+        Reason.ROLE_TOO_LOW: (
+            "Ask whoever keeps this robot for a login with that role, then type: robotctl login"
+        ),
+        Reason.LOCKED_OUT: "Wait as long as it says; if the stored login is an old one, type: robotctl login",
+    }
+)
+"""Where a reason lets us say more than the family's own advice does."""
+
 _CLOSED: Final = "the connection was closed, as by a gateway that wants to know who asks (robotctl login)"
 
 # gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
@@ -121,7 +134,7 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
     if code is grpc.StatusCode.UNAVAILABLE and (why := _words_for(details, _NOT_TRUSTED)):
         return NotTrusted(f"what answers at {target} is not trusted: {why}")
     family = REASONS.get(refusal.reason, ERRORS[code])
-    error = family(_sentence(family, details, target, timeout_s))
+    error = family(_sentence(family, details, target, timeout_s), _ADVICE.get(refusal.reason))
     error.reason, error.fields, error.retry_after_s = refusal.reason, refusal.fields, refusal.retry_after_s
     return error
 
