@@ -17,7 +17,12 @@ _MODULES = {
     "bench.video.enabling": ("video.enable_to_frame_ms",),
     "bench.video.cpu": ("video.cpu",),
     "bench.video.switching": ("video.switch_gap_ms",),
-    "bench.video.adaptive": ("video.adaptive_limited", "video.adaptive_lossy"),
+    "bench.video.adaptive": (
+        "video.adaptive_limited",
+        "video.adaptive_limited_freeze_ms",
+        "video.adaptive_lossy",
+        "video.adaptive_lossy_freeze_ms",
+    ),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
