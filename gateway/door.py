@@ -58,7 +58,14 @@ class Door:
         self._watch = watch = AccessWatch(files.read_store, files.store_file, tls_files, self._take_over)
         self._keyring = Keyring(watch.loaded.store)
         asked = tls_files is not None and tls_files.client_authority is not None
-        self.guard = Guard(self._keyring, Lockout(), self._note_refused, somebody_is_out, certificates=asked)
+        self.guard = Guard(
+            self._keyring,
+            Lockout(),
+            self._note_refused,
+            watch.look_for_unknown,
+            somebody_is_out,
+            certificates=asked,
+        )
         self._tls = ServerTls(watch.loaded.tls) if watch.loaded.tls else None
 
     def credentials(self) -> grpc.ServerCredentials | None:

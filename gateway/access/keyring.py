@@ -41,6 +41,10 @@ class Keyring:
         token = parse_token(token_text)
         return token.credential_id if token and token.credential_id in self._by_id else ""
 
+    def knows_certificate(self, fingerprint: str) -> bool:
+        """Whether the list has this certificate, valid or not."""
+        return fingerprint in self._by_fingerprint
+
     def of_token(self, text: str) -> Principal:
         """Who shows this token.
 

@@ -5,6 +5,7 @@ were read last stay in force, and the operators see a fault.
 """
 
 import asyncio
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from gateway.status.access import AccessView, CertificateEnd
 
 LOOK_EVERY_S: Final = 0.5
 """How often the files are looked at; a revoked credential is worth nothing a moment later."""
+_UNKNOWN_LOOK_EVERY_S: Final = 0.1
+"""Minimum interval of the looks that unknown credentials cause: a flood of them costs ten `stat` a second."""
 _TROUBLED_LOOKS: Final = 3
 """Two files that belong together don't change at one instant: so many looks may find them apart."""
 _ENDING: Final = {
@@ -93,6 +96,9 @@ class AccessWatch:
         self._seen = self._signature()
         self.loaded = self._load()
         self._trouble, self._troubled_looks = "", 0
+        self._looking = asyncio.Lock()
+        self._looked_s = -math.inf
+        self._next_look: asyncio.Task[None] | None = None
 
     async def run(self) -> NoReturn:
         """Looks again and again, until cancelled."""
@@ -100,8 +106,28 @@ class AccessWatch:
             await asyncio.sleep(LOOK_EVERY_S)
             await self.look()
 
+    async def look_for_unknown(self) -> None:
+        """Returns after a look that began after this call: the credential may have been added just now.
+
+        Calls share looks, which are at least `_UNKNOWN_LOOK_EVERY_S` apart.
+        """
+        if self._next_look is None:
+            self._next_look = asyncio.create_task(self._look_when_due(), name="look for unknown credential")
+        await asyncio.shield(self._next_look)
+
+    async def _look_when_due(self) -> None:
+        await asyncio.sleep(max(0.0, self._looked_s + _UNKNOWN_LOOK_EVERY_S - time.monotonic()))
+        self._next_look = None
+        await self.look()
+
     async def look(self) -> None:
         """One look. Files are read in another thread: a disk may be slow."""
+        # One at a time: an older look that ended later would put a revoked credential back in force.
+        async with self._looking:
+            self._looked_s = time.monotonic()
+            await self._look()
+
+    async def _look(self) -> None:
         seen = await asyncio.to_thread(self._signature)
         if seen == self._seen and not self._troubled_looks:
             return

@@ -49,6 +49,7 @@ class Guard(grpc.aio.ServerInterceptor):
         keyring: knows the credentials.
         lockout: remembers who showed wrong ones.
         refused: takes the record of a control action that was refused here.
+        look_for_unknown: reads the list of credentials again when one is shown that it does not have.
         somebody_is_out: called when one who was let in would not be any more: what they know is to change.
         certificates: whether connections show certificates.
     """
@@ -58,6 +59,7 @@ class Guard(grpc.aio.ServerInterceptor):
         keyring: Keyring,
         lockout: Lockout,
         refused: Callable[[AuditRecord], None],
+        look_for_unknown: Callable[[], Awaitable[None]],
         somebody_is_out: Callable[[], None],
         *,
         certificates: bool,
@@ -65,6 +67,7 @@ class Guard(grpc.aio.ServerInterceptor):
         self._keyring = keyring
         self._lockout = lockout
         self._refused = refused
+        self._look_for_unknown = look_for_unknown
         self._somebody_is_out = somebody_is_out
         self._let_in: dict[tuple[str, ...], Principal] = {}
         """By their credentials, of which the robot has a list."""
@@ -109,14 +112,14 @@ class Guard(grpc.aio.ServerInterceptor):
 
     def _unary(self, behavior: Any, method: str, needed: Needed) -> Any:
         async def call(request: Any, context: Context) -> Any:
-            begin(self._admit(context, method, needed))
+            begin(await self._admit(context, method, needed))
             return await behavior(request, context)
 
         return call
 
     def _stream(self, behavior: Any, method: str, needed: Needed) -> Any:
         async def call(request: Any, context: Context) -> AsyncIterator[Any]:
-            principal = self._admit(context, method, needed)
+            principal = await self._admit(context, method, needed)
             begin(principal)
             task = asyncio.current_task()
             assert task is not None, "gRPC serves each call in a task of its own"
@@ -130,7 +133,7 @@ class Guard(grpc.aio.ServerInterceptor):
 
         return call
 
-    def _admit(self, context: Context, method: str, needed: Needed) -> Principal:
+    async def _admit(self, context: Context, method: str, needed: Needed) -> Principal:
         """Who calls, when they may.
 
         Raises:
@@ -138,7 +141,7 @@ class Guard(grpc.aio.ServerInterceptor):
         """
         principal = None
         try:
-            principal = self._identify(context)
+            principal = await self._identify(context)
             _hold_to(needed, principal, method)
         except (NotAuthenticatedError, NotAllowedError, TooMuchError) as error:
             self._note_refusal(context, method, needed, principal, error)
@@ -146,7 +149,7 @@ class Guard(grpc.aio.ServerInterceptor):
         self._let_in[principal.credential_ids] = principal
         return principal
 
-    def _identify(self, context: Context) -> Principal:
+    async def _identify(self, context: Context) -> Principal:
         token = token_of(context)
         fingerprint = fingerprint_of(context) if self._certificates else None
         if token is None and fingerprint is None:
@@ -154,6 +157,11 @@ class Guard(grpc.aio.ServerInterceptor):
                 "this robot wants to know who asks; robotctl login tells it",
                 Reason.CREDENTIAL_MISSING,
             )
+        unknown = (token is not None and not self._keyring.owner(token)) or (
+            fingerprint is not None and not self._keyring.knows_certificate(fingerprint)
+        )
+        if unknown:
+            await self._look_for_unknown()
         by_certificate = self._keyring.of_certificate(fingerprint) if fingerprint is not None else None
         by_token = self._of_token(context, token) if token is not None else None
         if by_certificate and by_token:

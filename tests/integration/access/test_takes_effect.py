@@ -16,6 +16,7 @@ from console.client.refusal import refusal_in
 from gateway.access.attempts import FREE
 from gateway.access.credential import Kind
 from gateway.access.role import Role
+from gateway.access.token import new_token
 from gateway.rpc.mapping.enums import SEVERITIES
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetSystemStatusRequest,
@@ -58,6 +59,28 @@ async def test_a_new_token_counts_soon_and_a_revoked_one_no_more(tmp_path: Path)
         await until(lambda: ping(calls, login), "")
         robot.keeper.revoke(credential.credential_id)
         await until(lambda: ping(calls, login), Reason.CREDENTIAL_REVOKED)
+
+
+async def test_a_new_token_counts_at_its_first_use(tmp_path: Path) -> None:
+    """`robot-gateway credentials add ... | robotctl login ...` asks within milliseconds."""
+    async with guarded_gateway(new_robot(tmp_path)) as robot:
+        for number in range(10):
+            _, login = robot.add(Role.VIEWER, name=f"person-{number}")
+            assert await ping(stub(robot), login) == ""
+
+
+async def test_a_flood_of_unknown_tokens_shares_its_looks(tmp_path: Path) -> None:
+    """Strangers cause ten reads of the files a second at the most, however many they are."""
+    async with guarded_gateway(new_robot(tmp_path)) as robot:
+        strangers = [Login(new_token(f"{number:012x}").text()) for number in range(200)]
+        calls = stub(robot)
+        began_s = time.monotonic()
+        said = await asyncio.gather(*(ping(calls, each) for each in strangers))
+        # One look is shared by all that wait for it; two hundred looks in a row would take 20 s.
+        assert time.monotonic() - began_s < 5
+        assert set(said) <= {Reason.CREDENTIAL_UNKNOWN, Reason.LOCKED_OUT}
+        _, login = robot.add(Role.VIEWER)
+        assert await ping(calls, login) == ""
 
 
 async def test_a_rotated_token_goes_over_without_a_gap(tmp_path: Path) -> None:

@@ -30,9 +30,19 @@ class Ground:
         self.take_over()
         self.refused: list[Any] = []
         self.times_out = 0
+        self.looks = 0
         self.guard = Guard(
-            self.keyring, Lockout(), self.refused.append, self._somebody_is_out, certificates=False
+            self.keyring,
+            Lockout(),
+            self.refused.append,
+            self._look_for_unknown,
+            self._somebody_is_out,
+            certificates=False,
         )
+
+    async def _look_for_unknown(self) -> None:
+        self.looks += 1
+        self.take_over()
 
     def _somebody_is_out(self) -> None:
         self.times_out += 1
@@ -106,3 +116,19 @@ async def test_who_was_never_let_in_takes_nothing_along(ground: Ground) -> None:
         await ground.ping("carla")
     await ground.guard.end_what_is_over()
     assert ground.times_out == 0
+
+
+async def test_a_credential_added_since_the_last_look_is_accepted_at_once(ground: Ground) -> None:
+    ground.tokens["dora"] = new_token("d" * 12)
+    ground.credentials["dora"] = _credential("dora", ground.tokens["dora"])
+    assert await ground.ping("dora") == "answer"
+    assert ground.looks == 1
+    assert await ground.ping("dora") == "answer"
+    assert ground.looks == 1, "known ones cause no look"
+
+
+async def test_an_unknown_credential_causes_one_look_and_is_refused(ground: Ground) -> None:
+    ground.tokens["eve"] = new_token("e" * 12)
+    with pytest.raises(NotAuthenticatedError):
+        await ground.ping("eve")
+    assert ground.looks == 1
