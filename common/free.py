@@ -1,50 +1,61 @@
-"""Ports and ROS domains that nobody on this machine uses."""
+"""Ports and ROS domains that are free on this machine.
 
-import fcntl
+Programs that start at the same time (two demos, the workers of a test run) must not choose the same one.
+Each claims what it takes: a name in the abstract namespace of Unix sockets (unix(7)), which has one owner per
+network namespace, as ports have, ends with its process and leaves no file behind.
+"""
+
 import os
 import socket
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Final
 
 from common.errors import UserError
 
+_PORT_BLOCKS: Final = tuple(range(61_000, 65_500, 125))
+"""First port of each block, above the ephemeral ports of Linux (net.ipv4.ip_local_port_range, usually 32768
+to 60999): the kernel gives none of them to an outgoing connection between our look and the program's bind."""
+_BLOCK_SIZE: Final = 125
 _DOMAINS: Final = range(1, 102)
-"""Beyond 101 the ports of a domain reach into the range that Linux hands out to anybody."""
+"""The ports of a domain beyond 101 reach into the ephemeral ports (DDSI-RTPS 9.6: 7400 + 250 x domain)."""
 _LOOPBACK: Final = "127.0.0.1"
+_ANY_ADDRESS: Final = ""
+
+_ports: Iterator[int] | None = None
+"""This process's block of ports, one after the other and round again; None before the first one is needed."""
 
 
 def free_port(kind: socket.SocketKind) -> int:
-    """A port that was free on every local address a moment ago."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
+    """Returns a port that is free on every local address, from this process's own block of ports.
+
+    Raises:
+        UserError: every block is claimed, or no port of this process's block is free.
+    """
+    global _ports  # noqa: PLW0603 - one block per process, however many callers it has
+    if _ports is None:
+        _ports = _claimed_block()
+    for _ in range(_BLOCK_SIZE):
+        port = next(_ports)
+        if _can_bind(kind, _ANY_ADDRESS, port):
+            return port
+    raise UserError(
+        "none of the ports set aside for this program is free", "Stop what listens on them: ss -tulnp"
+    )
 
 
 def port_is_free(kind: socket.SocketKind, port: int) -> bool:
     """Whether a program could listen on this port of 127.0.0.1 now."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        if kind is socket.SOCK_STREAM:
-            # What a closed connection leaves behind for a minute is in nobody's way.
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((_LOOPBACK, port))
-            if kind is socket.SOCK_STREAM:
-                probe.listen()
-        except OSError:
-            return False
-    return True
+    return _can_bind(kind, _LOOPBACK, port)
 
 
 def free_tcp_port() -> int:
-    """A TCP port that was free on every local address a moment ago."""
+    """Returns a free TCP port; see `free_port`."""
     return free_port(socket.SOCK_STREAM)
 
 
 def free_udp_port() -> int:
-    """A UDP port that was free on every local address a moment ago."""
+    """Returns a free UDP port; see `free_port`."""
     return free_port(socket.SOCK_DGRAM)
 
 
@@ -55,33 +66,60 @@ def udp_port_is_free(port: int) -> bool:
 
 @contextmanager
 def free_domain() -> Iterator[int]:
-    """A ROS domain without a participant on this machine, ours until the block ends.
-
-    A lock per domain keeps two demos, or a demo and a test, from choosing the same one at the same time.
+    """Yields a ROS domain without a participant on this machine, claimed until the block ends.
 
     Raises:
         UserError: every domain is in use.
     """
-    locks = Path(tempfile.gettempdir()) / f"robot-gateway-ros-domains-{os.getuid()}"
-    locks.mkdir(exist_ok=True)
     first = os.getpid() % len(_DOMAINS)
     for domain in (*_DOMAINS[first:], *_DOMAINS[:first]):
-        with (locks / str(domain)).open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                continue
-            if _is_silent(domain):
+        claim = _claim(f"ros-domain-{domain}")
+        if claim is None:
+            continue
+        with claim:
+            # The discovery port of the domain, which its participants share.
+            if _can_bind(socket.SOCK_DGRAM, _ANY_ADDRESS, 7400 + 250 * domain):
                 yield domain
                 return
     raise UserError("all ROS domains are in use", "Stop what nobody needs any more, or choose one yourself")
 
 
-def _is_silent(domain: int) -> bool:
-    """Whether nobody listens on the domain's discovery port (RTPS: 7400 + 250 x domain)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+def _claimed_block() -> Iterator[int]:
+    for first in _PORT_BLOCKS:
+        if claim := _claim(f"ports-{first}"):
+            return _round_robin(first, claim)
+    raise UserError(
+        f"all {len(_PORT_BLOCKS)} blocks of free ports are claimed by other programs", "Stop demos or tests"
+    )
+
+
+def _round_robin(first: int, claim: socket.socket) -> Iterator[int]:
+    # Round again rather than from the start: a socket may close late. The iterator holds the claim.
+    with claim:
+        while True:
+            yield from range(first, first + _BLOCK_SIZE)
+
+
+def _claim(name: str) -> socket.socket | None:
+    """Returns what holds the claim until it is closed; None where another program has it."""
+    holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        holder.bind(f"\0robot-gateway-{name}")
+    except OSError:
+        holder.close()
+        return None
+    return holder
+
+
+def _can_bind(kind: socket.SocketKind, address: str, port: int) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind is socket.SOCK_STREAM:
+            # A closed connection in TIME-WAIT (RFC 9293 3.6.1) does not keep a listener out.
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind(("", 7400 + 250 * domain))
+            probe.bind((address, port))
+            if kind is socket.SOCK_STREAM:
+                probe.listen()
         except OSError:
             return False
     return True
