@@ -11,8 +11,9 @@ import pytest
 # Read when the first application is made.
 os.environ.setdefault("QT_QPA_PLATFORM", f"offscreen:configfile={Path(__file__).with_name('offscreen.json')}")
 
-from PySide6.QtCore import QEventLoop, QSettings, QTimer
+from PySide6.QtCore import QEventLoop, QSettings, Qt, QTimer
 from PySide6.QtGui import QColor, QPalette
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 T = TypeVar("T")
@@ -56,6 +57,16 @@ def until(condition: Callable[[], T], what: str, within_s: float = 20.0) -> T:
         assert time.monotonic() < deadline_s, f"not within {within_s:g} s: {what}"
         let_pass(0.01)
     return answer
+
+
+def press(
+    widget: QWidget, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier
+) -> None:
+    """Presses a key in the active window; a shortcut of a window that is not active yet would be lost."""
+    window = widget.window()
+    window.activateWindow()
+    until(window.isActiveWindow, "the window is active")
+    QTest.keyClick(widget, key, *modifier)
 
 
 def keep_picture(widget: QWidget, name: str) -> Path:

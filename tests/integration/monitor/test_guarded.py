@@ -9,14 +9,13 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtTest import QTest
 
 from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from tests.support.guarded_program import Guarded, guarded_program, guarded_video
-from tests.support.qt import keep_picture, let_pass, until
+from tests.support.qt import keep_picture, let_pass, press, until
 
 pytestmark = pytest.mark.gst
 
@@ -47,7 +46,7 @@ class Person:
 
     def press_p(self) -> None:
         until(self.window.preview.switch.isEnabled, "the controls may be touched")
-        QTest.keyClick(self.window, Qt.Key.Key_P)
+        press(self.window, Qt.Key.Key_P)
 
     def notes(self) -> str:
         return " ".join(line.text.text() for line in self.window.preview.notes.shown)  # type: ignore[attr-defined]

@@ -16,7 +16,7 @@ from console.window.preview_panel import PreviewPanel
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import keep_picture, let_pass, until
+from tests.support.qt import keep_picture, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
 CLOSES_WITHIN_S = 6.0
@@ -35,7 +35,7 @@ class Desk:
         return self.window.preview
 
     def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
-        QTest.keyClick(QApplication.focusWidget() or self.window, key, modifier)
+        press(QApplication.focusWidget() or self.window, key, modifier)
 
     def click(self, button: QPushButton) -> None:
         QTest.mouseClick(button, Qt.MouseButton.LeftButton)
@@ -127,7 +127,7 @@ def test_while_the_robot_thinks_nothing_can_be_pressed_and_the_focus_comes_back(
     until(lambda: not desk_work.preview.switch.isEnabled(), "the controls are locked")
     assert not any(each.isEnabled() for each in desk_work.preview.profiles.values())
     asked = len(desk_work.gateway.wishes)
-    QTest.keyClick(desk_work.window, Qt.Key.Key_P)
+    press(desk_work.window, Qt.Key.Key_P)
     desk_work.gateway.hold.set()
     desk_work.free()
     assert button.hasFocus()
@@ -195,7 +195,7 @@ def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
         with monitor(f"127.0.0.1:{port}") as window:
             until(window.preview.switch.isEnabled, "it is connected")
             gateway.hold.clear()
-            QTest.keyClick(window, Qt.Key.Key_P)
+            press(window, Qt.Key.Key_P)
             until(lambda: not window.preview.switch.isEnabled(), "a request is on its way")
             window.close()
             closed_s = time.monotonic()

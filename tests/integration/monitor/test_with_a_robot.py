@@ -19,7 +19,7 @@ from console.window.lines import ComponentLine, FaultWidget
 from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import NoteLine
-from tests.support.qt import keep_picture, let_pass, until
+from tests.support.qt import keep_picture, let_pass, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
@@ -82,7 +82,7 @@ class Watch:
 
     def key(self, key: Qt.Key) -> None:
         until(self.window.preview.switch.isEnabled, "the controls may be touched")
-        QTest.keyClick(self.window, key)
+        press(self.window, key)
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     assert watch.robot.gateway
     watch.robot.gateway.kill()
     closed_s = time.monotonic()
-    QTest.keyClick(watch.window, Qt.Key.Key_Q)
+    press(watch.window, Qt.Key.Key_Q)
     until(lambda: not watch.window.isVisible(), "it is closed")
     assert time.monotonic() - closed_s < CLOSES_WITHIN_S
 

@@ -15,14 +15,13 @@ from console.viewer.geometry import Box
 from console.viewer.state import Phase
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import KEPT_IN, application, let_pass, until
+from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
 from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 from PySide6.QtGui import QColor, QImage  # isort: skip
-from PySide6.QtTest import QTest  # isort: skip
 from PySide6.QtWidgets import QWidget  # isort: skip
 
 from console.window.view_program import Viewing, viewing
@@ -93,23 +92,23 @@ def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: Vie
     shows(view, Phase.OFF)
     let_pass(0.6)
     keep(view.window, "off")
-    QTest.keyClick(view.window, Qt.Key.Key_P)
+    press(view.window, Qt.Key.Key_P)
     shows(view, Phase.LIVE)
     until(lambda: "320x240 h264 by avdec_h264" in view.window.figures.text(), "the figures")
     assert view.window.windowTitle().endswith(ground.target)
-    QTest.keyClick(view.window, Qt.Key.Key_P)
+    press(view.window, Qt.Key.Key_P)
     shows(view, Phase.OFF)
 
 
 def test_a_person_turns_full_screen_on_and_off_and_quits(view: Viewing) -> None:
     shows(view, Phase.OFF)
-    QTest.keyClick(view.window, Qt.Key.Key_F)
-    assert view.window.isFullScreen()
+    press(view.window, Qt.Key.Key_F)
+    until(view.window.isFullScreen, "full screen")
     assert not view.window.figures.isVisible()
-    QTest.keyClick(view.window, Qt.Key.Key_Escape)
-    assert not view.window.isFullScreen()
+    press(view.window, Qt.Key.Key_Escape)
+    until(lambda: not view.window.isFullScreen(), "a window again")
     assert view.window.figures.isVisible()
-    QTest.keyClick(view.window, Qt.Key.Key_Q)
+    press(view.window, Qt.Key.Key_Q)
     assert not view.window.isVisible()
 
 
@@ -138,7 +137,7 @@ def test_a_refusal_is_told_in_the_robots_words() -> None:
     double.accept = False
     with serving(double) as port, viewing(f"127.0.0.1:{port}", None, Bookkeeper()) as view:
         shows(view, Phase.OFF)
-        QTest.keyClick(view.window, Qt.Key.Key_P)
+        press(view.window, Qt.Key.Key_P)
         until(lambda: "the robot is being serviced" in view.window.said.text(), "the robot's words")
         let_pass(0.3)
         keep(view.window, "refused")
