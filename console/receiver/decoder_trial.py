@@ -13,10 +13,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
+from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
 from console.receiver import clips
 
+_ENDS_WITHIN_S: Final = 30
+"""More than any caller waits: what is left when the caller was killed between its start and ours."""
 _FIRST_WITHIN_S: Final = 1.5
 """A driver may have to wake up."""
 _NEXT_WITHIN_S: Final = 0.3
@@ -50,6 +53,7 @@ class _Run:
 
 def main() -> None:
     """Runs one trial."""
+    end_with_parent(_ENDS_WITHIN_S)
     element, codec = sys.argv[1:]
     try:
         # Kept until the end: a pipeline that is forgotten while it plays is torn down badly.

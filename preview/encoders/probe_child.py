@@ -11,6 +11,7 @@ import time
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
+from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import settings
@@ -21,6 +22,8 @@ from preview.values import Target
 FRAMES: Final = 10
 _ENOUGH: Final = 8
 """Pictures that must come out; an encoder may keep a frame or two until more arrive."""
+_ENDS_WITHIN_S: Final = 90
+"""More than the configuration allows a trial: the service sets the deadline, unless it was killed."""
 _NICE: Final = 5
 """A trial yields to whatever runs."""
 
@@ -50,6 +53,7 @@ def main() -> None:
 
     `python -m preview.encoders.probe_child x264 1280 720 30 2500`
     """
+    end_with_parent(_ENDS_WITHIN_S)
     os.nice(_NICE)
     name, *figures = sys.argv[1:]
     width, height, fps, bitrate = (int(figure) for figure in figures)

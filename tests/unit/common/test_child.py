@@ -1,0 +1,49 @@
+"""A helper process ends with the one that started it, even while it hangs with Python's lock held."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).parents[3]
+# PyDLL keeps Python's lock during the call: no handler or thread of Python runs, as in a driver that hangs.
+HANGS = "import ctypes; ctypes.PyDLL(None).sleep(60)"
+HELPER = f"""
+from common.child import end_with_parent
+end_with_parent({{}})
+print("begun", flush=True)
+{HANGS}
+"""
+PARENT = f"""
+import subprocess, sys
+helper = subprocess.Popen([sys.executable, "-c", {HELPER.format(60)!r}])
+print(helper.pid, flush=True)
+helper.wait()
+"""
+
+
+def run(code: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_it_ends_with_its_parent(number: signal.Signals) -> None:
+    with run(PARENT) as parent:
+        assert parent.stdout
+        lines = {parent.stdout.readline().strip(), parent.stdout.readline().strip()}
+        assert "begun" in lines
+        helper = psutil.Process(int((lines - {"begun"}).pop()))
+        os.kill(parent.pid, number)
+        parent.wait(10)
+        wait_until(lambda: not helper.is_running() or helper.status() == psutil.STATUS_ZOMBIE, "it ended")
+
+
+def test_it_ends_after_its_time() -> None:
+    with run(HELPER.format(1)) as helper:
+        assert helper.wait(15) == -signal.SIGALRM
