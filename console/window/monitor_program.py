@@ -50,5 +50,7 @@ def monitor(target: str, login: Login | None = None) -> Iterator[MonitorWindow]:
         yield window
     finally:
         window.close()
+        # Its shortcuts hold it, and it holds the last picture: only Qt can free it.
+        window.deleteLater()
         worker.close(_HANG_UP_WITHIN_S)
         session.close(_HANG_UP_WITHIN_S)

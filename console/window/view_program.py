@@ -62,6 +62,8 @@ def viewing(
         yield Viewing(window, session, worker)
     finally:
         window.close()
+        # Its shortcuts hold it, and it holds the last picture: only Qt can free it.
+        window.deleteLater()
         worker.close(_HANG_UP_WITHIN_S)
         if session.close(_HANG_UP_WITHIN_S) and recording:
             # Only now does nobody write to it any more.
