@@ -2,7 +2,12 @@
 
 import signal
 
-pytest_plugins = ["tests.support.engine", "tests.support.ros"]
+pytest_plugins = [
+    "tests.support.distribution",
+    "tests.support.engine",
+    "tests.support.leftovers",
+    "tests.support.ros",
+]
 
 
 def pytest_configure() -> None:

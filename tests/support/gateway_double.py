@@ -28,6 +28,7 @@ _TARGETS = {
     preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY: (60, 4500),
 }
 """Frames per second and kbit/s."""
+_HELD_AT_MOST_S = 20
 
 
 def healthy_status() -> system_status_pb2.SystemStatus:
@@ -64,6 +65,8 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         failures: (code, details) pairs; each call takes one and fails with it, until none is left.
         preview_becomes: states of the preview after an enable, one for each later look at the status. When it
             is empty, an enable comes to its end at once.
+        preview_answers: while cleared, the preview service behind this gateway hangs: SetPreviewMode waits,
+            at most 20 s, and nothing else does so.
         hold: while cleared, calls wait (at most 20 s) before they are answered.
         calls: names of the methods called, in order.
         wishes: what SetPreviewMode was asked.
@@ -80,6 +83,8 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.fault = "no encoder works. Type: robot-preview encoders"
         self.accept = True
         self.works = True
+        self.preview_answers = threading.Event()
+        self.preview_answers.set()
         self.hold = threading.Event()
         self.hold.set()
         self.calls: list[str] = []
@@ -108,6 +113,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.wishes.append(request)
         if request.enabled and request.profile not in preview_pb2.PreviewProfile.values():
             context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"profile {request.profile} does not exist")
+        self.preview_answers.wait(_HELD_AT_MOST_S)
         message = self._switch(request) if self.accept else "the robot is being serviced"
         return robot_gateway_pb2.SetPreviewModeResponse(
             accepted=self.accept, message=message, preview=self.status.preview
@@ -125,7 +131,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         if self.failures:
             code, details = self.failures.popleft()
             context.abort(code, details)
-        self.hold.wait(20)
+        self.hold.wait(_HELD_AT_MOST_S)
 
     def _switch(self, request: robot_gateway_pb2.SetPreviewModeRequest) -> str:
         preview = self.status.preview
@@ -182,8 +188,9 @@ def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
 @contextmanager
 def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
     """Serves the double on 127.0.0.1 and yields the port; pings are allowed as by the real gateway."""
+    workers = futures.ThreadPoolExecutor(max_workers=8)
     server = grpc.server(
-        futures.ThreadPoolExecutor(max_workers=8),
+        workers,
         options=[
             ("grpc.so_reuseport", 0),
             ("grpc.keepalive_permit_without_calls", 1),
@@ -197,4 +204,6 @@ def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
         yield bound
     finally:
         double.hold.set()
+        double.preview_answers.set()
         server.stop(0).wait(10)
+        workers.shutdown()

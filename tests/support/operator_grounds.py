@@ -91,7 +91,7 @@ class DoubleGround(Ground):
         self._double.preview_service_dies()
 
     def hang_preview(self) -> None:
-        """There is none that could hang."""
+        self._double.preview_answers.clear()
 
 
 @asynccontextmanager

@@ -67,7 +67,8 @@ class SrtSender:
         if passphrase:
             sink.set_property("passphrase", passphrase)
             sink.set_property("pbkeylen", 32)
-        sink.connect("caller-added", self._on_caller)
+        self._sink = sink
+        self._handler = sink.connect("caller-added", self._on_caller)
         self._input = self._pipeline.get_by_name("in")
         self._pipeline.set_state(Gst.State.PLAYING)
 
@@ -88,6 +89,9 @@ class SrtSender:
     def close(self) -> None:
         """Hangs up on every viewer and frees the port."""
         self._pipeline.set_state(Gst.State.NULL)
+        # GStreamer's sink holds our handler and we hold the sink: no collector would free either.
+        if self._sink.handler_is_connected(self._handler):
+            self._sink.disconnect(self._handler)
 
     def _on_caller(self, _sink: Any, _socket: int, _address: Any) -> None:
         self.viewer_joined.set()
