@@ -15,10 +15,11 @@ _HELP = "Type: robotctl --help"
 
 def run() -> NoReturn:
     """Ends the program."""
-    sys.exit(_exit_code())
+    sys.exit(exit_code())
 
 
-def _exit_code() -> int:
+def exit_code() -> int:
+    """Runs the command line of this process; returns what the program is to end with."""
     try:
         code = app(prog_name="robotctl", standalone_mode=False)
     except UserError as error:

@@ -18,7 +18,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
 from tests.support.guarded_gateway import HOSTS
-from tests.support.robotctl import robotctl
+from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 
@@ -61,6 +61,10 @@ class Guarded:
     def robotctl(self, *words: str) -> "subprocess.CompletedProcess[str]":
         """Typed on the laptop."""
         return robotctl(*words, XDG_CONFIG_HOME=str(self.home))
+
+    def robotctl_process(self, *words: str) -> "subprocess.CompletedProcess[str]":
+        """The same by the installed program: video needs a process of its own."""
+        return robotctl_process(*words, XDG_CONFIG_HOME=str(self.home))
 
     def stored(self) -> Credentials:
         """What the laptop has kept last."""

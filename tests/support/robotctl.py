@@ -1,9 +1,18 @@
-"""robotctl as a user starts it: another process, its exit code and what it printed."""
+"""robotctl as a user types it: its exit code and what it printed.
 
+`robotctl` runs the command line in this process, which takes a tenth of the time; `robotctl_process` runs the
+installed program. Each file of tests that uses the first has a test that uses the second or `ROBOTCTL`.
+"""
+
+import io
 import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from unittest import mock
+
+from console.cli.run import exit_code
 
 ROBOTCTL = Path(sys.executable).parent / "robotctl"
 ENDS_WITHIN_S = 60.0
@@ -17,7 +26,20 @@ def environment(**extra: str) -> dict[str, str]:
 
 
 def robotctl(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":
-    """Runs it to its end, in pipes; `extra` goes into its environment."""
+    """Runs the command line to its end, output captured; `extra` goes into its environment."""
+    out, err = _pipe(), _pipe()
+    with (
+        mock.patch.object(sys, "argv", [str(ROBOTCTL), *words]),
+        mock.patch.dict(os.environ, environment(**extra), clear=True),
+        redirect_stdout(out),
+        redirect_stderr(err),
+    ):
+        code = exit_code()
+    return subprocess.CompletedProcess([ROBOTCTL, *words], code, _text(out), _text(err))
+
+
+def robotctl_process(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":
+    """Runs the installed program to its end, in pipes; `extra` goes into its environment."""
     return subprocess.run(
         [ROBOTCTL, *words],
         capture_output=True,
@@ -32,3 +54,13 @@ def only_line(text: str) -> str:
     """The one line there is."""
     (line,) = text.splitlines()
     return line
+
+
+def _pipe() -> io.TextIOWrapper:
+    """A text stream over bytes, as standard output is when it leads into a pipe."""
+    return io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
+
+
+def _text(pipe: io.TextIOWrapper) -> str:
+    pipe.seek(0)
+    return pipe.read()

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.access.role import Role
 from tests.support.guarded_program import ROBOT, Guarded, guarded_program
-from tests.support.robotctl import ENDS_WITHIN_S, only_line, robotctl
+from tests.support.robotctl import ENDS_WITHIN_S, only_line, robotctl, robotctl_process
 from tests.support.robotctl_docs import documented, holds
 from tests.support.terminal import robotctl_on_terminal
 
@@ -87,6 +87,8 @@ def test_a_token_is_never_sent_in_the_clear_and_no_window_opens_for_it(tmp_path:
     token.chmod(0o600)
     book.write_text(f'[robots.far]\ntarget = "192.0.2.1:50051"\ntoken_file = "{token}"\n')
     for words in (("status",), ("monitor",)):
-        done = robotctl("--robot", "far", *words, XDG_CONFIG_HOME=str(tmp_path), QT_QPA_PLATFORM="offscreen")
+        done = robotctl_process(
+            "--robot", "far", *words, XDG_CONFIG_HOME=str(tmp_path), QT_QPA_PLATFORM="offscreen"
+        )
         assert done.returncode == 2, done
         assert "in the clear" in only_line(done.stderr)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl
+from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl_process
 from tests.support.waiting import wait_until
 
 ENDS_WITHIN_S = 6.0
@@ -21,14 +21,14 @@ NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
 
 def test_without_a_display_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
-    ended = robotctl("monitor", **NO_DISPLAY)
+    ended = robotctl_process("monitor", **NO_DISPLAY)
     assert ended.returncode == 1
     assert "no display" in only_line(ended.stderr)
     assert "robotctl watch" in ended.stderr
 
 
 def test_a_display_that_does_not_answer_is_one_line() -> None:
-    ended = robotctl("monitor", QT_QPA_PLATFORM="xcb", DISPLAY="127.0.0.1:98")
+    ended = robotctl_process("monitor", QT_QPA_PLATFORM="xcb", DISPLAY="127.0.0.1:98")
     assert ended.returncode == 1
     assert only_line(ended.stderr).startswith("error: Qt can't show a window")
 
@@ -39,7 +39,7 @@ def test_without_qt_it_says_what_to_install(tmp_path: Path) -> None:
     (package / "__init__.py").write_text(
         "raise ModuleNotFoundError('none', name='PySide6')", encoding="utf-8"
     )
-    ended = robotctl("monitor", PYTHONPATH=str(tmp_path))
+    ended = robotctl_process("monitor", PYTHONPATH=str(tmp_path))
     assert ended.returncode == 1
     assert only_line(ended.stderr).endswith("Type, in a clone of the project: scripts/install-console")
 
@@ -49,14 +49,14 @@ def test_qt_without_a_library_of_the_system_says_what_to_install(tmp_path: Path)
     package.mkdir()
     reason = "libEGL.so.1: cannot open shared object file"
     (package / "__init__.py").write_text(f"raise ImportError('{reason}')", encoding="utf-8")
-    ended = robotctl("monitor", PYTHONPATH=str(tmp_path))
+    ended = robotctl_process("monitor", PYTHONPATH=str(tmp_path))
     assert ended.returncode == 1
     assert reason in only_line(ended.stderr)
     assert "sudo apt install" in ended.stderr
 
 
 def test_an_address_that_is_none_is_a_wrong_command_line() -> None:
-    ended = robotctl("monitor", "--target", "http://robot/", QT_QPA_PLATFORM="offscreen")
+    ended = robotctl_process("monitor", "--target", "http://robot/", QT_QPA_PLATFORM="offscreen")
     assert ended.returncode == 2
     assert "not the address" in only_line(ended.stderr)
 

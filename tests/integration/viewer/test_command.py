@@ -13,7 +13,7 @@ import pytest
 from common.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.judges import decoded_pictures
-from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl
+from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl_process
 from tests.support.robotctl_docs import documented, holds
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -45,7 +45,7 @@ def without(library: str, directory: Path) -> str:
 
 
 def test_frames_are_counted_and_told_in_a_line(running: VideoGround) -> None:
-    done = robotctl("--target", running.target, "view", "--headless", "--frames", "20")
+    done = robotctl_process("--target", running.target, "view", "--headless", "--frames", "20")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     said = only_line(done.stdout)
@@ -56,7 +56,7 @@ def test_frames_are_counted_and_told_in_a_line(running: VideoGround) -> None:
 def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = ["view", "--headless", "--frames", "20", "--record", str(file)]
-    done = robotctl("--target", running.target, "--json", *command)
+    done = robotctl_process("--target", running.target, "--json", *command)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
     holds(documented("view --json"), document, complete=True)
@@ -99,7 +99,7 @@ def test_the_window_shows_and_closes(running: VideoGround, tmp_path: Path) -> No
 
 
 def test_a_full_disk_is_one_line(running: VideoGround) -> None:
-    done = robotctl(
+    done = robotctl_process(
         "--target", running.target, "view", "--headless", "--frames", "500", "--record", "/dev/full"
     )
     assert done.returncode == 1
@@ -115,13 +115,13 @@ def test_a_full_disk_is_one_line(running: VideoGround) -> None:
     ],
 )
 def test_a_wrong_command_line_is_one_line_and_2(words: list[str], said: str) -> None:
-    done = robotctl("--target", f"127.0.0.1:{free_tcp_port()}", "view", *words)
+    done = robotctl_process("--target", f"127.0.0.1:{free_tcp_port()}", "view", *words)
     assert done.returncode == 2
     assert said in only_line(done.stderr)
 
 
 def test_a_place_that_cannot_be_written_is_one_line_and_1() -> None:
-    done = robotctl("view", "--headless", "--record", "/nowhere/kept.ts")
+    done = robotctl_process("view", "--headless", "--record", "/nowhere/kept.ts")
     assert done.returncode == 1
     assert "/nowhere/kept.ts can't be written" in only_line(done.stderr)
 
@@ -129,7 +129,7 @@ def test_a_place_that_cannot_be_written_is_one_line_and_1() -> None:
 def test_nobody_there_is_one_line_and_3_and_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = ["view", "--headless", "--frames", "3", "--record", str(file)]
-    done = robotctl("--target", f"127.0.0.1:{free_tcp_port()}", *command)
+    done = robotctl_process("--target", f"127.0.0.1:{free_tcp_port()}", *command)
     assert done.returncode == 3
     assert "nothing listens there" in only_line(done.stderr)
     assert not file.exists()
@@ -144,7 +144,7 @@ def test_a_login_that_can_not_be_used_is_one_line_and_2_and_leaves_no_file(
     token.chmod(0o644)
     book.parent.mkdir()
     book.write_text(f'[robots.lab]\ntarget = "127.0.0.1"\ntoken_file = "{token}"\n')
-    done = robotctl(
+    done = robotctl_process(
         *("--robot", "lab", "view", *words, "--record", str(file)),
         XDG_CONFIG_HOME=str(tmp_path),
         QT_QPA_PLATFORM="offscreen",
@@ -156,7 +156,7 @@ def test_a_login_that_can_not_be_used_is_one_line_and_2_and_leaves_no_file(
 
 def test_a_preview_that_is_off_is_one_line_and_1() -> None:
     with serving(GatewayDouble()) as port:
-        done = robotctl("--target", f"127.0.0.1:{port}", "view", "--headless", "--frames", "3")
+        done = robotctl_process("--target", f"127.0.0.1:{port}", "view", "--headless", "--frames", "3")
     assert done.returncode == 1
     assert only_line(done.stderr) == "error: the preview is off. Type: robotctl preview on"
 
@@ -169,14 +169,14 @@ def claiming_to_run(words: str = "") -> Iterator[str]:
     double.fault = words
     with serving(double) as port:
         target = f"127.0.0.1:{port}"
-        robotctl("--target", target, "preview", "on")
+        robotctl_process("--target", target, "preview", "on")
         double.status.preview.endpoint.port = free_tcp_port()
         yield target
 
 
 def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
     with claiming_to_run() as target:
-        done = robotctl("--target", target, "view", "--headless", "--frames", "3", "--patience", "4")
+        done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "4")
     assert done.returncode == 3
     said = only_line(done.stderr)
     assert "no picture for 4 s: the preview is running; no SRT listener answers" in said
@@ -185,14 +185,14 @@ def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
 
 def test_a_faulted_preview_is_one_line_and_1() -> None:
     with claiming_to_run("the camera is gone. Plug it in") as target:
-        done = robotctl("--target", target, "view", "--headless", "--frames", "3", "--patience", "1")
+        done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "1")
     assert done.returncode == 1
     assert "the preview is faulted: the camera is gone. Plug it in" in only_line(done.stderr)
 
 
 @pytest.mark.parametrize("words", [["view"], ["view", "--headless", "--frames", "1"]])
 def test_without_gstreamer_one_line_says_what_to_install(tmp_path: Path, words: list[str]) -> None:
-    done = robotctl(*words, PYTHONPATH=without("gi", tmp_path))
+    done = robotctl_process(*words, PYTHONPATH=without("gi", tmp_path))
     assert done.returncode == 1
     said = only_line(done.stderr)
     assert said.startswith("error: video needs GStreamer")
@@ -202,18 +202,18 @@ def test_without_gstreamer_one_line_says_what_to_install(tmp_path: Path, words: 
 def test_without_gstreamer_everything_else_works(tmp_path: Path) -> None:
     with serving(GatewayDouble()) as port:
         path = without("gi", tmp_path)
-        assert robotctl("--target", f"127.0.0.1:{port}", "status", PYTHONPATH=path).returncode == 0
+        assert robotctl_process("--target", f"127.0.0.1:{port}", "status", PYTHONPATH=path).returncode == 0
 
 
 def test_without_qt_one_line_says_what_to_install(running: VideoGround, tmp_path: Path) -> None:
     path = without("PySide6", tmp_path)
-    done = robotctl("--target", running.target, "view", PYTHONPATH=path)
+    done = robotctl_process("--target", running.target, "view", PYTHONPATH=path)
     assert done.returncode == 1
     said = only_line(done.stderr)
     assert said.startswith("error: the window needs Qt")
     assert said.endswith("scripts/install-console")
     command = ["view", "--headless", "--frames", "3"]
-    assert robotctl("--target", running.target, *command, PYTHONPATH=path).returncode == 0
+    assert robotctl_process("--target", running.target, *command, PYTHONPATH=path).returncode == 0
 
 
 def test_without_a_display_one_line_says_what_to_do() -> None:

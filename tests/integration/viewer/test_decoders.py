@@ -12,7 +12,7 @@ import pytest
 
 from console.receiver import clips
 from console.receiver.decoder_probe import objection
-from tests.support.robotctl import robotctl
+from tests.support.robotctl import robotctl_process
 from tests.support.video_ground import VideoGround, video_ground
 
 pytestmark = pytest.mark.gst
@@ -37,7 +37,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[VideoGround]:
 
 def seen(ground: VideoGround, **faults: str) -> dict[str, Any]:
     """What a viewer with these decoders saw."""
-    done = robotctl(
+    done = robotctl_process(
         *("--target", ground.target, "--json", "view", "--headless", "--frames", "10"),
         **with_doubles(**faults),
     )

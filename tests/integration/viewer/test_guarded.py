@@ -11,13 +11,12 @@ from console.viewer.banner import banner
 from console.viewer.state import Phase
 from gateway.access.role import Role
 from tests.support.guarded_program import ROBOT, Guarded, guarded_video
-from tests.support.qt import application, until
-from tests.support.robotctl import only_line, robotctl
+from tests.support.qt import application, press, until
+from tests.support.robotctl import only_line, robotctl_process
 from tests.support.robotctl_docs import documented, holds
 from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
-from PySide6.QtTest import QTest  # isort: skip
 
 from console.window.view_program import viewing
 
@@ -36,7 +35,7 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
 
 
 def view(robot: Guarded, *words: str) -> tuple[int, str, str]:
-    done = robot.robotctl("--robot", ROBOT, "view", "--headless", "--frames", "30", *words)
+    done = robot.robotctl_process("--robot", ROBOT, "view", "--headless", "--frames", "30", *words)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -62,7 +61,7 @@ def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded)
     assert (code, said) == (1, "")
     assert "was revoked" in only_line(complaints)
     assert complaints.endswith("then type: robotctl login\n")
-    stranger = robotctl("--target", robot.target, "view", "--headless", "--frames", "1")
+    stranger = robotctl_process("--target", robot.target, "view", "--headless", "--frames", "1")
     assert (stranger.returncode, stranger.stdout) == (3, "")
     assert "robotctl login" in only_line(stranger.stderr)
 
@@ -72,7 +71,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
     robot.log_in("dora", Role.VIEWER)
     with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
         until(lambda: window.session.state().phase is Phase.OFF, "the preview is off")
-        QTest.keyClick(window.window, Qt.Key.Key_P)
+        press(window.window, Qt.Key.Key_P)
         until(
             lambda: "dora is viewer, and SetPreviewMode needs operator" in window.window.said.text(),
             "what is missing",
@@ -86,7 +85,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         )
         robot.log_in("dora", Role.OPERATOR)
         until(lambda: window.session.state().phase is Phase.OFF, "the new login counts", TOLD_WITHIN_S)
-        QTest.keyClick(window.window, Qt.Key.Key_P)
+        press(window.window, Qt.Key.Key_P)
         until(lambda: window.session.state().phase is Phase.LIVE, "video")
         robot.keeper.revoke("dora")
         # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
