@@ -117,10 +117,20 @@ async def test_who_does_not_read_is_not_written_for(operator: Operator) -> None:
 
 
 async def test_watchers_leave_nothing_behind(operator: Operator) -> None:
+    async def tasks() -> int:
+        # The gateway lives in this very loop: its streams, and what waits for changes on their behalf.
+        return len(asyncio.all_tasks())
+
+    async def served() -> int:
+        return int((await operator.status()).gateway.requests_served)
+
+    served_before, tasks_before = await served(), await tasks()
     calls = [watching(operator) for _ in range(10)]
     for call in calls:
         await take(call)
+    assert await tasks() >= tasks_before + 10
     for call in calls:
         call.cancel()
-    info = await operator.status()
-    assert info.gateway.requests_served >= 10
+    await eventually(tasks, lambda count: count <= tasks_before, "no stream is served any more")
+    # Counted when it ends; the status that tells of it may be the one before.
+    await eventually(served, lambda count: count >= served_before + 10, "each was counted")
