@@ -35,14 +35,9 @@ def images() -> str:
     # Its reaper is one more image, which can't be had everywhere; every test removes what is its own.
     os.environ["TESTCONTAINERS_RYUK_DISABLED"] = "true"
     built = subprocess.run(
-        [ROOT / "scripts/images", "build", "--ros", "wheels"],
-        env={**os.environ, "TAG": TAG, "COMPOSE_FILE": "compose.yaml"},
-        capture_output=True,
-        text=True,
-        timeout=_BUILD_WITHIN_S,
-        check=False,
+        [ROOT / "docker/test-images"], capture_output=True, text=True, timeout=_BUILD_WITHIN_S, check=False
     )
-    assert built.returncode == 0, f"scripts/images build: {built.stderr[-3000:]}"
+    assert built.returncode == 0, f"docker/test-images: {built.stderr[-3000:]}"
     return TAG
 
 

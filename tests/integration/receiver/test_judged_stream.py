@@ -10,7 +10,7 @@ from tests.support.mpegts import analyse, share_beyond
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 
-pytestmark = pytest.mark.gst
+pytestmark = [pytest.mark.gst, pytest.mark.timed]
 
 SECONDS = 4
 RARELY = 0.05

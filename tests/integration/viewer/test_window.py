@@ -60,6 +60,7 @@ def banner_is_on_screen(view: Viewing) -> bool:
     return max(colour.red(), colour.green(), colour.blue()) < 60
 
 
+@pytest.mark.timed
 def test_the_window_adds_less_than_one_and_a_half_pictures_to_the_latency(tmp_path: Path) -> None:
     """In one round of three: what other programs take of the machine is not the window's doing."""
     with closing(extra_latency_ms(tmp_path, rounds=3)) as rounds:

@@ -6,7 +6,7 @@ import pytest
 
 from common.healthcheck import state_of
 from console.client.results import PreviewProfile, PreviewState
-from tests.e2e.deployment import Deployment, udp_ports
+from tests.e2e.containers.deployment import Deployment, udp_ports
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 

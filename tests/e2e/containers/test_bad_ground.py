@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from console.client.results import PreviewState
-from tests.e2e.deployment import Deployment, demo_overlay, deployed
+from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -74,7 +74,8 @@ def fill(deployment: Deployment, service: str, directory: str) -> None:
     assert "No space left on device" in done.stderr
 
 
-def test_full_disks_stop_neither_status_nor_video(demo: Deployment) -> None:
+def test_full_disks_stop_neither_status_nor_video(own_demo: Deployment) -> None:
+    demo = own_demo
     fill(demo, "preview", "/tmp")
     fill(demo, "preview", "/run/robot-gateway")
     fill(demo, "gateway", "/tmp")

@@ -19,7 +19,7 @@ from console.receiver.errors import StreamRefusedError
 from console.receiver.receiver import Receiver
 from console.robots.login import parse_login
 from gateway.access.authority import new_authority
-from tests.e2e.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
+from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
 from tests.support.engine import ROOT
 from tests.support.robotctl import robotctl
 from tests.support.waiting import wait_until

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.deployment import Deployment, deployed
+from tests.e2e.containers.deployment import Deployment, deployed
 from tests.support.engine import ROOT
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until

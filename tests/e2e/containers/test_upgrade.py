@@ -6,7 +6,7 @@ import grpc
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
-from tests.e2e.deployment import Deployment
+from tests.e2e.containers.deployment import Deployment
 from tests.support.engine import ROOT
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]

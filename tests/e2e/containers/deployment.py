@@ -43,6 +43,7 @@ class Deployment:
         self.gateway_port = gateway_port
         self.preview_port = preview_port
         self.domain = domain
+        self._restarts_before: dict[str, int] = {}
 
     @property
     def target(self) -> str:
@@ -94,8 +95,17 @@ class Deployment:
                 os.kill(pid, number)
 
     def restarts(self, service: str) -> int:
-        """How often the engine has started it again."""
-        return int(self.inspect(service)["RestartCount"])
+        """How often the engine has started it again since the last reset."""
+        return int(self.inspect(service)["RestartCount"]) - self._restarts_before.get(service, 0)
+
+    def reset(self) -> None:
+        """Puts everything back to how it is after the start, for the next test."""
+        if any(self.inspect(service)["State"]["Status"] != "running" for service in SERVICES):
+            self.run("up", "--detach")
+        with self.client() as robot:
+            self.wait_for_status(robot)
+            robot.disable_preview()
+        self._restarts_before = {service: int(self.inspect(service)["RestartCount"]) for service in SERVICES}
 
     def time_s(self, service: str, name: str) -> float:
         """A time of the container's state, "StartedAt" or "FinishedAt", on the wall clock."""

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from console.client.results import PreviewProfile, PreviewState
-from tests.e2e.deployment import Deployment, demo_overlay, deployed, udp_ports
-from tests.e2e.lookout import Lookout
+from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, udp_ports
+from tests.e2e.containers.lookout import Lookout
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -85,13 +85,14 @@ def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
     with demo.client() as robot, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
         viewer.wait_for_pictures(30)
+        calls = viewer.reconnects
         demo.signal_all("gateway", signal.SIGKILL)
         back_s = restarted_s(demo, "gateway", 0)
         status = demo.wait_for_status(robot)
         viewer.wait_for_pictures(30)
 
         assert time.time() - back_s < 30
-        assert viewer.reconnects == 0
+        assert viewer.reconnects == calls
         assert viewer.longest_pause_s < 1
         assert demo.restarts("preview") == 0
         # The new gateway takes over what the earlier one had applied.

@@ -1,12 +1,11 @@
 """Reads the running containers: what a program that was broken into could do there."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.e2e.deployment import Deployment, demo_overlay, deployed, mounts, writable
+from tests.e2e.containers.deployment import Deployment, mounts, writable
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
 
@@ -26,13 +25,12 @@ def status_fields(pid: int) -> dict[str, str]:
     return {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}
 
 
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Deployment]:
-    with deployed(tmp_path_factory.mktemp("hardening"), demo_overlay()) as deployment:
-        with deployment.client() as robot:
-            deployment.wait_for_status(robot)
-            robot.enable_preview()
-        yield deployment
+@pytest.fixture
+def running(demo: Deployment) -> Deployment:
+    """With a pipeline at work."""
+    with demo.client() as robot:
+        robot.enable_preview()
+    return demo
 
 
 @pytest.mark.parametrize("service", SERVICES)

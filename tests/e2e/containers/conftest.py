@@ -1,0 +1,29 @@
+"""The whole system in containers, for the tests here that need it; those count as tests that need Docker."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed
+
+
+@pytest.fixture(scope="session")
+def _shared_demo(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Deployment]:
+    with deployed(tmp_path_factory.mktemp("demo"), demo_overlay()) as deployment:
+        yield deployment
+
+
+@pytest.fixture
+def demo(_shared_demo: Deployment) -> Deployment:
+    """The whole system with a simulated robot: containers up, preview off, restarts counted from 0."""
+    _shared_demo.reset()
+    return _shared_demo
+
+
+@pytest.fixture
+def own_demo(tmp_path: Path, images: str) -> Iterator[Deployment]:
+    """The same for this test alone, which leaves traces that a reset does not remove."""
+    with deployed(tmp_path, demo_overlay()) as deployment, deployment.client() as robot:
+        deployment.wait_for_status(robot)
+        yield deployment
