@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -168,6 +169,9 @@ def deployed(
             if up:
                 compose.start()
             yield deployment
+        except BaseException:
+            sys.stderr.write(deployment.run("logs", "--tail", "100", check=False).stdout)
+            raise
         finally:
             deployment.run("down", "--volumes", "--timeout", "5", check=False)
 

@@ -12,7 +12,7 @@ from tests.e2e.containers.lookout import Lookout
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
-pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timed, pytest.mark.timeout(900)]
 
 BACK_WITHIN_S = 5.0
 NOTICED_WITHIN_S = 3.0

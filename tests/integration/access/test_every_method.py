@@ -56,9 +56,20 @@ async def called(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[gr
     return OK, ""
 
 
+async def answered(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[grpc.StatusCode, str]:
+    """As `called`. Again where the server ended a call while its request was written.
+
+    gRPC's asyncio client then makes up a status of its own, INTERNAL, and the server's is lost.
+    """
+    for _ in range(5):
+        if (answer := await called(channel, path, login)) != (grpc.StatusCode.INTERNAL, ""):
+            break
+    return answer
+
+
 async def all_called(robot: Robot, login: Login) -> dict[str, tuple[grpc.StatusCode, str]]:
     channel = robot.channel(login)
-    return {path: await called(channel, path, login) for path in PATHS}
+    return {path: await answered(channel, path, login) for path in PATHS}
 
 
 def expected_for(role: Role) -> dict[str, tuple[grpc.StatusCode, str]]:
@@ -102,7 +113,7 @@ async def test_each_token_gives_its_role_and_nothing_else_gives_any(tmp_path: Pa
         for path in PATHS:
             # A fresh gateway every few calls has not locked anybody out yet.
             async with guarded_gateway(robot) as robot:
-                assert await called(robot.channel(), path, login) == (
+                assert await answered(robot.channel(), path, login) == (
                     UNAUTHENTICATED,
                     Reason.CREDENTIAL_UNKNOWN,
                 )
