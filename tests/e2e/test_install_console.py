@@ -24,7 +24,8 @@ def install(home: Path, *options: str) -> "subprocess.CompletedProcess[str]":
         capture_output=True,
         text=True,
         timeout=DONE_WITHIN_S,
-        env=environment | {"HOME": str(home)},
+        # The homes are new, what is downloaded need not be.
+        env=environment | {"HOME": str(home), "UV_CACHE_DIR": str(Path.home() / ".cache/uv")},
         cwd="/",
         check=False,
     )
