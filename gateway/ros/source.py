@@ -19,6 +19,9 @@ log = logging.getLogger(__name__)
 # rests, so that a flood of them starves neither the other sources nor the clients.
 _MAX_SHARE = 0.2
 _COMPLAINT_EVERY_S = 10.0
+_CLOCKS_APART_S = 50e-6
+"""Between reading one clock and the other; more than that, and the thread was preempted in between."""
+_CLOCK_TRIES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +76,7 @@ class Source:
 
     def take(self) -> None:
         """Puts the value of the newest message on the board, if there is a new one. Never raises."""
-        now = Instant(time.monotonic(), time.time_ns())
+        now = _now()
         if now.monotonic_s < self._rests_until_s:
             return
         cpu_before_s = time.thread_time()
@@ -119,3 +122,12 @@ class Source:
             type(error).__name__,
             error,
         )
+
+
+def _now() -> Instant:
+    """Reads both clocks at one moment, as far as the scheduler allows: what lies between is an error."""
+    for _ in range(_CLOCK_TRIES):
+        now = Instant(time.monotonic(), time.time_ns())
+        if time.monotonic() - now.monotonic_s < _CLOCKS_APART_S:
+            break
+    return now

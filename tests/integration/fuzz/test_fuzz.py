@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import fuzz.__main__ as program
 
 ROOT = Path(__file__).parents[3]
@@ -21,6 +23,7 @@ def run(*arguments: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
+@pytest.mark.timeout(LONG_S)
 def test_nothing_is_found_in_a_short_run() -> None:
     ended = run("fuzz", "--runs", "2000")
     assert ended.returncode == 0, ended.stdout + ended.stderr

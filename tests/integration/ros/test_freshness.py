@@ -28,6 +28,7 @@ def age_s(board: Board) -> float:
     return time.monotonic() - received.at_s if received else float("inf")
 
 
+@pytest.mark.timed
 def test_an_age_is_counted_from_the_reception(talker: Talker) -> None:
     """Not from the moment of sampling, which comes 25 ms later on average."""
     board, late_s = Board(), []
