@@ -9,7 +9,7 @@ LEAVES = {
     "thread": "threading.Thread(target=threading.Event().wait, args=(30,), daemon=True).start()",
     "socket": "KEPT.append(socket.create_server(('127.0.0.1', 0)))",
     "file": "KEPT.append(open(__file__))",
-    "unnamed descriptor": "KEPT.extend(os.pipe() for _ in range(20))",
+    "unnamed descriptor": "KEPT.extend(os.pipe() for _ in range(30))",
 }
 
 
