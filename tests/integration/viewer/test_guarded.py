@@ -20,7 +20,7 @@ from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 
 from console.window.view_program import viewing
 
-pytestmark = [pytest.mark.gst, pytest.mark.usefixtures("application")]
+pytestmark = [pytest.mark.gst, pytest.mark.timed, pytest.mark.usefixtures("application")]
 __all__ = ["application"]
 
 TOLD_WITHIN_S = 10.0
@@ -92,7 +92,6 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
 
 
-@pytest.mark.timed
 def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselves(robot: Guarded) -> None:
     robot.log_in("emil", Role.VIEWER)
     emils = robot.stored()
