@@ -5,6 +5,7 @@ Each claims what it takes: a name in the abstract namespace of Unix sockets (uni
 network namespace, as ports have, ends with its process and leaves no file behind.
 """
 
+import errno
 import os
 import socket
 from collections.abc import Iterator
@@ -105,8 +106,10 @@ def _claim(name: str) -> socket.socket | None:
     holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         holder.bind(f"\0robot-gateway-{name}")
-    except OSError:
+    except OSError as error:
         holder.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
         return None
     return holder
 

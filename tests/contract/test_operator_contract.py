@@ -224,7 +224,7 @@ async def test_a_dead_preview_service_is_a_status(
 async def test_a_hanging_preview_service_delays_no_look(ground: Ground, operator: Operator) -> None:
     await running(operator, LOW_BW)
     ground.hang_preview()
-    # Whoever asks for a change waits for the preview; who looks does not.
+    # A change waits for the preview service; a status does not.
     switching = asyncio.create_task(operator.switch(False))
     await looks_in_time(operator)
     switching.cancel()

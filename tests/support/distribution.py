@@ -9,13 +9,12 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 _CONTAINERS = "tests/e2e/containers/"
-_LONG = (_CONTAINERS, "tests/e2e/", "tests/integration/fuzz/", "tests/integration/monitor/")
+_LONG = ("tests/e2e/", "tests/integration/fuzz/", "tests/integration/monitor/")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the longest files first, so that no worker begins one when the others are done."""
-    items.sort(key=lambda item: not item.nodeid.startswith(_LONG))
-    items.sort(key=lambda item: not item.nodeid.startswith(_CONTAINERS))
+    items.sort(key=lambda item: (not item.nodeid.startswith(_CONTAINERS), not item.nodeid.startswith(_LONG)))
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -75,15 +75,14 @@ def fill(deployment: Deployment, service: str, directory: str) -> None:
 
 
 def test_full_disks_stop_neither_status_nor_video(own_demo: Deployment) -> None:
-    demo = own_demo
-    fill(demo, "preview", "/tmp")
-    fill(demo, "preview", "/run/robot-gateway")
-    fill(demo, "gateway", "/tmp")
-    with demo.client() as robot:
+    fill(own_demo, "preview", "/tmp")
+    fill(own_demo, "preview", "/run/robot-gateway")
+    fill(own_demo, "gateway", "/tmp")
+    with own_demo.client() as robot:
         assert robot.enable_preview().preview.state is PreviewState.RUNNING
-        with Watcher(demo.preview_port) as viewer:
+        with Watcher(own_demo.preview_port) as viewer:
             viewer.wait_for_pictures(30)
         # The volume of the socket stays full, because the gateway holds it.
-        demo.run("restart", "preview")
+        own_demo.run("restart", "preview")
         wait_until(lambda: robot.status().preview.state is PreviewState.RUNNING, "the preview is back", 30)
         assert robot.status().health.ready

@@ -132,5 +132,5 @@ async def test_watchers_leave_nothing_behind(operator: Operator) -> None:
     for call in calls:
         call.cancel()
     await eventually(tasks, lambda count: count <= tasks_before, "no stream is served any more")
-    # Counted when it ends; the status that tells of it may be the one before.
+    # Counted when it ends; a status may have been made a moment before that.
     await eventually(served, lambda count: count >= served_before + 10, "each was counted")
