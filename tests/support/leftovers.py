@@ -60,13 +60,21 @@ def _belongings() -> Counter[str]:
 
 def _processes() -> Iterator[str]:
     mark = f"{_MARK}={os.environ[_MARK]}".encode()
+    # A child that was started this instant may still be in execve(2), where its environment reads as empty.
+    children = {str(each.pid) for each in psutil.Process().children(recursive=True) if _runs(each)}
     for directory in Path("/proc").glob("[0-9]*"):
         if directory.name == str(os.getpid()):
             continue
         with suppress(OSError):  # It ended while we looked.
-            if mark in (directory / "environ").read_bytes().split(b"\0"):
+            if directory.name in children or mark in (directory / "environ").read_bytes().split(b"\0"):
                 words = (directory / "cmdline").read_bytes().split(b"\0")
                 yield f"process {directory.name} ({b' '.join(words).decode(errors='replace')})"
+
+
+def _runs(process: psutil.Process) -> bool:
+    with suppress(psutil.NoSuchProcess):
+        return bool(process.status() != psutil.STATUS_ZOMBIE)
+    return False
 
 
 def _threads() -> Iterator[str]:
