@@ -15,7 +15,7 @@ from pathlib import Path
 import grpc
 import uvloop
 
-from common.listen import bind_tcp
+from common.bind import bind_tcp
 from common.rpc import Context, new_server
 from gateway.config import SecuritySettings
 from gateway.door import Door

@@ -1,6 +1,6 @@
 """What every gRPC server of the project shares: its limits, and how a domain error becomes a status code.
 
-common.listen binds what `new_server` makes to a TCP port or a Unix socket.
+common.bind binds what `new_server` makes to a TCP port or a Unix socket.
 """
 
 import logging

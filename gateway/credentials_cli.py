@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from common.errors import ExitCode, UserError
-from common.private import write_private
+from common.private_files import write_private
 from gateway.access.bundle import Bundle
 from gateway.access.command import to_type
 from gateway.access.credential import Credential, Kind

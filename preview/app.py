@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Final
 
-from common import listen, rpc
+from common import bind, rpc
 from common.health import Health
 from preview.config import PreviewSettings
 from preview.crash_report import CrashReport
@@ -41,7 +41,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     servicer = PreviewServicer(manager, prober, preference(settings))
     servicer.register(server)
     Health(SERVICE).register(server)
-    listen.bind_unix(server, settings.socket)
+    bind.bind_unix(server, settings.socket)
     await server.start()
     _log.info("serving on %s", settings.socket)
     trials = asyncio.create_task(prober.try_all(selection.order), name="trials")

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from common.errors import UserError
-from common.private import alone_in, write_private
+from common.private_files import alone_in, write_private
 from console.client import parse_target
 from console.robots.book import (
     FILE_KEYS,

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from common.private import write_private
+from common.private_files import write_private
 from console.client import Credentials
 from console.robots.book import Robot, RobotBook, book_path
 from console.robots.credentials import credentials_directory

@@ -1,4 +1,4 @@
-"""Files that nobody else may read are refused when somebody can. common.private writes them."""
+"""Files that nobody else may read are refused when somebody can. common.private_files writes them."""
 
 import os
 import shlex

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from common.private import alone_in, write_private
+from common.private_files import alone_in, write_private
 from gateway.access.authority import Pair
 from gateway.access.command import to_type
 from gateway.access.store import Store, parse_store, store_text

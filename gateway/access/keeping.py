@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.errors import UserError
-from common.private import alone_in
+from common.private_files import alone_in
 from gateway.access.authority import (
     Pair,
     certificate_facts,

@@ -6,8 +6,8 @@ import socket
 from pathlib import Path
 from typing import Final
 
+from common.bind import bracketed
 from common.findings import Finding, good, note, wrong
-from common.listen import bracketed
 
 _WITHIN_S: Final = 1.0
 

@@ -11,8 +11,8 @@ from contextlib import asynccontextmanager, suppress
 from http import HTTPStatus
 from typing import Final
 
+from common.bind import bracketed
 from common.errors import ExitCode, UserError
-from common.listen import bracketed
 
 _log = logging.getLogger(__name__)
 

@@ -13,8 +13,8 @@ from grpc_health.v1.health import SERVICE_NAME as HEALTH_SERVICE
 from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION_SERVICE
 from grpc_reflection.v1alpha.reflection import enable_server_reflection
 
+from common.bind import bind_tcp, bind_unix, bracketed
 from common.health import Health
-from common.listen import bind_tcp, bind_unix, bracketed
 from common.rpc import STOP_GRACE_S, Context, Handler, Observe, new_server, unobserved
 from gateway.rpc.counting import CountingInterceptor
 from gateway.rpc.guard import Guard

@@ -18,7 +18,7 @@ from typing import Any
 
 import grpc
 
-from common.listen import bind_unix
+from common.bind import bind_unix
 from common.rpc import new_server
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1.preview_service_pb2_grpc import (

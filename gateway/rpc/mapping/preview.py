@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from common.listen import bracketed
+from common.bind import bracketed
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
 from gateway.status.freshness import Sample

@@ -11,9 +11,9 @@ import grpc
 import pytest
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 
+from common.bind import bind_tcp, bind_unix
 from common.health import Health
 from common.healthcheck import state_of
-from common.listen import bind_tcp, bind_unix
 from common.rpc import new_server
 
 SERVING, NOT_SERVING = HealthCheckResponse.SERVING, HealthCheckResponse.NOT_SERVING

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import ExitCode, UserError
-from common.private import write_private
+from common.private_files import write_private
 from console.robots import Robot, RobotBook, choose, read_book, read_credentials
 from console.robots.book import book_path, parse_book
 from console.robots.choice import Choice

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from grpc.aio import Server
 
+from common.bind import bind_tcp, bind_unix, bracketed
 from common.errors import UserError
-from common.listen import bind_tcp, bind_unix, bracketed
 from common.rpc import new_server
 
 
