@@ -73,6 +73,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+        ("console/presentation/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/robots/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window", "console.cli")),
         (
