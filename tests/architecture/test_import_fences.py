@@ -97,6 +97,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/authority.py",)),
         ("yaml", ("common/config.py",)),
+        ("tomlkit", ("console/robots/robots_file_edit.py",)),
         ("google.protobuf", ("gateway/rpc/", "gateway/preview_link", "preview/rpc/", "console/client/")),
         ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
         ("omniseer.preview", ("gateway/preview_link", "preview/rpc/")),
