@@ -27,6 +27,7 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
+from console.client.mapping.methods import PreviewRequest
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,
@@ -73,6 +74,7 @@ __all__ = [
     "Overloaded",
     "PreviewChange",
     "PreviewProfile",
+    "PreviewRequest",
     "PreviewState",
     "PreviewStatus",
     "Refused",
