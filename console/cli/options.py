@@ -63,7 +63,7 @@ def keep_global_options(context: typer.Context, target: str | None, robot: str |
 def session_of(
     context: typer.Context, target: str | None, as_json: bool, robot: str | None = None
 ) -> Session:
-    """Returns a session on standard output. Options after a command's name precede those before it.
+    """Returns a session on standard output. An option after the command's name overrides one before it.
 
     Raises:
         UserError: No robot has this name, or the file of known robots is wrong.
