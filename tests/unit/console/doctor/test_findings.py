@@ -29,9 +29,10 @@ def double() -> GatewayDouble:
 
 def examined(double: GatewayDouble, *, ahead_s: float = 0.0) -> dict[str, Finding]:
     """All findings, by check; the robot's clock is ahead of ours by so much."""
-    double.info.wall_clock_unix_ms = int((time.time() + ahead_s) * 1000)
+    now_s = time.time()
+    double.info.wall_clock_unix_ms = int((now_s + ahead_s) * 1000)
     with serving(double) as port:
-        examination = Examination(f"127.0.0.1:{port}")
+        examination = Examination(f"127.0.0.1:{port}", wall_clock=lambda: now_s)
         findings = list(examination.findings())
         assert examination.reached
     return {finding.check: finding for finding in findings}
