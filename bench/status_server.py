@@ -10,6 +10,7 @@ import itertools
 import sys
 import time
 from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import grpc
@@ -19,10 +20,11 @@ from common.bind import bind_tcp
 from common.rpc import Context, new_server
 from gateway.config import SecuritySettings
 from gateway.door import Door
-from gateway.preview_link.actual import Actual
-from gateway.preview_link.control import PreviewControl
-from gateway.preview_link.link import PreviewLink
-from gateway.preview_link.reconciler import Reconciler
+from gateway.links.link import ServiceLink
+from gateway.links.preview.control import PreviewControl
+from gateway.links.preview.model import PreviewModel
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.reconciler import Desired, Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
@@ -87,8 +89,8 @@ def main() -> None:
 
 async def _serve(unlimited: bool, credentials: Path | None) -> None:
     board, events = Board(), EventLog("bench")
-    reconciler, tally = Reconciler(1), Tally()
-    link = PreviewLink(Path("/nonexistent"), reconciler)
+    tally, model = Tally(), PreviewModel()
+    link = ServiceLink("preview service", _PreviewInMemory(), Reconciler(1, model))
     for number in range(8):
         events.add(_mode(f"odometry received, for the {number}th time"), time.monotonic())
 
@@ -108,7 +110,7 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
     gateway = RobotGateway(
         snapshot,
         Answers(snapshot, lambda: link.view, time.monotonic),
-        PreviewControl(link, 1.0),
+        PreviewControl(link, model, 1.0),
         Callers(None),
         streams,
         tally=tally,
@@ -142,7 +144,8 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
     port = bind_tcp(server, "127.0.0.1", 0, door.credentials())
     await server.start()
     background = [
-        asyncio.create_task(_bring_news(board, reconciler)),
+        asyncio.create_task(_bring_news(board)),
+        asyncio.create_task(link.run()),
         asyncio.create_task(streams.watch.run()),
     ]
     print(port, flush=True)
@@ -167,7 +170,23 @@ async def _constant(request: bytes, _context: Context) -> AsyncIterator[bytes]:
         await asyncio.sleep(CONSTANT_EVERY_S)
 
 
-async def _bring_news(board: Board, reconciler: Reconciler) -> None:
+class _PreviewInMemory:
+    """A preview service without a process: it runs, and reports as often as the sources do."""
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator["_PreviewInMemory"]:
+        yield self
+
+    async def reports(self) -> AsyncIterator[PreviewReport]:
+        while True:
+            yield _RUNNING
+            await asyncio.sleep(_NEWS_EVERY_S)
+
+    async def apply(self, _desired: Desired[PreviewSpec]) -> PreviewReport:
+        return _RUNNING
+
+
+async def _bring_news(board: Board) -> None:
     for number in itertools.count():
         now = time.monotonic()
         # A robot that moves: something changes all the time.
@@ -186,13 +205,12 @@ async def _bring_news(board: Board, reconciler: Reconciler) -> None:
             Network("wlan0", connected=True, wifi_signal_dbm=-61, link_quality_percent=70), now
         )
         board.onboard_battery = board.battery
-        reconciler.heard(_RUNNING, now)
         await asyncio.sleep(_NEWS_EVERY_S)
 
 
 _RULE = SourceRule(1000, required=True)
 _RULES = Rules(dict.fromkeys(SourceKind, _RULE), 3000, dict.fromkeys(CommandSource, _RULE))
-_RUNNING = Actual(
+_RUNNING = PreviewReport(
     instance_id="bench",
     applied_revision=1,
     state=PreviewState.RUNNING,

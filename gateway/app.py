@@ -14,14 +14,16 @@ from common.rpc import Observe, unobserved
 from gateway.config import GatewaySettings, LimitSettings, MetricsSettings, SecuritySettings, SourceSettings
 from gateway.door import Door
 from gateway.knowledge import Knowledge
+from gateway.links.link import ServiceLink
+from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.model import PreviewModel
+from gateway.links.preview.wire import PreviewConnector
+from gateway.links.reconciler import Reconciler
 from gateway.metrics.calls import Calls
 from gateway.metrics.collector import GatewayCollector, StreamFigures
 from gateway.metrics.endpoint import serving_metrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
-from gateway.preview_link.control import PreviewControl
-from gateway.preview_link.link import PreviewLink
-from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
@@ -54,10 +56,16 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
         UserError: a part can't start.
     """
     _tell_who_gets_in(settings.security)
-    link = PreviewLink(settings.preview.socket, _reconciler(settings.preview_encrypted))
+    model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
+    link = ServiceLink(
+        f"preview service at {settings.preview.socket}",
+        PreviewConnector(settings.preview.socket),
+        Reconciler(_first_revision(), model),
+    )
+    preview = PreviewControl(link, model, settings.preview.settle_ms / 1000)
     tally = Tally()
     knowledge = Knowledge(settings, lambda: link.view, tally)
-    door = Door(settings.security, knowledge.note, link.renew_passphrase)
+    door = Door(settings.security, knowledge.note, preview.renew_passphrase)
     streams = Streams(
         StatusWatch(knowledge.snapshot, time.monotonic),
         EventStreams(knowledge.events),
@@ -66,7 +74,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     gateway = RobotGateway(
         knowledge.snapshot,
         Answers(knowledge.snapshot, lambda: link.view, time.monotonic),
-        PreviewControl(link, settings.preview.settle_ms / 1000),
+        preview,
         Callers(settings.preview.advertised_host),
         streams,
         tally=tally,
@@ -121,10 +129,9 @@ def _tell_who_gets_in(security: SecuritySettings) -> None:
         _log.warning("security.insecure: everybody on the way may read tokens and answers")
 
 
-def _reconciler(encrypted: bool) -> Reconciler:
+def _first_revision() -> int:
     # Milliseconds since this machine's start: a later gateway's revisions are larger than an earlier one's.
-    first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-    return Reconciler(first_revision, _new_passphrase if encrypted else None)
+    return time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
 
 
 def _new_passphrase() -> str:

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 
 from common.rpc import Context
-from gateway.preview_link.control import PreviewControl
+from gateway.links.preview.control import PreviewControl
 from gateway.rpc.answers import Answers
 from gateway.rpc.caller import Callers
 from gateway.rpc.controls import Controls
@@ -94,7 +94,7 @@ class RobotGateway:
     async def set_preview_mode(self, request: SetPreviewModeRequest, context: Context) -> bytes:
         """Returns when the preview has settled, or when patience or the caller's deadline ends."""
         profile = profile_from(request.profile) if request.enabled else None
-        message = await self._preview.switch(
+        message = await self._preview.set_mode(
             enabled=request.enabled, profile=profile, remaining_s=context.time_remaining()
         )
         now = self._take()
