@@ -10,9 +10,9 @@ import itertools
 import sys
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final
 
 import grpc
 import uvloop
@@ -28,9 +28,8 @@ from gateway.config import (
     SecuritySettings,
     SourceSettings,
 )
-from gateway.preview_link.actual import Actual
-from gateway.preview_link.link import PreviewLink
-from gateway.preview_link.reconciler import Reconciler
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.reconciler import Desired
 from gateway.status.board import Board, SourceKind
 from gateway.status.event import ModeChanged, News
 from gateway.status.faults.fault import Severity
@@ -110,21 +109,24 @@ class _BenchRobot:
         finally:
             task.cancel()
 
-    def preview_link(self) -> PreviewLink:
+    def preview(self) -> "_PreviewInMemory":
         return _PreviewInMemory()
 
 
-class _PreviewInMemory(PreviewLink):
-    """The link to a preview service that runs and reports, without a socket."""
+class _PreviewInMemory:
+    """A preview service without a process: it runs, and reports as often as the sources do."""
 
-    def __init__(self) -> None:
-        self._in_memory = Reconciler(1)
-        super().__init__(Path("/nonexistent"), self._in_memory)
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator["_PreviewInMemory"]:
+        yield self
 
-    async def run(self) -> NoReturn:
+    async def reports(self) -> AsyncIterator[PreviewReport]:
         while True:
-            self._in_memory.heard(_RUNNING, time.monotonic())
+            yield _RUNNING
             await asyncio.sleep(_UPDATE_EVERY_S)
+
+    async def apply(self, _desired: Desired[PreviewSpec]) -> PreviewReport:
+        return _RUNNING
 
 
 def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
@@ -180,7 +182,7 @@ async def _drive(board: Board) -> None:
         await asyncio.sleep(_UPDATE_EVERY_S)
 
 
-_RUNNING = Actual(
+_RUNNING = PreviewReport(
     instance_id="bench",
     applied_revision=1,
     state=PreviewState.RUNNING,

@@ -22,8 +22,9 @@ from fuzz.robot import robots_message
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
+from gateway.links.link import LinkLostError
+from gateway.links.preview.wire import from_wire
 from gateway.metrics.endpoint import answer
-from gateway.preview_link.wire import UnknownSpeechError, from_wire
 from gateway.ros.cutting import cut
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.methods import CONTRACT, method_at
@@ -57,7 +58,7 @@ def previews_truth(data: bytes) -> None:
     """What the preview service reports, as the gateway takes it in."""
     state = preview_pb.ActualState()
     if _parses(state, data):
-        with suppress(UnknownSpeechError):
+        with suppress(LinkLostError):
             from_wire(state)
 
 

@@ -16,12 +16,15 @@ from typing import Final, Protocol
 from common.health import Health
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
+from gateway.links.link import Connector, ServiceLink
+from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.model import PreviewModel
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.preview.wire import PreviewConnector
+from gateway.links.reconciler import Reconciler
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
-from gateway.preview_link.control import PreviewControl
-from gateway.preview_link.link import PreviewLink
-from gateway.preview_link.reconciler import Reconciler
 from gateway.rpc.event_stream import EventStream
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import Admission, RateLimit
@@ -52,8 +55,8 @@ class Outside(Protocol):
     def feeding(self, board: Board) -> AbstractContextManager[None]:
         """Writes the robot's values to the board while the block lasts."""
 
-    def preview_link(self) -> PreviewLink:
-        """Returns the link to the preview service; the gateway runs it."""
+    def preview(self) -> Connector[PreviewSpec, PreviewReport]:
+        """Returns what opens connections to the preview service."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +82,21 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     Raises:
         UserError: credentials or certificates can't be read.
     """
-    link = outside.preview_link()
+    # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
+    first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
+    model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
+    name = f"preview service at {settings.preview.socket}"
+    link = ServiceLink(name, outside.preview(), Reconciler(first_revision, model))
+    control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
-    access = AccessControl(settings.security, state, link)
+    access = AccessControl(settings.security, state, control)
     recipients = Recipients(settings.preview.advertised_host)
     status_stream = StatusStream(state, time.monotonic)
     event_stream = EventStream(state.events, state.event_added)
     services = Services(
         status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
-        preview=PreviewService(PreviewControl(link, settings.preview.settle_ms / 1000), state, recipients),
+        preview=PreviewService(control, state, recipients),
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
     )
@@ -140,12 +148,9 @@ class ThisRobot:
             with intake(self._settings.sources, board):
                 yield
 
-    def preview_link(self) -> PreviewLink:
-        """Returns a link through the configured socket."""
-        # Milliseconds since this machine's start: a later gateway's revisions exceed an earlier one's.
-        first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-        new_passphrase = _new_passphrase if self._settings.preview_encrypted else None
-        return PreviewLink(self._settings.preview.socket, Reconciler(first_revision, new_passphrase))
+    def preview(self) -> PreviewConnector:
+        """Returns a connector to the configured socket."""
+        return PreviewConnector(self._settings.preview.socket)
 
 
 def _new_passphrase() -> str:

@@ -64,9 +64,11 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("simrobot/", ("gateway", "preview", "console")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
-        ("gateway/ros/", ("gateway.rpc", "gateway.preview_link", *WIRE)),
+        ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
         ("gateway/rpc/", ("gateway.ros",)),
-        ("gateway/preview_link", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
+        ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
+        ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
+        ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
         (
             "preview/lifecycle.py",
             (*HEAVY, *WIRE, "asyncio", "common.gst", "preview.pipeline", "preview.encoders"),
@@ -101,13 +103,13 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
             (
                 "common/interceptors.py",
                 "gateway/rpc/",
-                "gateway/preview_link",
+                "gateway/links/",
                 "preview/rpc/",
                 "console/client/",
             ),
         ),
         ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
-        ("omniseer.preview", ("gateway/preview_link", "preview/rpc/")),
+        ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
     ],
 )
 def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:

@@ -1,6 +1,6 @@
 """The live preview: switched on and off."""
 
-from gateway.preview_link.control import PreviewControl
+from gateway.links.preview.control import PreviewControl
 from gateway.rpc.call import CallContext
 from gateway.rpc.mapping.enums import profile_from
 from gateway.rpc.mapping.preview import preview_status
@@ -28,7 +28,7 @@ class PreviewService:
     ) -> SetPreviewModeResponse:
         """Returns when the preview has settled, or when the settle time or the caller's deadline ends."""
         profile = profile_from(request.profile) if request.enabled else None
-        message = await self._control.switch(
+        message = await self._control.set_mode(
             enabled=request.enabled, profile=profile, remaining_s=call.remaining_s()
         )
         now = self._state.snapshot()

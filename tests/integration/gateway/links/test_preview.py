@@ -43,7 +43,7 @@ async def until(operator: Operator, state: int, within_s: float = 15.0) -> Any:
     )
 
 
-async def test_a_service_that_comes_late_gets_the_wish(operator: Operator, socket: Path) -> None:
+async def test_a_service_that_comes_late_gets_the_desired_state(operator: Operator, socket: Path) -> None:
     reply = await operator.switch(True, pb.PREVIEW_PROFILE_LOW_BW)
     assert reply.accepted
     assert reply.preview.state == states.PREVIEW_FAULTED
@@ -57,12 +57,12 @@ async def test_a_service_that_comes_late_gets_the_wish(operator: Operator, socke
         status = await until(operator, states.PREVIEW_RUNNING)
         assert status.preview.profile == pb.PREVIEW_PROFILE_LOW_BW
         assert status.preview.last_error == ""
-        assert [wish.enabled for wish in double.wishes] == [True]
+        assert [desired.enabled for desired in double.applied] == [True]
     finally:
         await server.stop(None)
 
 
-async def test_a_killed_service_is_a_fault_and_its_successor_gets_the_wish(
+async def test_a_killed_service_is_a_fault_and_its_successor_gets_the_desired_state(
     operator: Operator, socket: Path
 ) -> None:
     with double_process(socket) as first:
@@ -93,12 +93,15 @@ async def test_a_frozen_service_is_noticed_and_found_again(operator: Operator, s
             os.kill(process.pid, signal.SIGCONT)
         # 3 s is the promise; the rest is for a busy test machine.
         assert noticed_s < 4
-        assert "no word for 2.5 s" in status.preview.last_error
+        assert "no report for 2.5 s" in status.preview.last_error
         status = await until(operator, states.PREVIEW_RUNNING)
         assert (status.preview.counters.starts, status.preview.counters.restarts) == (1, 0)
 
 
-async def test_a_lost_connection_does_not_stay_open(operator: Operator, socket: Path) -> None:
+@pytest.mark.parametrize("requesting", [False, True], ids=["a silent stream", "an unanswered request"])
+async def test_a_lost_connection_does_not_stay_open(
+    operator: Operator, socket: Path, requesting: bool
+) -> None:
     async def descriptors() -> int:
         return len(await asyncio.to_thread(os.listdir, descriptors_dir))
 
@@ -108,8 +111,10 @@ async def test_a_lost_connection_does_not_stay_open(operator: Operator, socket: 
         before = await descriptors()
         gc.disable()  # It would close what was forgotten, some time.
         try:
-            for _ in range(2):
+            for enabled in (True, False):
                 os.kill(process.pid, signal.SIGSTOP)
+                if requesting:
+                    await operator.switch(enabled)
                 await eventually(operator.status, lambda it: not it.preview.service_reachable, "loss")
                 os.kill(process.pid, signal.SIGCONT)
                 await in_contact(operator)
@@ -118,7 +123,9 @@ async def test_a_lost_connection_does_not_stay_open(operator: Operator, socket: 
             gc.enable()
 
 
-async def test_a_wish_to_a_frozen_service_is_answered_in_time(operator: Operator, socket: Path) -> None:
+async def test_a_request_while_the_service_is_frozen_is_answered_in_time(
+    operator: Operator, socket: Path
+) -> None:
     with double_process(socket) as process:
         await in_contact(operator)
         os.kill(process.pid, signal.SIGSTOP)
@@ -140,18 +147,18 @@ async def test_a_service_that_refuses_is_quoted_and_not_asked_again(operator: Op
         assert "the double refuses" in reply.message
         off = await operator.switch(False)
         assert off.preview.state == states.PREVIEW_DISABLED
-        assert [wish.enabled for wish in double.wishes] == [True, False]
+        assert [desired.enabled for desired in double.applied] == [True, False]
     finally:
         await server.stop(None)
 
 
 async def test_a_service_of_another_version_is_reported_as_such(operator: Operator, socket: Path) -> None:
-    with double_process(socket, Behaviour.SPEAKS_STRANGELY):
+    with double_process(socket, Behaviour.REPORTS_AN_UNKNOWN_STATE):
 
         async def last_error() -> str:
             return str((await operator.switch(True)).preview.last_error)
 
-        await eventually(last_error, lambda it: "state number 42" in it, "the strange word is quoted")
+        await eventually(last_error, lambda it: "state number 42" in it, "the unknown state is named")
 
 
 async def test_an_unwanted_preview_is_off_whether_or_not_there_is_a_service(
@@ -166,7 +173,7 @@ async def test_an_unwanted_preview_is_off_whether_or_not_there_is_a_service(
     assert reply.preview.state == states.PREVIEW_DISABLED
 
 
-async def test_a_restarted_gateway_leaves_the_picture_alone(socket: Path) -> None:
+async def test_a_restarted_gateway_leaves_the_video_alone(socket: Path) -> None:
     double = PreviewDouble()
     server = await serve_double(socket, double)
     try:
@@ -178,7 +185,7 @@ async def test_a_restarted_gateway_leaves_the_picture_alone(socket: Path) -> Non
             assert status.preview.profile == pb.PREVIEW_PROFILE_HIGH_QUALITY
             reply = await operator.switch(True)
             assert "already running" in reply.message
-        assert len(double.wishes) == 1
+        assert len(double.applied) == 1
     finally:
         await server.stop(None)
 
@@ -193,7 +200,7 @@ async def test_each_session_has_a_passphrase_that_callers_on_the_robot_see(socke
             for profile in (pb.PREVIEW_PROFILE_LOW_BW, pb.PREVIEW_PROFILE_BALANCED):
                 endpoint = (await operator.switch(True, profile)).preview.endpoint
                 assert endpoint.encrypted
-                assert endpoint.passphrase == double.wishes[-1].passphrase
+                assert endpoint.passphrase == double.applied[-1].passphrase
                 assert 10 <= len(endpoint.passphrase) <= 79
                 assert endpoint.passphrase not in endpoint.uri
                 passphrases.append(endpoint.passphrase)
@@ -231,7 +238,7 @@ class TestSwitching:
             assert off.accepted
             assert off.preview.state == states.PREVIEW_DISABLED
             assert off.preview.profile == pb.PREVIEW_PROFILE_BALANCED
-        assert [wish.enabled for wish in double.wishes] == [True, False]
+        assert [desired.enabled for desired in double.applied] == [True, False]
 
     async def test_the_same_again_touches_nothing(self, operator: Operator, double: PreviewDouble) -> None:
         await operator.switch(True, pb.PREVIEW_PROFILE_HIGH_QUALITY)
@@ -239,7 +246,7 @@ class TestSwitching:
             again = await operator.switch(True, profile)
             assert again.accepted
             assert "already running" in again.message
-        assert len(double.wishes) == 1
+        assert len(double.applied) == 1
 
     async def test_an_unspecified_profile_is_the_last_chosen(
         self, operator: Operator, double: PreviewDouble
@@ -256,7 +263,7 @@ class TestSwitching:
             await operator.switch(True, 77)
         assert refused.value.code() is grpc.StatusCode.INVALID_ARGUMENT
         assert "77" in str(refused.value.details())
-        assert len(double.wishes) == 1
+        assert len(double.applied) == 1
         assert (await operator.status()).preview.profile == pb.PREVIEW_PROFILE_LOW_BW
         # Ignored where the contract says so.
         assert (await operator.switch(False, 77)).accepted
@@ -281,15 +288,15 @@ class TestSwitching:
         reply = await operator.switch(True, timeout_s=1.0)
         assert reply.accepted
         assert reply.preview.state == states.PREVIEW_STARTING
-        assert "on its way" in reply.message
+        assert "not running yet" in reply.message
 
-    async def test_the_newest_of_many_wishes_wins_and_the_others_hear_so(
+    async def test_the_newest_of_many_requests_wins_and_the_others_are_answered_so(
         self, operator: Operator, double: PreviewDouble
     ) -> None:
         double.behaviour = Behaviour.STAYS_STARTING
         older = asyncio.create_task(operator.switch(True, pb.PREVIEW_PROFILE_LOW_BW))
         await eventually(
-            operator.status, lambda it: it.preview.state == states.PREVIEW_STARTING, "first wish"
+            operator.status, lambda it: it.preview.state == states.PREVIEW_STARTING, "first request"
         )
         newer = await operator.switch(False)
         assert newer.preview.state == states.PREVIEW_DISABLED
@@ -306,11 +313,11 @@ class TestSwitching:
         )
         assert all(reply.accepted for reply in replies)
         status = await operator.status()
-        last = double.wishes[-1]
+        last = double.applied[-1]
         assert status.preview.state == (states.PREVIEW_RUNNING if last.enabled else states.PREVIEW_DISABLED)
         assert double.actual.applied_revision == last.revision
 
-    async def test_events_tell_what_happened_without_being_asked(
+    async def test_events_show_what_happened_without_a_question(
         self, operator: Operator, double: PreviewDouble
     ) -> None:
         await operator.switch(True)
