@@ -16,8 +16,8 @@ from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from console.client.mapping.methods import METHODS
-from console.robots.book import parse_book
 from console.robots.login import parse_login
+from console.robots.robots_file import parse_robots_file
 from fuzz.robot import robots_message
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
@@ -118,7 +118,7 @@ def login(data: bytes) -> None:
 def known_robots(data: bytes) -> None:
     """The file of known robots. What is wrong with it is told in one line."""
     try:
-        parse_book(Path("config.toml"), data.decode("utf-8", "replace"))
+        parse_robots_file(Path("config.toml"), data.decode("utf-8", "replace"))
     except UserError as error:
         _must_be_one_line(str(error))
 

@@ -75,6 +75,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+        ("console/presentation/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/robots/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window", "console.cli")),
         (
@@ -98,6 +99,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/authority.py",)),
         ("yaml", ("common/config.py",)),
+        ("tomlkit", ("console/robots/robots_file_edit.py",)),
         (
             "google.protobuf",
             (

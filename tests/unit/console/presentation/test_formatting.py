@@ -1,6 +1,6 @@
 import pytest
 
-from console.words import age, gibibytes, joined, plural, quantity, signed
+from console.presentation.formatting import age, gibibytes, joined, plural, quantity, signed
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,7 @@ class _Newer:
 
 
 def test_the_page_gives_every_reason_its_code_and_exception() -> None:
-    page = (Path(__file__).parents[3] / "docs/errors.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[4] / "docs/errors.md").read_text(encoding="utf-8")
     rows = [
         [cell.strip(" `") for cell in line.strip("|").split("|")]
         for line in page.splitlines()

@@ -13,7 +13,7 @@ from console.cli.live.picture import Fitted
 from console.cli.live.wishes import Wish, Wishes
 from console.client import PreviewChange, PreviewProfile, PreviewState, PreviewStatus, Unreachable
 from console.client.mapping.methods import GET_SYSTEM_STATUS
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 
 PREVIEW = GET_SYSTEM_STATUS.decode(SystemStatus().SerializeToString()).preview
@@ -110,7 +110,7 @@ def test_good_news_goes_soon_and_bad_news_later(wishes: Wishes, clock: Clock) ->
     clock.now_s += 6
     note = wishes.note()
     assert note
-    assert (note.text, note.tone) == ("preview on: the robot refused: being serviced", Tone.BAD)
+    assert (note.text, note.style) == ("preview on: the robot refused: being serviced", SeverityStyle.BAD)
     clock.now_s += 20
     assert wishes.note() is None
 

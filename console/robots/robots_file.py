@@ -1,4 +1,4 @@
-"""The file of known robots as values: ~/.config/robotctl/config.toml, read strictly.
+"""The file of known robots: ~/.config/robotctl/config.toml, read strictly.
 
     default = "lab2"
 
@@ -28,14 +28,15 @@ _TOP_KEYS: Final = ("default", "robots")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
-    """How one robot is reached. A field is a key of its table in the file.
+    """How to reach one robot. Each field is a key of its table in the file.
 
     Args:
         target: HOST or HOST:PORT of its gateway.
-        ca_certificate_file: who signed the gateway's certificate (PEM); with it the connection is encrypted.
-        client_certificate_file: this person's certificate (PEM), where the robot asks for one.
-        client_key_file: the key that belongs to it (PEM); nobody else may read it.
-        token_file: this person's bearer token, on one line; nobody else may read it.
+        ca_certificate_file: Certificate of the authority that signed the gateway's certificate (PEM); with it
+            the connection is encrypted.
+        client_certificate_file: This user's certificate (PEM), for a robot that requires one.
+        client_key_file: The private key of that certificate (PEM), readable by its owner only.
+        token_file: This user's bearer token, on one line, readable by its owner only.
     """
 
     target: str
@@ -44,24 +45,19 @@ class Robot:
     client_key_file: Path | None = None
     token_file: Path | None = None
 
-    @property
-    def guarded(self) -> bool:
-        """Whether anything but the address is known: the connection must be encrypted."""
-        return any(getattr(self, key) for key in FILE_KEYS)
-
 
 KEYS: Final = tuple(one.name for one in fields(Robot))
 FILE_KEYS: Final = KEYS[1:]
 
 
 @dataclass(frozen=True, slots=True)
-class RobotBook:
-    """All known robots.
+class RobotsFile:
+    """The content of the file.
 
     Args:
-        path: the file, whether it exists or not.
-        robots: by name, in the file's order.
-        default: the one that is meant when none is named.
+        path: The file, whether it exists or not.
+        robots: By name, in the file's order.
+        default: The robot that commands use when none is named.
     """
 
     path: Path
@@ -69,10 +65,10 @@ class RobotBook:
     default: str | None = None
 
     def find(self, name: str) -> Robot:
-        """The robot of this name.
+        """Returns the robot of this name.
 
         Raises:
-            UserError: there is none (a wrong command line).
+            UserError: There is none (a wrong command line).
         """
         try:
             return self.robots[name]
@@ -85,42 +81,32 @@ class RobotBook:
             ) from None
 
 
-def book_path() -> Path:
-    """$XDG_CONFIG_HOME/robotctl/config.toml; ~/.config when that is not set, or not an absolute path."""
+def robots_file_path() -> Path:
+    """Returns $XDG_CONFIG_HOME/robotctl/config.toml; ~/.config where that is unset or not absolute."""
     configured = Path(os.environ.get("XDG_CONFIG_HOME", ""))
     home = configured if configured.is_absolute() else Path.home() / ".config"
     return home / "robotctl" / "config.toml"
 
 
-def read_book(path: Path | None = None) -> RobotBook:
-    """The file, or an empty book where there is none.
+def read_robots_file(path: Path | None = None) -> RobotsFile:
+    """Returns the content of this user's file, empty where there is none.
 
     Raises:
-        UserError: it can't be read, is no TOML, or says something that is not known.
+        UserError: It can't be read, is not TOML, or has an unknown key or a wrong value.
     """
-    path = path or book_path()
-    try:
-        return parse_book(path, path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return RobotBook(path)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise UserError(
-            f"{path} can't be read: {reason}",
-            "Mend the file, or name the robot with --target",
-            exit_code=ExitCode.USAGE,
-        ) from error
+    path = path or robots_file_path()
+    return parse_robots_file(path, read_text(path))
 
 
-def parse_book(path: Path, text: str) -> RobotBook:
-    """The book that a text makes.
+def parse_robots_file(path: Path, text: str) -> RobotsFile:
+    """Returns the content of a text.
 
     Raises:
-        UserError: as `read_book`; the line names the file, the key and what is allowed.
+        UserError: As `read_robots_file`; the line names the file, the key and what is allowed.
     """
     try:
         document = tomllib.loads(text)
-    # Beside its own error, which is a ValueError, the parser lets through what endless nesting raises.
+    # Beside its own error, which is a ValueError, the parser passes on what endless nesting raises.
     except (ValueError, RecursionError) as error:
         raise _wrong(path, f"not TOML: {error}", "") from error
     _only(path, "", document, _TOP_KEYS)
@@ -132,22 +118,37 @@ def parse_book(path: Path, text: str) -> RobotBook:
     if default is not None and not (isinstance(default, str) and default in robots):
         known = ", ".join(robots) or "none"
         raise _wrong(path, f"default = {default!r} is not one of its robots", f"Known: {known}")
-    return RobotBook(path, MappingProxyType(robots), default)
+    return RobotsFile(path, MappingProxyType(robots), default)
 
 
 def check_name(name: str) -> str:
-    """The name, if a robot may be called so.
+    """Returns the name of a robot.
 
     Raises:
-        UserError: it may not (a wrong command line).
+        UserError: It is not allowed (a wrong command line).
     """
     if not _NAME.fullmatch(name):
         raise UserError(
             f"'{name}' can't be a robot's name",
-            "Take up to 63 letters, digits, - and _, the first a letter or a digit",
+            "Use up to 63 letters, digits, - and _, the first a letter or a digit",
             exit_code=ExitCode.USAGE,
         )
     return name
+
+
+def read_text(path: Path) -> str:
+    """Returns the text of the file, empty where there is none; raises as `read_robots_file`."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return ""
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise UserError(
+            f"{path} can't be read: {reason}",
+            "Correct the file, or name the robot with --target",
+            exit_code=ExitCode.USAGE,
+        ) from error
 
 
 def _robot(path: Path, name: str, table: Any) -> Robot:
@@ -175,12 +176,12 @@ def _robot(path: Path, name: str, table: Any) -> Robot:
     return Robot(target=target, **{key: _file(path, table[key]) for key in FILE_KEYS if key in table})
 
 
-def _file(book: Path, text: str) -> Path:
+def _file(path: Path, text: str) -> Path:
     try:
         given = Path(text).expanduser()
     except RuntimeError as error:
-        raise _wrong(book, f"'{text}': {error}", "Write the whole path") from error
-    return book.parent / given
+        raise _wrong(path, f"'{text}': {error}", "Write the whole path") from error
+    return path.parent / given
 
 
 def _only(path: Path, above: str, table: Mapping[str, Any], allowed: tuple[str, ...]) -> None:

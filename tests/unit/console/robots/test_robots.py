@@ -8,11 +8,11 @@ import pytest
 
 from common.errors import ExitCode, UserError
 from common.private_files import write_private
-from console.robots import Robot, RobotBook, choose, read_book, read_credentials
-from console.robots.book import book_path, parse_book
+from console.robots import Robot, RobotsFile, choose, read_credentials, read_robots_file
 from console.robots.choice import Choice
 from console.robots.credentials import credentials_directory, forget_credentials
-from console.robots.edit import drop_robot, put_robot, set_default
+from console.robots.robots_file import parse_robots_file, robots_file_path
+from console.robots.robots_file_edit import drop_robot, put_robot, set_default
 
 FULL = """\
 # mine
@@ -48,23 +48,21 @@ def full(path: Path) -> Path:
 
 def test_a_file_as_values(full: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", "/home/someone")
-    book = read_book(full)
-    assert book.default == "lab2"
-    assert list(book.robots) == ["lab1", "lab2"]
-    assert book.robots["lab1"] == Robot(target="lab1.local:50051")
-    assert not book.robots["lab1"].guarded
-    assert book.robots["lab2"] == Robot(
+    content = read_robots_file(full)
+    assert content.default == "lab2"
+    assert list(content.robots) == ["lab1", "lab2"]
+    assert content.robots["lab1"] == Robot(target="lab1.local:50051")
+    assert content.robots["lab2"] == Robot(
         target="10.0.0.2:6000",
         ca_certificate_file=full.parent / "credentials/lab2/ca.pem",
         client_certificate_file=Path("/etc/robots/me.pem"),
         client_key_file=Path("/home/someone/me.key"),
         token_file=full.parent / "credentials/lab2/token",
     )
-    assert book.robots["lab2"].guarded
 
 
 def test_no_file_is_an_empty_book(path: Path) -> None:
-    assert read_book(path) == RobotBook(path)
+    assert read_robots_file(path) == RobotsFile(path)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +90,7 @@ def test_no_file_is_an_empty_book(path: Path) -> None:
 )
 def test_what_is_wrong_is_one_line_with_the_files_name(path: Path, text: str, says: str) -> None:
     with pytest.raises(UserError) as seen:
-        parse_book(path, text)
+        parse_robots_file(path, text)
     line = str(seen.value)
     assert line.startswith(f"{path}: ")
     assert says in line
@@ -103,25 +101,25 @@ def test_what_is_wrong_is_one_line_with_the_files_name(path: Path, text: str, sa
 def test_what_can_not_be_read_is_one_line(path: Path) -> None:
     path.mkdir(parents=True)
     with pytest.raises(UserError, match="can't be read: Is a directory"):
-        read_book(path)
+        read_robots_file(path)
     path.rmdir()
     path.write_bytes(b"default = '\xff'")
     with pytest.raises(UserError, match="not UTF-8"):
-        read_book(path)
+        read_robots_file(path)
 
 
 def test_where_the_file_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", "/home/someone")
     monkeypatch.setenv("XDG_CONFIG_HOME", "/elsewhere")
-    assert book_path() == Path("/elsewhere/robotctl/config.toml")
+    assert robots_file_path() == Path("/elsewhere/robotctl/config.toml")
     for value in ("", "not/absolute"):
         monkeypatch.setenv("XDG_CONFIG_HOME", value)
-        assert book_path() == Path("/home/someone/.config/robotctl/config.toml")
+        assert robots_file_path() == Path("/home/someone/.config/robotctl/config.toml")
 
 
 # --- which robot is meant ---
 
-BOOK = parse_book(
+KNOWN = parse_robots_file(
     Path("/b"), "default = 'one'\n[robots.one]\ntarget = 'a'\n[robots.two]\ntarget = 'b'\ntoken_file = '/t'"
 )
 BOTH = {"ROBOTCTL_TARGET": "env:1", "ROBOTCTL_ROBOT": "two"}
@@ -141,16 +139,16 @@ BOTH = {"ROBOTCTL_TARGET": "env:1", "ROBOTCTL_ROBOT": "two"}
 def test_who_speaks_first(
     target: str | None, name: str | None, environment: dict[str, str], meant: tuple[str, str | None]
 ) -> None:
-    choice = choose(target, name, environment, lambda: BOOK)
+    choice = choose(target, name, environment, lambda: KNOWN)
     assert (choice.robot.target, choice.name) == meant
 
 
 def test_without_anything_it_is_this_computer() -> None:
-    assert choose(None, None, {}, lambda: RobotBook(Path("/b"))) == Choice(Robot(target="127.0.0.1:50051"))
+    assert choose(None, None, {}, lambda: RobotsFile(Path("/b"))) == Choice(Robot(target="127.0.0.1:50051"))
 
 
 def test_an_address_beside_a_name_replaces_the_address_alone() -> None:
-    assert choose("tunnel:1", "two", {}, lambda: BOOK).robot == Robot(
+    assert choose("tunnel:1", "two", {}, lambda: KNOWN).robot == Robot(
         target="tunnel:1", token_file=Path("/t")
     )
 
@@ -158,7 +156,7 @@ def test_an_address_beside_a_name_replaces_the_address_alone() -> None:
 def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
     """An address on its own: not even the file is read, broken or not."""
 
-    def read() -> RobotBook:
+    def read() -> RobotsFile:
         raise AssertionError
 
     assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read).robot == Robot(target="typed:1")
@@ -166,7 +164,7 @@ def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
 
 def test_a_name_nobody_has() -> None:
     with pytest.raises(UserError, match=r"no robot is called 'three' in /b \(known: one, two\)") as seen:
-        choose(None, "three", {}, lambda: BOOK)
+        choose(None, "three", {}, lambda: KNOWN)
     assert seen.value.exit_code is ExitCode.USAGE
 
 
@@ -176,7 +174,7 @@ def test_a_name_nobody_has() -> None:
 def test_the_first_robot_is_the_default(path: Path) -> None:
     put_robot("lab1", Robot(target="lab1.local"), path=path)
     put_robot("lab2", Robot(target="lab2.local"), path=path)
-    assert read_book(path).default == "lab1"
+    assert read_robots_file(path).default == "lab1"
     assert path.read_text().splitlines() == [
         'default = "lab1"',
         "",
@@ -201,16 +199,16 @@ def test_a_known_robot_is_written_anew_where_it_stands(full: Path) -> None:
 
 
 def test_a_robot_goes_with_its_lines_alone(full: Path) -> None:
-    book = drop_robot("lab1", path=full)
-    assert book == read_book(full)
+    content = drop_robot("lab1", path=full)
+    assert content == read_robots_file(full)
     assert full.read_text() == FULL.replace('[robots.lab1]\ntarget = "lab1.local"\n\n', "")
     assert drop_robot("lab2", path=full).default is None
-    assert read_book(full).robots == {}
+    assert read_robots_file(full).robots == {}
 
 
 def test_the_default_moves(full: Path) -> None:
     assert set_default("lab1", path=full).default == "lab1"
-    assert read_book(full).default == "lab1"
+    assert read_robots_file(full).default == "lab1"
     assert "# mine" in full.read_text()
     with pytest.raises(UserError, match="no robot is called 'lab9'"):
         set_default("lab9", path=full)
@@ -223,21 +221,25 @@ def test_a_name_that_would_not_do(path: Path, name: str) -> None:
     assert not path.exists()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        'robots = { lab1 = { target = "a:1" } }\n',
-        '[robots]\nlab1.target = "a:1"\n',
-        '[robots]\nlab1 = { target = "a:1" }\n',
-    ],
-)
-def test_a_way_of_writing_that_is_not_understood_stays_as_it_is(path: Path, text: str) -> None:
+@pytest.mark.parametrize("text", ['[robots]\nlab1.target = "a:1"\n', '[robots]\nlab1 = { target = "a:1" }\n'])
+def test_other_notations_are_edited_as_well(path: Path, text: str) -> None:
     path.parent.mkdir()
     path.write_text(text)
+    put_robot("lab1", Robot(target="b:1"), path=path)
+    put_robot("lab2", Robot(target="c:1", token_file=Path("/t")), path=path)
+    assert read_robots_file(path).robots == {
+        "lab1": Robot(target="b:1"),
+        "lab2": Robot(target="c:1", token_file=Path("/t")),
+    }
+    drop_robot("lab1", path=path)
+    assert list(read_robots_file(path).robots) == ["lab2"]
+
+
+def test_a_notation_that_can_not_be_edited_stays_as_it_is(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text(text := 'robots = { lab1 = { target = "a:1" } }\n')
     with pytest.raises(UserError, match="can't change"):
         put_robot("lab1", Robot(target="b:1"), path=path)
-    with pytest.raises(UserError, match="can't change"):
-        drop_robot("lab1", path=path)
     assert path.read_text() == text
 
 
@@ -251,7 +253,7 @@ def test_many_at_once_lose_nothing(path: Path) -> None:
         thread.start()
     for thread in threads:
         thread.join(20)
-    assert sorted(read_book(path).robots) == sorted(names)
+    assert sorted(read_robots_file(path).robots) == sorted(names)
 
 
 def test_who_can_not_write_is_told_so_and_nothing_is_left(

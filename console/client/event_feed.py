@@ -1,17 +1,17 @@
-"""Events without loss, without doubles: where a subscriber stands, whatever becomes of its connections."""
+"""The position of an event subscriber, kept across connections: no event lost, none delivered twice."""
 
 from collections.abc import Iterator
 
-from console.client.mapping.methods import EventsWanted
+from console.client.mapping.methods import EventsRequest
 from console.client.results import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, GapReason
 
 
 class EventFeed:
-    """Knows the place to go on from after each thing that was received.
+    """Tracks the position to resume from.
 
     Args:
-        after: where to begin; None takes what the gateway still keeps.
-        least: what matters less is left out.
+        after: Where to begin; None begins with the oldest event that the gateway keeps.
+        least: Events of lower severity are left out.
     """
 
     def __init__(
@@ -20,13 +20,13 @@ class EventFeed:
         self.position = after
         self._least = least
 
-    def wanted(self) -> EventsWanted:
-        """What to ask the gateway for now."""
-        return EventsWanted(self.position, self._least)
+    def request(self) -> EventsRequest:
+        """Returns the request that resumes at the present position."""
+        return EventsRequest(self.position, self._least)
 
     def take(self, item: Event | EventGap | CaughtUp | None) -> Iterator[Event | EventGap | CaughtUp]:
-        """What of the item is news to the subscriber: itself, nothing, or a gap before it."""
-        if item is None or self._is_old(item):
+        """Yields the item unless it is a duplicate, preceded by a gap where events are missing before it."""
+        if item is None or self._is_duplicate(item):
             return
         gap = self._unannounced(item)
         if gap:
@@ -34,8 +34,7 @@ class EventFeed:
         self.position = item.position
         yield item
 
-    def _is_old(self, item: Event | EventGap | CaughtUp) -> bool:
-        """Whether it was received before; a gateway that keeps its word sends nothing twice."""
+    def _is_duplicate(self, item: Event | EventGap | CaughtUp) -> bool:
         here = self.position
         return (
             isinstance(item, Event)
@@ -45,7 +44,7 @@ class EventFeed:
         )
 
     def _unannounced(self, item: Event | EventGap | CaughtUp) -> EventGap | None:
-        """A gap that the gateway did not tell. Who leaves events out can't see any within a run."""
+        """Returns a gap that the gateway did not announce. A filtered feed can't detect one within a run."""
         here = self.position
         if not isinstance(item, Event) or here is None:
             return None

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from console.client.feed import EventFeed
+from console.client.event_feed import EventFeed
 from console.client.results import (
     CaughtUp,
     Event,
@@ -33,10 +33,10 @@ def told(feed: EventFeed, *items: Event | EventGap | CaughtUp | None) -> list[ob
 
 def test_a_feed_begins_where_it_is_told_and_goes_on_after_the_last() -> None:
     feed = EventFeed(EventPosition("run", 4), FaultSeverity.WARNING)
-    assert feed.wanted().after == EventPosition("run", 4)
-    assert feed.wanted().least is FaultSeverity.WARNING
+    assert feed.request().after == EventPosition("run", 4)
+    assert feed.request().least is FaultSeverity.WARNING
     told(feed, event(5))
-    assert feed.wanted().after == EventPosition("run", 5)
+    assert feed.request().after == EventPosition("run", 5)
 
 
 def test_what_came_before_is_not_told_again() -> None:
@@ -73,7 +73,7 @@ def test_another_run_that_nobody_announced_is_told() -> None:
 def test_caught_up_moves_the_feed_on_past_what_was_left_out() -> None:
     feed = EventFeed(least=FaultSeverity.ERROR)
     told(feed, event(1), CaughtUp(position=EventPosition("run", 7)))
-    assert feed.wanted().after == EventPosition("run", 7)
+    assert feed.request().after == EventPosition("run", 7)
 
 
 @given(st.lists(st.tuples(st.sampled_from(["a", "b"]), st.integers(1, 9)), max_size=60))

@@ -5,12 +5,12 @@ import io
 import pytest
 from rich.console import Console, RenderableType
 
-from console.cli.rows import status_rows
 from console.cli.tables import overlay_view, status_view
-from console.cli.watch_line import watch_line
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STATUS
 from console.client.results import SystemStatus
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
+from console.presentation.status_line import status_line
+from console.presentation.status_table import status_rows
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
@@ -60,7 +60,7 @@ def test_stale_and_missing_are_words() -> None:
     rows = {row.label: row for row in status_rows(decoded(message))}
     assert (rows["vision"].mark, rows["vision"].age) == ("STALE", "3.4 s")
     assert (rows["motion"].mark, rows["motion"].text) == ("no data", "")
-    line = watch_line(decoded(message))
+    line = status_line(decoded(message))
     assert "vision STALE 29.5 fps (3.4 s)" in line
     assert "motion no data" in line
 
@@ -81,7 +81,7 @@ def test_everything_a_gateway_can_report_has_a_line() -> None:
     message.effective_command.active_source = "keyboard"
     message.teleop.state, message.teleop.enabled = states.TELEOP_ENABLED, True
     text = printed(status_view(decoded(message), "robot:50051"))
-    for part in ("slowed down by heat", "wlan0, connected", "not in its place", "from keyboard", "ENABLED"):
+    for part in ("throttled by heat", "wlan0, connected", "not installed", "from keyboard", "ENABLED"):
         assert part in text
 
 
@@ -91,9 +91,9 @@ def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_wanted() -> Non
     message.preview.encoder.name, message.preview.encoder.wanted = "x264", "mpp-h265"
     message.preview.encoder.fallback_reason = "/dev/mpp_service is missing"
     rows = status_rows(decoded(message))
-    assert any(row.tone is Tone.BAD and row.text == "camera unplugged" for row in rows)
+    assert any(row.style is SeverityStyle.BAD and row.text == "camera unplugged" for row in rows)
     assert any(row.text == "wanted mpp-h265, /dev/mpp_service is missing" for row in rows)
-    assert "preview faulted (camera unplugged)" in watch_line(decoded(message))
+    assert "preview faulted (camera unplugged)" in status_line(decoded(message))
 
 
 def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
@@ -110,10 +110,10 @@ def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
         id="odometry.stale", message="odometry stopped coming", age_ms=9000, cleared_age_ms=500
     )
     _, disk, odometry = status_rows(decoded(message))[:3]
-    assert (disk.mark, disk.tone, disk.age) == ("error", Tone.BAD, "1 min 05 s")
+    assert (disk.mark, disk.style, disk.age) == ("error", SeverityStyle.BAD, "1 min 05 s")
     assert disk.text == "the disk is nearly full -> make room"
-    assert watch_line(decoded(message)).endswith("  1 fault (platform.disk)")
-    assert (odometry.mark, odometry.text, odometry.age) == ("over", "odometry stopped coming", "500 ms")
+    assert status_line(decoded(message)).endswith("  1 fault (platform.disk)")
+    assert (odometry.mark, odometry.text, odometry.age) == ("cleared", "odometry stopped coming", "500 ms")
 
 
 def test_a_source_has_a_line_only_when_nothing_else_tells_of_it() -> None:
@@ -137,7 +137,7 @@ def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:
     assert "srt://10.0.0.7:7100" in text
     assert "2480 kbit/s of 2500, 30.0 fps, 1 viewer" in text
     assert "round trip" not in text, "nobody measured one"
-    assert "preview running 30.0 fps 2480 kbit/s 1 viewer" in watch_line(decoded(message))
+    assert "preview running 30.0 fps 2480 kbit/s 1 viewer" in status_line(decoded(message))
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])
@@ -164,7 +164,7 @@ def test_overlay_lists_objects_and_events() -> None:
     found.detections.add(class_id=7)
     message.events.add(sequence=4, age_ms=65_000, message="preview running")
     text = printed(overlay_view(GET_OVERLAY_SNAPSHOT.decode(message.SerializeToString()), "r:1"))
-    for part in ("5 in a picture of 1280x720", "the first 2 of them", "person", "0.91", "class 7"):
+    for part in ("5 in a frame of 1280x720", "the first 2 of them", "person", "0.91", "class 7"):
         assert part in text
     assert "#4" in text
     assert "1 min 05 s ago" in text

@@ -22,9 +22,9 @@ from console.client.mapping.methods import (
     STREAMS,
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
-    EventsWanted,
+    EventsRequest,
     Method,
-    PreviewWish,
+    PreviewRequest,
 )
 from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
 from omniseer.gateway.v1 import (
@@ -461,7 +461,7 @@ def test_the_tables_name_only_fields_of_answers() -> None:
 
 def test_every_field_of_a_preview_request_is_set() -> None:
     request = robot_gateway_pb2.SetPreviewModeRequest.FromString(
-        SET_PREVIEW_MODE.encode(PreviewWish(True, PreviewProfile.HIGH_QUALITY))
+        SET_PREVIEW_MODE.encode(PreviewRequest(True, PreviewProfile.HIGH_QUALITY))
     )
     assert request.enabled
     assert request.profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
@@ -470,7 +470,7 @@ def test_every_field_of_a_preview_request_is_set() -> None:
 
 def test_every_field_of_a_subscription_is_set() -> None:
     request = robot_gateway_pb2.SubscribeEventsRequest.FromString(
-        SUBSCRIBE_EVENTS.encode(EventsWanted(EventPosition("run", 7), FaultSeverity.ERROR))
+        SUBSCRIBE_EVENTS.encode(EventsRequest(EventPosition("run", 7), FaultSeverity.ERROR))
     )
     assert (request.after.run_id, request.after.sequence) == ("run", 7)
     assert request.min_severity == fault_pb2.FAULT_SEVERITY_ERROR
