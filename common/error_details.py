@@ -1,4 +1,4 @@
-"""A refusal for programs: google.rpc.Status with reason, fields and when to try again, in gRPC's metadata."""
+"""Encodes errors as google.rpc.Status in trailing metadata: reason, field violations and retry delay."""
 
 from typing import Final
 
@@ -11,12 +11,12 @@ from common.errors import DomainError
 from common.reasons import Reason
 
 DOMAIN: Final = "omniseer.gateway.v1"
-"""Whose reasons these are."""
+"""The namespace of the reasons, as google.rpc.ErrorInfo requires."""
 _NS_PER_S: Final = 1_000_000_000
 
 
 def metadata_of(error: DomainError, code: grpc.StatusCode) -> tuple[tuple[str, str | bytes], ...]:
-    """What is sent along with the code and the error's own words."""
+    """Returns the trailing metadata that accompanies the code and text of a domain error."""
     status = _status(code, str(error), error.reason)
     if error.violations:
         fields = [
@@ -31,14 +31,14 @@ def metadata_of(error: DomainError, code: grpc.StatusCode) -> tuple[tuple[str, s
     return _metadata(status)
 
 
-def metadata_of_defect(words: str) -> tuple[tuple[str, str | bytes], ...]:
-    """The same for an error of our own, of which the caller learns nothing."""
-    return _metadata(_status(grpc.StatusCode.INTERNAL, words, Reason.INTERNAL))
+def metadata_of_defect(text: str) -> tuple[tuple[str, str | bytes], ...]:
+    """Returns the trailing metadata of an internal error, which reveals nothing of its cause."""
+    return _metadata(_status(grpc.StatusCode.INTERNAL, text, Reason.INTERNAL))
 
 
-def _status(code: grpc.StatusCode, words: str, reason: Reason) -> Status:
+def _status(code: grpc.StatusCode, text: str, reason: Reason) -> Status:
     number: int = code.value[0]
-    status = Status(code=number, message=words)
+    status = Status(code=number, message=text)
     status.details.add().Pack(ErrorInfo(reason=reason.value, domain=DOMAIN))
     return status
 

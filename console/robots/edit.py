@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from common.errors import UserError
-from common.private_files import alone_in, write_private
+from common.private_files import directory_lock, write_private
 from console.client import parse_target
 from console.robots.book import (
     FILE_KEYS,
@@ -96,7 +96,7 @@ def set_default(name: str, *, path: Path | None = None) -> RobotBook:
 
 def _change(path: Path | None, change: Callable[[RobotBook], tuple[RobotBook, Edit]]) -> RobotBook:
     path = path or book_path()
-    with alone_in(path.parent):
+    with directory_lock(path.parent):
         wanted, edit = change(read_book(path))
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         after = "\n".join(edit(before.splitlines())).strip("\n") + "\n"

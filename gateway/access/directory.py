@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from common.private_files import alone_in, write_private
+from common.private_files import directory_lock, write_private
 from gateway.access.authority import Pair
 from gateway.access.command import to_type
 from gateway.access.store import Store, parse_store, store_text
@@ -76,7 +76,7 @@ class CredentialDirectory:
         """
         # Before the lock, which would make a directory that is missing.
         self.read_store()
-        with alone_in(self.path):
+        with directory_lock(self.path):
             self.write_store(change(self.read_store()))
 
     def write_store(self, store: Store) -> None:

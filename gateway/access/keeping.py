@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.errors import UserError
-from common.private_files import alone_in
+from common.private_files import directory_lock
 from gateway.access.authority import (
     Pair,
     certificate_facts,
@@ -73,7 +73,7 @@ class Keeper:
             UserError: there is something already, or it can't be written.
         """
         directory = self._directory
-        with alone_in(directory.path):
+        with directory_lock(directory.path):
             if directory.store_file.exists() and not again:
                 raise UserError(
                     f"{directory.path} has credentials already",
@@ -155,7 +155,7 @@ class Keeper:
         """
         directory = self._directory
         authority = directory.read_authority()
-        with alone_in(directory.path):
+        with directory_lock(directory.path):
             known = tuple(hosts) if hosts is not None else self._hosts()
             directory.write_server(server_certificate(authority, self._robot, known, SERVER_DAYS))
         return known
@@ -183,7 +183,7 @@ class Keeper:
             return store.revoked(over, now_s)
 
         directory.change_store(without_certificates)
-        with alone_in(directory.path):
+        with directory_lock(directory.path):
             directory.write_authority(authority)
             directory.write_server(server_certificate(authority, self._robot, known, SERVER_DAYS))
         return tuple(over)

@@ -88,14 +88,14 @@ class PreviewLink:
         _log.info(
             "wish %d: %s", wish.revision, f"on, {wish.profile.value}" if wish.profile and enabled else "off"
         )
-        self.changes.wake_all()
+        self.changes.notify_all()
         return wish
 
     def renew_passphrase(self) -> None:
         """Who knows the present one watches no longer; whoever may watch finds the next one in the view."""
         if self._reconciler.renew_passphrase():
             _log.info("wish %d: another passphrase", self.wish.revision)
-            self.changes.wake_all()
+            self.changes.notify_all()
 
     def settled(self, wish: Wish) -> bool:
         """Whether the wish has come to something or was replaced."""
@@ -114,7 +114,7 @@ class PreviewLink:
                 _log.warning("preview service lost: %s", trouble.in_full)
             elif self._failures_in_a_row == 1:
                 _log.warning("preview service not reached at %s: %s", self._socket, trouble.in_full)
-            self.changes.wake_all()
+            self.changes.notify_all()
             await self._pause(self._failures_in_a_row)
 
     async def _pause(self, failures: int) -> None:
@@ -163,7 +163,7 @@ class PreviewLink:
                 raise
             _log.error("preview service refused revision %d: %s", wish.revision, _in_full(error))
             self._reconciler.refused(wish, error.details() or error.code().name)
-            self.changes.wake_all()
+            self.changes.notify_all()
             return
         self._take(reply.actual)
 
@@ -175,7 +175,7 @@ class PreviewLink:
                 self._failures_in_a_row,
             )
             self._failures_in_a_row = 0
-        self.changes.wake_all()
+        self.changes.notify_all()
 
 
 async def _next_word(stream: Any) -> object | None:

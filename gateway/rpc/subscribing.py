@@ -34,7 +34,7 @@ class EventStreams:
         """Serialised events by their sequence."""
         self.gaps = 0
         """How often a subscriber was told that events are missing."""
-        log.on_event = self._appended.wake_all
+        log.on_event = self._appended.notify_all
 
     async def events(self, after: Position | None, least: Severity) -> AsyncIterator[bytes]:
         """Serialised answers, until the caller leaves.
