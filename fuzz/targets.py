@@ -23,7 +23,7 @@ from fuzz.robot import robots_message
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import load_settings
-from gateway.metrics.endpoint import answer
+from gateway.metrics.endpoint import respond
 from gateway.preview_link.wire import UnknownSpeechError, from_wire
 from gateway.ros.cutting import cut
 from gateway.rpc.limits import MOST_REQUEST_BYTES
@@ -85,7 +85,7 @@ def configuration(data: bytes) -> None:
 
 def metrics_request(data: bytes) -> None:
     """An HTTP request to the metrics' port: always a whole answer."""
-    assert answer(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
+    assert respond(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
 
 
 def request_id(data: bytes) -> None:

@@ -10,10 +10,10 @@ import grpc
 
 from common import request_id
 from gateway.access.audit import AuditLog, AuditRecord
+from gateway.access.authenticator import Authenticator
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keyring import Keyring
 from gateway.access.lockout import Lockout
-from gateway.access.watch import AccessWatch, Loaded, TlsFiles
+from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
 from gateway.config import SecuritySettings
 from gateway.rpc.controls import action_news
 from gateway.rpc.guard import Guard
@@ -49,20 +49,20 @@ class Door:
         file = settings.audit.file or (where / _AUDIT_FILE if where else None)
         self._audit = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
         self.guard: Guard | None = None
-        self._watch: AccessWatch | None = None
+        self._watch: CredentialReloader | None = None
         self._tls: ServerTls | None = None
         if where is None:
             return
         files = CredentialDirectory(where)
         tls_files = tls_files_of(settings, files)
-        self._watch = watch = AccessWatch(files.read_store, files.store_file, tls_files, self._take_over)
-        self._keyring = Keyring(watch.loaded.store)
-        asked = tls_files is not None and tls_files.client_authority is not None
+        self._watch = watch = CredentialReloader(files, tls_files, self._take_over)
+        self._authenticator = Authenticator(watch.loaded.store)
+        asked = tls_files is not None and tls_files.client_ca is not None
         self.guard = Guard(
-            self._keyring,
+            self._authenticator,
             Lockout(),
             self._note_refused,
-            watch.look_for_unknown,
+            watch.reload_for_unknown,
             somebody_is_out,
             certificates=asked,
         )
@@ -120,14 +120,14 @@ class Door:
             tasks.create_task(self._watch.run(), name="credentials")
             tasks.create_task(self.guard.run(), name="streams")
 
-    def _take_over(self, loaded: Loaded) -> None:
-        self._keyring.use(loaded.store)
+    def _take_over(self, loaded: LoadedAccess) -> None:
+        self._authenticator.use(loaded.store)
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         self._audit.note(_changed_note(len(loaded.store.credentials)))
 
 
-def read_access(settings: SecuritySettings, where: Path) -> Loaded:
+def read_access(settings: SecuritySettings, where: Path) -> LoadedAccess:
     """Everything by which callers are asked who they are, read as a gateway does that starts.
 
     Args:
@@ -138,7 +138,7 @@ def read_access(settings: SecuritySettings, where: Path) -> Loaded:
         UserError: credentials or certificates can't be read.
     """
     files = CredentialDirectory(where)
-    return AccessWatch(files.read_store, files.store_file, tls_files_of(settings, files)).loaded
+    return load_access(files, tls_files_of(settings, files))
 
 
 def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:
@@ -146,9 +146,8 @@ def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsF
     tls = settings.tls
     if not tls.enabled:
         return None
-    certificate, key = files.server_files
-    authority = (tls.client_ca or files.authority_files[0]) if tls.client_certificates else None
-    return TlsFiles(tls.certificate or certificate, tls.key or key, authority)
+    authority = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
+    return TlsFiles(tls.certificate or files.server.certificate, tls.key or files.server.key, authority)
 
 
 def _changed_note(count: int) -> AuditRecord:

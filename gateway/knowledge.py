@@ -8,7 +8,7 @@ from typing import Final
 
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
-from gateway.platform.boot import boot_id
+from gateway.platform.files import boot_id
 from gateway.rpc.tally import Tally
 from gateway.status.board import Board
 from gateway.status.event import News

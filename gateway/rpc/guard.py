@@ -13,13 +13,13 @@ from common.error_details import metadata_of
 from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.reasons import Reason
 from common.rpc import STATUS_CODES, Context, Handler, rewrapped
-from gateway.access.attempts import Attempts
+from gateway.access.address_prefix import address_prefix
 from gateway.access.audit import AuditRecord
+from gateway.access.authenticator import Authenticator, combined
 from gateway.access.credential import Principal
-from gateway.access.keyring import Keyring, both
 from gateway.access.lockout import Lockout
+from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.access.role import Role
-from gateway.access.site import site_of
 from gateway.rpc.identity import begin, fingerprint_of, token_of
 from gateway.rpc.method_roles import Needed, Open, needed_for
 from gateway.rpc.peer import address_of, host_of
@@ -46,32 +46,32 @@ class Guard(grpc.aio.ServerInterceptor):
     """Belongs to one event loop.
 
     Args:
-        keyring: knows the credentials.
+        authenticator: knows the credentials.
         lockout: remembers who showed wrong ones.
         refused: takes the record of a control action that was refused here.
-        look_for_unknown: reads the list of credentials again when one is shown that it does not have.
+        reload_for_unknown: reads the list of credentials again when one is shown that it does not have.
         somebody_is_out: called when one who was let in would not be any more: what they know is to change.
         certificates: whether connections show certificates.
     """
 
     def __init__(
         self,
-        keyring: Keyring,
+        authenticator: Authenticator,
         lockout: Lockout,
         refused: Callable[[AuditRecord], None],
-        look_for_unknown: Callable[[], Awaitable[None]],
+        reload_for_unknown: Callable[[], Awaitable[None]],
         somebody_is_out: Callable[[], None],
         *,
         certificates: bool,
     ) -> None:
-        self._keyring = keyring
+        self._authenticator = authenticator
         self._lockout = lockout
         self._refused = refused
-        self._look_for_unknown = look_for_unknown
+        self._reload_for_unknown = reload_for_unknown
         self._somebody_is_out = somebody_is_out
         self._let_in: dict[tuple[str, ...], Principal] = {}
         """By their credentials, of which the robot has a list."""
-        self._attempts = Attempts()
+        self._refusal_limiter = RefusalLimiter()
         self._certificates = certificates
         self._streams: set[_OpenStream] = set()
 
@@ -102,12 +102,12 @@ class Guard(grpc.aio.ServerInterceptor):
 
     async def end_what_is_over(self) -> None:
         """Ends every stream whose caller would not be let in any more, and tells of those callers."""
-        out = [key for key, each in self._let_in.items() if not self._keyring.still_valid(each)]
+        out = [key for key, each in self._let_in.items() if not self._authenticator.still_valid(each)]
         for key in out:
             del self._let_in[key]
         if out:
             self._somebody_is_out()
-        over = [each for each in self._streams if not self._keyring.still_valid(each.principal)]
+        over = [each for each in self._streams if not self._authenticator.still_valid(each.principal)]
         await asyncio.gather(*(self._end(each) for each in over))
 
     def _unary(self, behavior: Any, method: str, needed: Needed) -> Any:
@@ -157,24 +157,26 @@ class Guard(grpc.aio.ServerInterceptor):
                 "this robot wants to know who asks; robotctl login tells it",
                 Reason.CREDENTIAL_MISSING,
             )
-        unknown = (token is not None and not self._keyring.owner(token)) or (
-            fingerprint is not None and not self._keyring.knows_certificate(fingerprint)
+        unknown = (token is not None and not self._authenticator.id_of_token(token)) or (
+            fingerprint is not None and not self._authenticator.knows_certificate(fingerprint)
         )
         if unknown:
-            await self._look_for_unknown()
-        by_certificate = self._keyring.of_certificate(fingerprint) if fingerprint is not None else None
+            await self._reload_for_unknown()
+        by_certificate = (
+            self._authenticator.authenticate_certificate(fingerprint) if fingerprint is not None else None
+        )
         by_token = self._of_token(context, token) if token is not None else None
         if by_certificate and by_token:
-            return both(by_certificate, by_token)
+            return combined(by_certificate, by_token)
         found = by_certificate or by_token
         assert found is not None, "one of them was shown"
         return found
 
     def _of_token(self, context: Context, token: str) -> Principal:
-        host, owner = host_of(context.peer()), self._keyring.owner(token)
+        host, owner = host_of(context.peer()), self._authenticator.id_of_token(token)
         self._lockout.admit(host, owner)
         try:
-            principal = self._keyring.of_token(token)
+            principal = self._authenticator.authenticate_token(token)
         except NotAuthenticatedError as error:
             if error.reason in _WRONG and self._lockout.failed(host, owner):
                 meant = f"credential {owner}" if owner else "no credential of this robot"
@@ -194,7 +196,7 @@ class Guard(grpc.aio.ServerInterceptor):
         if needed not in (Role.OPERATOR, Role.ADMIN) or isinstance(error, TooMuchError):
             return
         peer = context.peer()
-        left_out = self._attempts.left_out(principal.name if principal else site_of(host_of(peer)))
+        left_out = self._refusal_limiter.take(principal.name if principal else address_prefix(host_of(peer)))
         if left_out is None:
             return
         more = f" ({left_out} attempts before this one are left out)" if left_out else ""

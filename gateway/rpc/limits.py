@@ -14,7 +14,7 @@ from typing import Final
 
 from common.errors import TooMuchError
 from common.reasons import Reason
-from gateway.access.site import site_of
+from gateway.access.address_prefix import address_prefix
 from gateway.rpc.peer import host_of
 
 QUIET_AFTER_S: Final = 1.0
@@ -135,7 +135,7 @@ class Admission:
         return max(1.0, min(limits.burst, limits.requests_per_s * _HARDLY_ANYTHING_S))
 
     def _new(self, peer: str, now_s: float) -> _Connection:
-        limits, site = self._limits, site_of(host_of(peer))
+        limits, site = self._limits, address_prefix(host_of(peer))
         if self._sites[site] >= limits.connections_per_address and not self._put_out(now_s, site):
             raise TooMuchError(
                 f"this gateway serves {limits.connections_per_address} connections of one address at once, "

@@ -8,8 +8,8 @@ import grpc
 import pytest
 
 from common.errors import NotAuthenticatedError
+from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
-from gateway.access.keyring import Keyring
 from gateway.access.lockout import Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
@@ -26,21 +26,21 @@ class Ground:
     def __init__(self) -> None:
         self.tokens = {name: new_token(name[0] * 12) for name in ("anna", "ben", "carla")}
         self.credentials = {name: _credential(name, token) for name, token in self.tokens.items()}
-        self.keyring = Keyring(Store(MappingProxyType({})))
+        self.authenticator = Authenticator(Store(MappingProxyType({})))
         self.take_over()
         self.refused: list[Any] = []
         self.times_out = 0
         self.looks = 0
         self.guard = Guard(
-            self.keyring,
+            self.authenticator,
             Lockout(),
             self.refused.append,
-            self._look_for_unknown,
+            self._reload_for_unknown,
             self._somebody_is_out,
             certificates=False,
         )
 
-    async def _look_for_unknown(self) -> None:
+    async def _reload_for_unknown(self) -> None:
         self.looks += 1
         self.take_over()
 
@@ -50,7 +50,7 @@ class Ground:
     def take_over(self) -> None:
         """As when the gateway has read its files anew."""
         listed = {each.credential_id: each for each in self.credentials.values()}
-        self.keyring.use(Store(MappingProxyType(listed)))
+        self.authenticator.use(Store(MappingProxyType(listed)))
 
     def revoke(self, *names: str) -> None:
         for name in names:
