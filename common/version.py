@@ -1,4 +1,4 @@
-"""The version of what is installed, and the revision it was built from."""
+"""Version and git revision of the installed project."""
 
 import os
 import re
@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Final
 
 REVISION_VARIABLE: Final = "ROBOT_GATEWAY_REVISION"
-"""Set by whoever builds an image, which holds no repository."""
+"""Set when an image is built, which contains no repository."""
 _REVISION: Final = re.compile(r"[0-9a-f]{40}")
 
 
 def project_version() -> str:
-    """MAJOR.MINOR.PATCH of the installed project, "0.0.0" in a tree that was never installed."""
+    """Returns MAJOR.MINOR.PATCH of the installed project; "0.0.0" if it is not installed."""
     try:
         return version("robot-gateway")
     except PackageNotFoundError:
@@ -20,14 +20,13 @@ def project_version() -> str:
 
 
 def project_revision(repository: Path = Path(__file__).parents[1] / ".git") -> str:
-    """The git revision (40 digits): from the environment, else of the tree; empty when unknown."""
-    told = os.environ.get(REVISION_VARIABLE, "").strip().lower()
-    found = told or _checked_out(repository)
+    """Returns the git revision (40 digits) of the environment, else of the repository; empty if unknown."""
+    found = os.environ.get(REVISION_VARIABLE, "").strip().lower() or _head(repository)
     return found if _REVISION.fullmatch(found) else ""
 
 
-def _checked_out(repository: Path) -> str:
-    """What HEAD stands for; read from the files, because a robot has no git."""
+def _head(repository: Path) -> str:
+    """Resolves HEAD from the files of the repository, because a robot has no git."""
     try:
         head = (repository / "HEAD").read_text(encoding="ascii").strip()
         reference = head.removeprefix("ref: ")

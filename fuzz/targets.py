@@ -24,7 +24,7 @@ from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.link import LinkLostError
 from gateway.links.preview.wire import from_wire
-from gateway.metrics.endpoint import answer
+from gateway.metrics.endpoint import respond
 from gateway.ros.cutting import cut
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.methods import CONTRACT, method_at
@@ -83,7 +83,7 @@ def configuration(data: bytes) -> None:
 
 def metrics_request(data: bytes) -> None:
     """An HTTP request to the metrics' port: always a whole answer."""
-    assert answer(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
+    assert respond(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
 
 
 def request_id(data: bytes) -> None:

@@ -8,7 +8,7 @@ from typing import Final, Protocol
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
-from gateway.platform.boot import boot_id
+from gateway.platform.files import boot_id
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
 from gateway.status.event import News
@@ -116,7 +116,7 @@ class State:
         """Adds an event of this instant."""
         _log.info("event: %s", news.sentence or news.message)
         self.events.add(news, time.monotonic())
-        self.event_added.wake_all()
+        self.event_added.notify_all()
 
     def _runtime(self, now_s: float) -> Runtime:
         return Runtime(

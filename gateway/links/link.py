@@ -121,7 +121,7 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         """Replaces the desired state; returns without waiting for the service."""
         desired = self._reconciler.request(spec, request_id.current())
         _log.info("%s: revision %d requested: %s", self._name, desired.revision, spec)
-        self.changes.wake_all()
+        self.changes.notify_all()
         return desired
 
     async def settles(self, desired: Desired[SpecT], within_s: float) -> bool:
@@ -137,7 +137,7 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
                 _log.warning("%s lost: %s", self._name, detail)
             elif self._backoff.failures == 1:
                 _log.warning("%s not reached: %s", self._name, detail)
-            self.changes.wake_all()
+            self.changes.notify_all()
             await self._pause(pause_s)
 
     async def _pause(self, pause_s: float) -> None:
@@ -186,7 +186,7 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         except RefusedError as error:
             _log.error("%s refuses revision %d: %s", self._name, desired.revision, error)
             self._reconciler.take_refusal(desired, str(error))
-            self.changes.wake_all()
+            self.changes.notify_all()
             return
         if report is None:
             raise LinkLostError(f"no answer to a request for {self._apply_deadline_s:g} s")
@@ -199,7 +199,7 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
                 "%s connected (process %s), after %d failures", self._name, report.instance_id, failures
             )
             self._backoff.reset()
-        self.changes.wake_all()
+        self.changes.notify_all()
 
 
 async def _within(timeout_s: float, step: Awaitable[ResultT]) -> ResultT | None:

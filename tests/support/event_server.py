@@ -41,7 +41,7 @@ class EventServer:
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
             self._log.add(News(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
-        self._appended.wake_all()
+        self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
 
     async def restart(self) -> None:

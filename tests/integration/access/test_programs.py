@@ -176,8 +176,8 @@ def test_what_is_there_is_not_thrown_away_by_mistake(ground: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("revoke", "nobody"), "no credential in force"),
-        (("rotate", "nobody"), "no credential in force"),
+        (("revoke", "nobody"), "no valid credential"),
+        (("rotate", "nobody"), "no valid credential"),
         (("add", "../x", "--role", "viewer"), "can't be the name"),
     ],
 )

@@ -98,7 +98,7 @@ def test_a_viewer_is_told_what_is_missing_and_goes_on_watching(robot: Guarded) -
 def test_a_login_that_is_over_is_told_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
     robot.log_in("carla", Role.OPERATOR)
     with in_front_of(robot) as carla:
-        robot.keeper.revoke("carla")
+        robot.admin.revoke("carla")
         carla.link_is("not allowed")
         banner = carla.window.banner
         assert banner.isVisible()
@@ -141,7 +141,7 @@ def test_another_certificate_is_taken_over_like_another_token(tmp_path: Path) ->
     with guarded_program(tmp_path / "robot", tmp_path / "laptop", Kind.CERTIFICATE) as robot:
         robot.log_in("emma", Role.OPERATOR)
         with in_front_of(robot) as emma:
-            robot.keeper.revoke("emma")
+            robot.admin.revoke("emma")
             emma.link_is("not allowed")
             assert "the certificate of emma" in emma.window.banner.text.text()
             robot.log_in("emma", Role.OPERATOR)

@@ -55,7 +55,7 @@ def test_a_viewer_by_the_robots_name_sees_an_encrypted_stream(robot: Guarded) ->
 def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded) -> None:
     robot.switch_on()
     robot.log_in("carl", Role.VIEWER)
-    robot.keeper.revoke("carl")
+    robot.admin.revoke("carl")
     wait_until(lambda: view(robot)[0] == 1, "carl is refused", TOLD_WITHIN_S)
     code, said, complaints = view(robot)
     assert (code, said) == (1, "")
@@ -76,7 +76,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
             lambda: "dora is viewer, and SetPreviewMode needs operator" in window.window.said.text(),
             "what is missing",
         )
-        robot.keeper.revoke("dora")
+        robot.admin.revoke("dora")
         until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
         card = banner(window.session.state())
         assert card
@@ -87,7 +87,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         until(lambda: window.session.state().phase is Phase.OFF, "the new login counts", TOLD_WITHIN_S)
         press(window.window, Qt.Key.Key_P)
         until(lambda: window.session.state().phase is Phase.LIVE, "video")
-        robot.keeper.revoke("dora")
+        robot.admin.revoke("dora")
         # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
         until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
 
@@ -102,7 +102,7 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
     assert known
     with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
         until(lambda: window.session.state().phase is Phase.LIVE, "video")
-        robot.keeper.revoke("emil")
+        robot.admin.revoke("emil")
         with robot.client() as client:
             wait_until(
                 lambda: (

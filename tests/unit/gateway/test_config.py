@@ -62,7 +62,7 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
             "and no other, has a label",
         ),
-        ("- a list", "holds a list at its top"),
+        ("- a list", "holds a list at the top level"),
         ("a: [", "is not YAML"),
     ],
 )

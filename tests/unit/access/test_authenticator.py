@@ -1,4 +1,4 @@
-"""Who shows what: each state of a credential, and of two at once."""
+"""Authentication: each state of a credential, and two credentials at once."""
 
 from types import MappingProxyType
 
@@ -6,8 +6,8 @@ import pytest
 
 from common.errors import NotAuthenticatedError
 from common.reasons import Reason
+from gateway.access.authenticator import Authenticator, combined
 from gateway.access.credential import Credential, Kind, Principal, State
-from gateway.access.keyring import Keyring, both
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
@@ -29,9 +29,9 @@ def credential(**changed: object) -> Credential:
     return Credential(**values | changed)  # type: ignore[arg-type]  # a test's short hand
 
 
-def keyring(*credentials: Credential) -> Keyring:
+def authenticator(*credentials: Credential) -> Authenticator:
     store = Store(MappingProxyType({each.credential_id: each for each in credentials}))
-    return Keyring(store, lambda: NOW_S)
+    return Authenticator(store, lambda: NOW_S)
 
 
 @pytest.mark.parametrize(
@@ -44,52 +44,52 @@ def keyring(*credentials: Credential) -> Keyring:
         ({"begins_s": 1_000_001, "revoked_s": 5}, State.REVOKED, Reason.CREDENTIAL_REVOKED),
     ],
 )
-def test_what_is_not_valid_now_is_refused_with_its_reason(
+def test_an_invalid_credential_is_refused_with_its_reason(
     changed: dict[str, object], state: State, reason: Reason
 ) -> None:
     kept = credential(**changed)
     assert kept.state(NOW_S) is state
     with pytest.raises(NotAuthenticatedError) as caught:
-        keyring(kept).of_token(SHOWN.text())
+        authenticator(kept).authenticate_token(SHOWN.text())
     assert caught.value.reason is reason
     assert SHOWN.secret not in str(caught.value)
 
 
 @pytest.mark.parametrize("changed", [{}, {"begins_s": 1_000_000}, {"ends_s": 1_000_001}])
-def test_what_is_valid_makes_a_caller(changed: dict[str, object]) -> None:
-    kept = keyring(credential(**changed))
-    found = kept.of_token(SHOWN.text())
+def test_a_valid_credential_authenticates(changed: dict[str, object]) -> None:
+    kept = authenticator(credential(**changed))
+    found = kept.authenticate_token(SHOWN.text())
     assert found == Principal("anna", Role.OPERATOR, (SHOWN.credential_id,))
     assert kept.still_valid(found)
 
 
-def test_why_a_token_is_unknown_is_not_told() -> None:
-    """A wrong secret, an id that nobody has, a certificate's id: one answer."""
+def test_the_cause_of_an_unknown_token_is_not_revealed() -> None:
+    """A wrong secret, an unknown id, a certificate's id: one answer."""
     certificate = credential(kind=Kind.CERTIFICATE, proof=FINGERPRINT)
     cases = (
-        (keyring(credential()), Token(SHOWN.credential_id, "A" * 43).text()),
-        (keyring(), SHOWN.text()),
-        (keyring(certificate), SHOWN.text()),
-        (keyring(credential()), "nothing of the kind"),
-        (keyring(credential()), ""),
+        (authenticator(credential()), Token(SHOWN.credential_id, "A" * 43).text()),
+        (authenticator(), SHOWN.text()),
+        (authenticator(certificate), SHOWN.text()),
+        (authenticator(credential()), "not a token"),
+        (authenticator(credential()), ""),
     )
     said = set()
     for kept, text in cases:
         with pytest.raises(NotAuthenticatedError) as caught:
-            kept.of_token(text)
+            kept.authenticate_token(text)
         said.add((str(caught.value), caught.value.reason))
     assert len(said) == 1
 
 
 def test_a_tokens_hash_is_no_fingerprint() -> None:
-    kept = keyring(credential())
+    kept = authenticator(credential())
     with pytest.raises(NotAuthenticatedError):
-        kept.of_certificate(hash_of(SHOWN))
+        kept.authenticate_certificate(hash_of(SHOWN))
 
 
-def test_a_caller_is_over_when_their_credential_is_changed_revoked_or_gone() -> None:
-    kept = keyring(credential())
-    found = kept.of_token(SHOWN.text())
+def test_a_principal_is_invalid_when_its_credential_is_changed_revoked_or_gone() -> None:
+    kept = authenticator(credential())
+    found = kept.authenticate_token(SHOWN.text())
     for changed in ((credential(revoked_s=5),), (credential(role=Role.VIEWER),), ()):
         kept.use(Store(MappingProxyType({each.credential_id: each for each in changed})))
         assert not kept.still_valid(found)
@@ -99,13 +99,13 @@ def test_a_caller_is_over_when_their_credential_is_changed_revoked_or_gone() -> 
 
 def test_two_credentials_allow_what_both_allow() -> None:
     viewer, admin = Principal("anna", Role.VIEWER, ("a",)), Principal("anna", Role.ADMIN, ("b",))
-    assert both(viewer, admin) == Principal("anna", Role.VIEWER, ("a", "b"))
-    assert both(admin, viewer) == Principal("anna", Role.VIEWER, ("b", "a"))
+    assert combined(viewer, admin) == Principal("anna", Role.VIEWER, ("a", "b"))
+    assert combined(admin, viewer) == Principal("anna", Role.VIEWER, ("b", "a"))
     with pytest.raises(NotAuthenticatedError):
-        both(viewer, Principal("ben", Role.ADMIN, ("c",)))
+        combined(viewer, Principal("ben", Role.ADMIN, ("c",)))
 
 
-def test_roles_are_a_ladder() -> None:
+def test_each_role_includes_the_ones_before_it() -> None:
     ladder = list(Role)
     for place, role in enumerate(ladder):
         assert [role.may(needed) for needed in ladder] == [other <= place for other in range(len(ladder))]

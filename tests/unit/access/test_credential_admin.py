@@ -1,4 +1,4 @@
-"""What a robot's keeper does: nothing is lost between two who do it at once; a rotated secret takes over."""
+"""Administration: concurrent changes are all kept; a rotated secret replaces the old one."""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 from common.errors import UserError
 from gateway.access.credential import Kind, State
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
 from gateway.access.store import Store
 
@@ -16,10 +16,10 @@ NOW_S = 1_000_000.0
 
 
 @pytest.fixture
-def keeper(tmp_path: Path) -> Keeper:
-    keeper = Keeper(CredentialDirectory(tmp_path), "lab", lambda: NOW_S)
-    keeper.begin(("localhost",))
-    return keeper
+def admin(tmp_path: Path) -> CredentialAdmin:
+    admin = CredentialAdmin(CredentialDirectory(tmp_path), "lab", lambda: NOW_S)
+    admin.initialize(("localhost",))
+    return admin
 
 
 def states(path: Path) -> list[tuple[str, str]]:
@@ -28,44 +28,44 @@ def states(path: Path) -> list[tuple[str, str]]:
     return [(each.name, each.state(NOW_S).value) for each in kept]
 
 
-def test_changes_at_once_are_all_kept(keeper: Keeper, tmp_path: Path) -> None:
+def test_changes_at_once_are_all_kept(admin: CredentialAdmin, tmp_path: Path) -> None:
     names = [f"person-{number}" for number in range(40)]
     with ThreadPoolExecutor(8) as pool:
-        list(pool.map(lambda name: keeper.add(Wanted(name, Role.VIEWER)), names))
+        list(pool.map(lambda name: admin.add(CredentialRequest(name, Role.VIEWER)), names))
     assert sorted(name for name, _ in states(tmp_path)) == sorted(names)
 
 
-def test_a_rotated_token_replaces_the_old_one_at_once_or_later(keeper: Keeper, tmp_path: Path) -> None:
-    keeper.add(Wanted("anna", Role.OPERATOR))
-    new, bundle = keeper.rotate("anna")
+def test_a_rotated_token_replaces_the_old_one_now_or_later(admin: CredentialAdmin, tmp_path: Path) -> None:
+    admin.add(CredentialRequest("anna", Role.OPERATOR))
+    new, bundle = admin.rotate("anna")
     assert (new.name, new.role) == ("anna", Role.OPERATOR)
     assert bundle.token
     assert states(tmp_path) == [("anna", "revoked"), ("anna", "valid")]
-    keeper.rotate(new.credential_id, overlap_s=60)
+    admin.rotate(new.credential_id, overlap_s=60)
     assert states(tmp_path) == [("anna", "revoked"), ("anna", "valid"), ("anna", "valid")]
     kept = CredentialDirectory(tmp_path).read_store().credentials[new.credential_id]
     assert kept.state(NOW_S + 60) is State.EXPIRED
 
 
-def test_who_has_two_is_asked_which(keeper: Keeper) -> None:
-    first, _ = keeper.add(Wanted("anna", Role.VIEWER))
-    second, _ = keeper.add(Wanted("anna", Role.ADMIN))
+def test_who_has_two_is_asked_which(admin: CredentialAdmin) -> None:
+    first, _ = admin.add(CredentialRequest("anna", Role.VIEWER))
+    second, _ = admin.add(CredentialRequest("anna", Role.ADMIN))
     with pytest.raises(UserError, match=f"{first.credential_id}, {second.credential_id}"):
-        keeper.rotate("anna")
-    assert {each.credential_id for each in keeper.revoke("anna")} == {
+        admin.rotate("anna")
+    assert {each.credential_id for each in admin.revoke("anna")} == {
         first.credential_id,
         second.credential_id,
     }
 
 
-def test_a_rotation_lasts_as_long_as_what_it_replaces(keeper: Keeper) -> None:
-    keeper.add(Wanted("anna", Role.VIEWER, days=7))
-    assert keeper.rotate("anna")[0].ends_s == NOW_S + 7 * 86_400
+def test_a_rotation_lasts_as_long_as_what_it_replaces(admin: CredentialAdmin) -> None:
+    admin.add(CredentialRequest("anna", Role.VIEWER, days=7))
+    assert admin.rotate("anna")[0].ends_s == NOW_S + 7 * 86_400
 
 
-def test_a_bundle_holds_what_the_list_does_not(keeper: Keeper, tmp_path: Path) -> None:
-    _, token = keeper.add(Wanted("anna", Role.VIEWER))
-    _, certificate = keeper.add(Wanted("ben", Role.VIEWER, Kind.CERTIFICATE))
+def test_a_bundle_holds_what_the_list_does_not(admin: CredentialAdmin, tmp_path: Path) -> None:
+    _, token = admin.add(CredentialRequest("anna", Role.VIEWER))
+    _, certificate = admin.add(CredentialRequest("ben", Role.VIEWER, Kind.CERTIFICATE))
     listed = CredentialDirectory(tmp_path).store_file.read_text()
     assert token.token in token.text()
     assert token.token.partition(".")[2] not in listed
@@ -74,11 +74,11 @@ def test_a_bundle_holds_what_the_list_does_not(keeper: Keeper, tmp_path: Path) -
     assert token.token not in repr(token)
 
 
-def test_a_change_that_fails_changes_nothing(keeper: Keeper, tmp_path: Path) -> None:
-    keeper.add(Wanted("anna", Role.VIEWER))
+def test_a_change_that_fails_changes_nothing(admin: CredentialAdmin, tmp_path: Path) -> None:
+    admin.add(CredentialRequest("anna", Role.VIEWER))
     before = CredentialDirectory(tmp_path).store_file.read_bytes()
 
-    def fail(_store: Store) -> Store:
+    def fail(_store: Store) -> tuple[Store, None]:
         raise UserError("no")
 
     with pytest.raises(UserError, match="no"):
