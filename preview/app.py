@@ -9,14 +9,14 @@ from typing import Final
 from common import bind, rpc
 from common.health import Health
 from preview.config import PreviewSettings
-from preview.crash_report import CrashReport
-from preview.encoder_note import EncoderNote
 from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.crash_marker import EncoderNote
+from preview.encoders.crash_report import CrashReport
 from preview.encoders.probe import Prober
-from preview.manager import Manager
+from preview.encoders.selection import Selection
 from preview.planner import Planner
 from preview.rpc.servicer import SERVICE, PreviewServicer
-from preview.selection import Selection
+from preview.supervisor import Supervisor
 from preview.values import Target
 
 _log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     note.tell(selection, crash=CrashReport(settings.runtime_dir).begin())
     prober = new_prober(settings)
     planner = Planner(settings, prober, selection)
-    manager = Manager(settings, planner, note, on_hung=lambda name, why: _end_hung(note, name, why))
+    manager = Supervisor(settings, planner, note, on_hung=lambda name, why: _end_hung(note, name, why))
     server = rpc.new_server()
     servicer = PreviewServicer(manager, prober, preference(settings))
     servicer.register(server)

@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable
 
 from common.errors import UserError
-from preview import sources
 from preview.config import PreviewSettings
 from preview.encoders.probe import Prober
-from preview.plan import ListenerPlan, Plan
-from preview.selection import Selection
+from preview.encoders.selection import Selection
+from preview.pipeline import sources
+from preview.pipeline.plan import ListenerPlan, Plan
 from preview.values import Wish
 
 

@@ -8,7 +8,7 @@ from rich.table import Table
 from preview.app import new_prober, preference
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import Encoder
-from preview.selection import Verdict
+from preview.encoders.selection import Verdict
 
 _WIDTH: Final = 160
 

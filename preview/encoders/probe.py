@@ -14,7 +14,7 @@ from typing import Final
 
 from common.gst import Gst
 from preview.encoders.catalogue import Encoder
-from preview.selection import Verdict
+from preview.encoders.selection import Verdict
 from preview.values import Target
 
 _MAX_ANSWER_BYTES: Final = 64 * 1024

@@ -14,7 +14,7 @@ from typing import Any, Final
 from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.chain import chain, size_caps
 from preview.values import Target
@@ -106,7 +106,7 @@ def build(encoder: Encoder, target: Target) -> Any:
         raise UserError(error.message) from error
     pipeline.get_by_name("size").set_property("caps", size_caps(encoder, target))
     kbps = target.bitrate_kbps
-    settings.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
+    properties.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
 
 

@@ -15,10 +15,10 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.gst import GLib, Gst
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.encoders.chain import chain, size_caps
 from preview.pipeline import square_pixels
-from preview.plan import ListenerPlan, Plan
+from preview.pipeline.plan import ListenerPlan, Plan
 from preview.values import Target
 
 _TABLES_EVERY: Final = 4500
@@ -87,7 +87,7 @@ def build(plan: Plan) -> Parts:
     if not source.link(body):
         raise UserError(f"{plan.source.label} does not end in raw video", plan.source.remedy)
     parts = _parts(pipeline, source, body)
-    settings.configure(
+    properties.configure(
         parts.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, plan.highest_kbps
     )
     _listen(parts.sink, plan.listener)
@@ -100,7 +100,7 @@ def apply_target(dials: Dials, plan: Plan) -> None:
 
     The encoder's figures first: new caps make it start over, with what it has then.
     """
-    settings.set_figures(dials.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
+    properties.set_figures(dials.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
     size = size_caps(plan.encoder, plan.target)
     rate = Gst.Caps.from_string(_rate_caps(plan.target, exact=plan.source.any_rate))
     # Where caps don't change, setting them again would make the encoder start over for nothing.
@@ -117,8 +117,8 @@ def _source(plan: Plan) -> Any:
     # A description may end in caps only when something follows.
     source = _parsed(f"{description} ! identity name=source_end", "source_end", "src", plan.source.remedy)
     source.set_name("source")
-    for name, properties in plan.source.properties.items():
-        for key, value in properties.items():
+    for name, values in plan.source.properties.items():
+        for key, value in values.items():
             source.get_by_name(name).set_property(key, value)
     square_pixels.fill_in(source)
     return source

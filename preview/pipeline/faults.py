@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
+from preview.pipeline.plan import Plan
 from preview.pipeline.watchdogs import Silent
-from preview.plan import Plan
 
 _DETAILS: Final = 120
 """Characters of GStreamer's details that a person is told; the log has them all."""

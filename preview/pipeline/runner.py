@@ -33,17 +33,17 @@ from functools import partial
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.adaptive import BitrateController, Decision
 from preview.config import TimeoutSettings
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
-from preview.pipeline.crossing import Crossing, in_thread
+from preview.pipeline.adaptive import BitrateController, Decision
 from preview.pipeline.faults import Blame, Fault
+from preview.pipeline.file_loop import Looping
 from preview.pipeline.framing import Framing
-from preview.pipeline.joining import Joining
-from preview.pipeline.looping import Looping
+from preview.pipeline.keyframe_gate import Joining
+from preview.pipeline.plan import Plan
+from preview.pipeline.threads import Crossing, in_thread
 from preview.pipeline.watchdogs import Silent, Watchdogs
-from preview.plan import Plan
 from preview.values import Measurement, Profile, Target
 
 _log = logging.getLogger(__name__)
@@ -248,7 +248,7 @@ class Runner:
             return  # A viewer that joined a listener that is being stopped.
         if self._key_frame is None or self._key_frame.done():
             element, sink_pad = self._parts.encoder, self._parts.sink.get_static_pad("sink")
-            call = partial(settings.request_key_frame, element, self.plan.encoder, sink_pad)
+            call = partial(properties.request_key_frame, element, self.plan.encoder, sink_pad)
             self._key_frame = asyncio.create_task(
                 self._tell_encoder(call, "it was asked for a key frame"), name="key frame"
             )
@@ -296,7 +296,7 @@ class Runner:
 
         def change() -> None:
             if plan is self.plan:  # Not another profile meanwhile: its figures count.
-                settings.set_bitrate_live(encoder, plan.encoder, decision.bitrate_kbps, plan.gop_frames)
+                properties.set_bitrate_live(encoder, plan.encoder, decision.bitrate_kbps, plan.gop_frames)
 
         await self._tell_encoder(change, "its bit rate was changed")
         if plan is self.plan:

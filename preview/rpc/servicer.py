@@ -11,8 +11,8 @@ from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import Prober
-from preview.manager import Manager
 from preview.rpc import mapping
+from preview.supervisor import Supervisor
 
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["PreviewService"].full_name
 
@@ -29,7 +29,7 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
         encoders: all there are, in the order of preference.
     """
 
-    def __init__(self, manager: Manager, prober: Prober, encoders: Sequence[Encoder]) -> None:
+    def __init__(self, manager: Supervisor, prober: Prober, encoders: Sequence[Encoder]) -> None:
         self._manager = manager
         self._prober = prober
         self._encoders = tuple(encoders)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from preview.adaptive import BitrateController
+from preview.pipeline.adaptive import BitrateController
 
 
 @dataclass(frozen=True)

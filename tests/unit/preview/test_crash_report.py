@@ -11,7 +11,7 @@ import pytest
 LIVES = """
 import os, sys
 from pathlib import Path
-from preview.crash_report import CrashReport
+from preview.encoders.crash_report import CrashReport
 print(CrashReport(Path(sys.argv[1])).begin(), flush=True)
 os.kill(os.getpid(), int(sys.argv[2]))
 """

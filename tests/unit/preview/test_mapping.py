@@ -7,9 +7,9 @@ import pytest
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.selection import Verdict
 from preview.lifecycle import Counters, State
 from preview.rpc import mapping
-from preview.selection import Verdict
 from preview.status import Status, StreamStatus
 from preview.values import Codec, EncoderChoice, Measurement, Profile, Target
 

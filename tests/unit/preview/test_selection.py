@@ -1,7 +1,7 @@
 """Which encoder is used, and what is said about it."""
 
 from preview.encoders.catalogue import CATALOGUE
-from preview.selection import Selection, Verdict
+from preview.encoders.selection import Selection, Verdict
 
 ORDER = [CATALOGUE[name] for name in ("mpp-h265", "va-h265", "x264")]
 GOOD = Verdict(present=True, proven=True, first_byte_ms=5)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from preview.encoders.catalogue import Encoder
-from preview.sources import SourcePlan
+from preview.pipeline.sources import SourcePlan
 from preview.values import EncoderChoice, Profile, Target
 
 

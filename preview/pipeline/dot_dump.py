@@ -4,8 +4,8 @@ import logging
 from pathlib import Path
 from typing import Final
 
-from preview.pipeline.crossing import in_thread
 from preview.pipeline.runner import Runner
+from preview.pipeline.threads import in_thread
 
 _log = logging.getLogger(__name__)
 

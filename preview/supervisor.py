@@ -19,14 +19,14 @@ from dataclasses import replace
 from typing import Final
 
 from common.errors import UserError
-from preview.adaptive import BitrateController
 from preview.config import PreviewSettings
-from preview.drawing import keep_drawing
-from preview.encoder_note import EncoderNote
+from preview.encoders.crash_marker import EncoderNote
 from preview.lifecycle import Event, Lifecycle, State
+from preview.pipeline.adaptive import BitrateController
+from preview.pipeline.dot_dump import keep_drawing
 from preview.pipeline.faults import Blame, Fault
+from preview.pipeline.plan import Plan
 from preview.pipeline.runner import HungError, Runner
-from preview.plan import Plan
 from preview.planner import Planner
 from preview.status import Status, StreamStatus
 from preview.values import EncoderChoice, Wish
@@ -39,7 +39,7 @@ _PATIENCE_WITH_FAULTED_S: Final = 0.3
 """How long the next pipeline waits for the encoder of the last one; it may go on stopping meanwhile."""
 
 
-class Manager:
+class Supervisor:
     """The preview, wanted or not.
 
     Args:

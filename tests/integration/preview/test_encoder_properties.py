@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from common.gst import Gst
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.chain import chain, size_caps
 from preview.values import Target
@@ -29,14 +29,14 @@ def test_pictures_stay_small_and_the_bit_rate_follows(name: str) -> None:
     )
     pipeline.get_by_name("size").set_property("caps", size_caps(encoder, Target(320, 240, FPS, 600, 100)))
     element = pipeline.get_by_name("encoder")
-    settings.configure(element, encoder, 600, 2 * FPS, HIGHEST_KBPS)
+    properties.configure(element, encoder, 600, 2 * FPS, HIGHEST_KBPS)
     pipeline.set_state(Gst.State.PLAYING)
     try:
         begun = sizes_kbit(pipeline, PICTURES)
-        settings.set_bitrate_live(element, encoder, HIGHEST_KBPS, 2 * FPS)
+        properties.set_bitrate_live(element, encoder, HIGHEST_KBPS, 2 * FPS)
         sizes_kbit(pipeline, PICTURES // 2)
         raised = sizes_kbit(pipeline, PICTURES)
-        settings.set_bitrate_live(element, encoder, 300, 2 * FPS)
+        properties.set_bitrate_live(element, encoder, 300, 2 * FPS)
         sizes_kbit(pipeline, PICTURES // 2)
         lowered = sizes_kbit(pipeline, PICTURES)
     finally:

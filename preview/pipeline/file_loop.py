@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
-from preview.pipeline.crossing import Crossing, in_thread
+from preview.pipeline.threads import Crossing, in_thread
 
 _SEEK_DEADLINE_S: Final = 3.0
 

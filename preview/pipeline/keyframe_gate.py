@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
-from preview.pipeline.crossing import Crossing
+from preview.pipeline.threads import Crossing
 
 _KEY_FRAMES_APART_S: Final = 0.3
 """A crowd that joins at once gets its key frame at the end of this pause, not one each."""

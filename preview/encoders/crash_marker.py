@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Final
 
-from preview.selection import Selection
+from preview.encoders.selection import Selection
 
 _log = logging.getLogger(__name__)
 
