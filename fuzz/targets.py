@@ -31,7 +31,7 @@ from gateway.rpc.requests import Requests, hold_to_rules
 from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
-from preview.rpc.mapping import wish
+from preview.rpc.mapping import desired_state
 
 Target = Callable[[bytes], None]
 
@@ -53,7 +53,7 @@ def gateways_wish(data: bytes) -> None:
     request = preview_pb.ApplyDesiredStateRequest()
     if _parses(request, data):
         with suppress(InvalidRequestError):
-            wish(request.desired)
+            desired_state(request.desired)
 
 
 def previews_truth(data: bytes) -> None:

@@ -1,161 +1,413 @@
-"""Makes the truth follow the wish. The only owner of the lifecycle and of the running pipeline.
+"""Reconciles the preview with its desired state. The only owner of the lifecycle and of the pipeline.
 
-Everything that happens (a wish, a first picture, a fault, a timer) first moves the pure lifecycle, at once
-and on the loop; then one task brings the real world to where the lifecycle is. So an answer to the gateway
-never waits for a pipeline, and no two state changes of a pipeline ever overlap. pipeline/runner.py has the
-table of what can fail.
+Whatever happens (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on
+the loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway
+never waits for a pipeline, and no two state changes of a pipeline overlap.
 
-When an encoder is passed over for another one, the pipeline is rebuilt whole, listener included: viewers
-lose their connection and come back to a stream that may be of another codec. That takes some tenths of a
-second, and a viewer has to be able to reconnect anyway.
+What can fail, how it is noticed, and what follows:
+
+| failure | noticed by | follows |
+|---|---|---|
+| no encoder works | selection: UserError | FAULTED, retry with backoff |
+| source unusable, element missing | building: UserError | FAULTED, retry with backoff |
+| port in use, address not local | ERROR of the listener | FAULTED, retry with backoff |
+| source fails or ends | ERROR of the source, EOS | FAULTED, retry with backoff; a file loops instead |
+| source stalls | watchdog: no frames come in | FAULTED, retry with backoff |
+| encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
+| encoder is silent, or gives empty buffers | watchdog: frames go in, none come out | next encoder at once |
+| encoder's driver blocks a start or an adjustment | deadline of the call | next encoder at once |
+| last proven encoder fails | as above, and no alternative | FAULTED, retry with backoff |
+| pipeline fails again after running steadily | 15 s in RUNNING before it | backoff starts again at 1 s |
+| pipeline fails while it is being stopped | its fault, in STOPPING | logged, otherwise ignored |
+| encoder hangs after a fault | teardown not finished after 0.3 s | left behind, port and source are free |
+| encoder hangs when the preview is disabled | teardown not finished in time | crash marker, HungError |
+| source or listener hangs when stopped | HungError of the pipeline | HungError |
+| driver crashes the process | crash marker of the encoder in use | next process passes the encoder over |
+| hardware preferred, only x264 works | selection | runs, and last_error says so |
+| gateway is gone | no watcher for without_gateway_s | disabled until the next request |
+
+HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
+or vanished viewer is no failure: the listener drops it, and the others notice nothing. When another encoder
+takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some tenths of a
+second and must reconnect, to a stream of possibly another codec.
 """
 
 import asyncio
 import logging
-import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import Final
+from pathlib import Path
+from typing import Final, Protocol
 
 from common.errors import UserError
 from preview.config import PreviewSettings
-from preview.encoders.crash_marker import EncoderNote
+from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.lifecycle import Event, Lifecycle, State
-from preview.pipeline.adaptive import BitrateController
-from preview.pipeline.dot_dump import keep_drawing
-from preview.pipeline.faults import Blame, Fault
-from preview.pipeline.plan import Plan
-from preview.pipeline.runner import HungError, Runner
-from preview.planner import Planner
-from preview.status import Status, StreamStatus
-from preview.values import EncoderChoice, Wish
+from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.plan import Plan, make_plan
+from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState, Target
 
 _log = logging.getLogger(__name__)
 
-_STEADY_AFTER_S: Final = 15.0
-"""A pipeline that ran this long has left its last fault behind."""
-_PATIENCE_WITH_FAULTED_S: Final = 0.3
-"""How long the next pipeline waits for the encoder of the last one; it may go on stopping meanwhile."""
+GRAPH: Final = "last-fault.dot"
+"""File in the runtime directory: the graph of the last failed pipeline."""
+STEADY_AFTER_S: Final = 15.0
+"""A pipeline that ran this long has recovered: the backoff starts again."""
+ENCODER_STOP_S: Final = 0.3
+"""How long the next pipeline waits for the encoder of a failed one."""
+
+
+class Pipeline(Protocol):
+    """One pipeline; `preview.pipeline.runner.Runner` is the real one."""
+
+    @property
+    def plan(self) -> Plan:
+        """What it is made of."""
+
+    @property
+    def stream(self) -> StreamState:
+        """Parameters of the stream being served."""
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """Newest statistics; None before the first window."""
+
+    async def start(self) -> None:
+        """Starts it. Failures are reported as events, also after this has returned."""
+
+    async def switch(self, profile: Profile, target: Target) -> None:
+        """Switches to another profile; viewers stay connected."""
+
+    async def stop(self) -> "asyncio.Task[bool]":
+        """Stops listener and source, and returns the teardown of the encoder; False when that hangs.
+
+        Raises:
+            HungError: the listener or the source hangs.
+        """
+
+    async def write_graph(self, path: Path) -> None:
+        """Writes its graph, for finding the cause of a fault."""
+
+
+class PipelineFactory(Protocol):
+    """Builds pipelines."""
+
+    def __call__(self, plan: Plan, events: PipelineEvents) -> Pipeline:
+        """Returns a pipeline that is not yet started.
+
+        Raises:
+            UserError: the pipeline can't be built.
+        """
+
+
+class EncoderSelector(Protocol):
+    """Knows which encoders work; `preview.encoders.selection.Selection` is the real one."""
+
+    async def probe(self) -> bool:
+        """Tries encoders until one works that has not failed; False when there is none."""
+
+    def choose(self) -> tuple[Encoder, EncoderChoice]:
+        """Returns the encoder to use.
+
+        Raises:
+            UserError: none works.
+        """
+
+    def pass_over(self, name: str, reason: str) -> None:
+        """Excludes an encoder for a while."""
+
+
+class CrashMarker(Protocol):
+    """Names the encoder to blame if this process dies; `crash_marker.CrashMarkerFile` is the real one."""
+
+    def set(self, encoder: str, reason: str = "") -> None:
+        """Marks an encoder as in use, or as the one that hangs because of `reason`."""
+
+    def clear(self) -> None:
+        """Removes the mark."""
 
 
 class Supervisor:
-    """The preview, wanted or not.
+    """The preview.
 
     Args:
-        settings: the service's.
-        planner: decides what each pipeline is made of.
-        note: tells the next process, should this one die of an encoder.
-        on_hung: called when a driver hangs so that only the end of the process frees it; told the name of
-            the encoder to pass over next time (empty: not the encoder's doing) and why.
+        settings: of the service.
+        encoders: chooses the encoder of each pipeline.
+        marker: informs the next process if an encoder ends this one.
+        new_pipeline: builds pipelines.
     """
 
     def __init__(
         self,
         settings: PreviewSettings,
-        planner: Planner,
-        note: EncoderNote,
-        on_hung: Callable[[str, str], None],
+        encoders: EncoderSelector,
+        marker: CrashMarker,
+        new_pipeline: PipelineFactory,
     ) -> None:
         self._settings = settings
-        self._planner = planner
-        self._note = note
-        self._on_hung = on_hung
+        self._encoders = encoders
+        self._marker = marker
+        self._new_pipeline = new_pipeline
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
-        self._wish = Wish()
+        self._desired = DesiredState()
         self._last_error = ""
-        self._runner: Runner | None = None
+        self._pipeline: Pipeline | None = None
+        self._teardowns: dict[asyncio.Task[bool], str] = {}
+        """Encoders that have not stopped yet, by their teardown."""
         self._running_since = 0.0
-        self._stopping: dict[asyncio.Task[bool], str] = {}
-        """What is left of pipelines whose encoder did not stop at once, and its name."""
-        self._passed_over = False
-        """The newest fault was an encoder's."""
+        self._encoder_failed = False
         self._retry_now = False
         self._retry_timer: asyncio.TimerHandle | None = None
         self._watchers = 0
-        self._alone_timer: asyncio.TimerHandle | None = None
+        self._unwatched_timer: asyncio.TimerHandle | None = None
         self._wake = asyncio.Event()
         self._changed = asyncio.Event()
 
-    # --- what others may ask ---
+    # --- for the gateway ---
 
-    def apply(self, wish: Wish) -> Status:
-        """Takes a wish in; the way to it is told by the status.
+    def apply(self, desired: DesiredState) -> ActualState:
+        """Accepts a desired state and returns the actual state at this moment.
 
-        The same revision again is the same wish and changes nothing.
+        The same revision again is the same request and changes nothing.
         """
-        if wish.revision != self._wish.revision or wish.revision == 0:
-            profile = wish.profile if wish.enabled else self._wish.profile
-            self._wish = replace(wish, profile=profile)
-            _log.info("wish %d: %s", wish.revision, f"on, {profile.value}" if wish.enabled else "off")
-            self._follow_wish(renewed=True)
-        self._mind_being_alone()
-        return self.status()
+        if desired.revision != self._desired.revision or desired.revision == 0:
+            profile = desired.profile if desired.enabled else self._desired.profile
+            self._desired = replace(desired, profile=profile)
+            mode = f"on, {profile.value}" if desired.enabled else "off"
+            _log.info("desired state %d: %s", desired.revision, mode)
+            self._follow_desired(new_request=True)
+        self._restart_unwatched_timer()
+        return self.actual()
 
-    def status(self) -> Status:
-        """What is, now."""
-        runner = self._runner
-        return Status(
+    def actual(self) -> ActualState:
+        """Returns the actual state."""
+        pipeline = self._pipeline
+        return ActualState(
             instance_id=self._instance_id,
-            applied_revision=self._wish.revision,
+            applied_revision=self._desired.revision,
             state=self._lifecycle.state,
-            profile=runner.plan.profile if runner else self._wish.profile,
+            profile=pipeline.plan.profile if pipeline else self._desired.profile,
             last_error=self._last_error,
             counters=self._lifecycle.counters,
             port=self._settings.srt.port,
             latency_ms=self._settings.srt.latency_ms,
-            stream=_stream(runner) if runner else None,
-            encoder=runner.plan.choice if runner else None,
-            measurement=runner.measurement if runner else None,
+            stream=pipeline.stream if pipeline else None,
+            encoder=pipeline.plan.choice if pipeline else None,
+            measurement=pipeline.measurement if pipeline else None,
         )
 
     @property
     def changed(self) -> asyncio.Event:
-        """Set at the next change; take it anew after every look at the status."""
+        """Set at the next change of the actual state; to be fetched anew before each reading of it."""
         return self._changed
 
-    def watcher_came(self) -> None:
-        """Somebody watches the service."""
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Counts as a gateway that watches the service."""
         self._watchers += 1
-        self._mind_being_alone()
+        self._restart_unwatched_timer()
+        try:
+            yield
+        finally:
+            self._watchers -= 1
+            self._restart_unwatched_timer()
 
-    def watcher_left(self) -> None:
-        """One of them is gone."""
-        self._watchers -= 1
-        self._mind_being_alone()
+    # --- reconciling: the pipeline follows the lifecycle; only the task of run() does this ---
 
     async def run(self, stop: asyncio.Event) -> None:
-        """Makes the truth follow the wish until `stop`, then leaves no pipeline behind."""
-        stopping = asyncio.create_task(stop.wait(), name="stop")
+        """Reconciles until `stop`, then leaves no pipeline behind.
+
+        Raises:
+            HungError: a driver hangs; the process must end.
+        """
+        stopped = asyncio.create_task(stop.wait(), name="stop")
+        stopped.add_done_callback(lambda _: self._wake.set())
         while not stop.is_set():
-            waking = asyncio.create_task(self._wake.wait(), name="wake")
-            await asyncio.wait((stopping, waking), return_when=asyncio.FIRST_COMPLETED)
-            waking.cancel()
+            await self._wake.wait()
             self._wake.clear()
-            await self._settle()
-        self._wish = replace(self._wish, enabled=False)
-        self._follow_wish(renewed=False)
-        await self._settle()
+            await self._reconcile()
+        self._desired = replace(self._desired, enabled=False)
+        self._follow_desired(new_request=False)
+        await self._reconcile()
 
-    # --- what happens: moves the lifecycle, on the loop, at once ---
+    async def _reconcile(self) -> None:
+        while await self._step():
+            self._publish()
 
-    def _follow_wish(self, *, renewed: bool) -> None:
-        """Moves the lifecycle towards the wish, as far as that goes without touching a pipeline."""
-        state, torn_down = self._lifecycle.state, self._runner is None
-        if not self._wish.enabled:
+    async def _step(self) -> bool:
+        """Does one thing that the lifecycle's state requires; False when there is none."""
+        pipeline, profile = self._pipeline, self._desired.profile
+        match self._lifecycle.state:
+            case State.STOPPING:
+                await self._finish_stopping()
+            case State.FAULTED:
+                return await self._recover()
+            case State.STARTING if pipeline is None:
+                await self._start()
+            case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
+                await self._switch_profile(pipeline)
+            case _:
+                return False
+        return True
+
+    async def _start(self) -> None:
+        await self._encoders.probe()
+        if self._lifecycle.state is not State.STARTING:
+            return
+        try:
+            encoder, choice = self._encoders.choose()
+            plan = make_plan(self._settings, self._desired, encoder, choice)
+            self._report_software_fallback(choice)
+            pipeline = self._pipeline = self._new_pipeline(plan, self)
+        except UserError as error:
+            self.failed(Fault(Blame.OTHER, str(error)))
+            return
+        self._retry_now = False
+        self._marker.set(encoder.name)
+        await pipeline.start()
+
+    def _report_software_fallback(self, choice: EncoderChoice) -> None:
+        """Software encoding on a robot with hardware encoders is an error, even though frames flow."""
+        if CATALOGUE[choice.wanted].hardware and not choice.hardware:
+            self._last_error = (
+                f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
+            )
+            _log.warning("%s", self._last_error)
+
+    async def _switch_profile(self, pipeline: Pipeline) -> None:
+        profile = self._desired.profile
+        _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
+        await pipeline.switch(profile, self._settings.profiles.targets[profile])
+
+    async def _recover(self) -> bool:
+        """Tears the failed pipeline down and arranges what follows; False when only waiting is left."""
+        if self._pipeline:
+            await self._pipeline.write_graph(self._settings.runtime_dir / GRAPH)
+            await self._tear_down(self._pipeline, wait_s=ENCODER_STOP_S)
+        if self._encoder_failed:
+            self._encoder_failed = False
+            if await self._encoders.probe():
+                self._lifecycle.count_fallback()
+                self._retry_now = True
+        if not self._desired.enabled:
+            self._move(Event.DISABLE)
+        elif self._retry_now:
+            self._retry_now = False
+            self._move(Event.RETRY)
+        else:
+            self._schedule_retry()
+            return False
+        return True
+
+    def _schedule_retry(self) -> None:
+        if self._retry_timer is None:
+            delay_s = self._lifecycle.retry_delay_s
+            _log.info("next attempt in %g s", delay_s)
+            self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
+
+    async def _finish_stopping(self) -> None:
+        if self._pipeline:
+            await self._tear_down(self._pipeline, wait_s=None)
+        if not self._desired.enabled:
+            await self._join_teardowns()
+        self._move(Event.STOPPED)
+        if self._desired.enabled:
+            # Another passphrase, or enabled again in the meantime.
+            self._last_error = ""
+            self._move(Event.ENABLE)
+
+    async def _tear_down(self, pipeline: Pipeline, wait_s: float | None) -> None:
+        """Stops a pipeline; waits for its encoder for `wait_s`, None: until its own deadline."""
+        teardown = await pipeline.stop()
+        self._teardowns[teardown] = pipeline.plan.encoder.name
+        await asyncio.wait({teardown}, timeout=wait_s)
+        self._pipeline = None
+        self._teardowns = {task: name for task, name in self._teardowns.items() if not _has_finished(task)}
+        if not self._teardowns:
+            self._marker.clear()
+
+    async def _join_teardowns(self) -> None:
+        """Waits for encoders that were left behind.
+
+        Raises:
+            HungError: one of them hangs; the crash marker names it.
+        """
+        if self._teardowns:
+            await asyncio.wait(self._teardowns)
+        hung = [name for task, name in self._teardowns.items() if not _has_finished(task)]
+        self._teardowns.clear()
+        if hung:
+            self._marker.set(hung[0], "it hung when it was stopped")
+            raise HungError(f"encoder {hung[0]} hung when it was stopped")
+
+    # --- events: move the lifecycle, on the loop, at once ---
+
+    def first_frame(self) -> None:
+        """Handles the first frame of the pipeline."""
+        self._running_since = asyncio.get_running_loop().time()
+        self._move(Event.FIRST_FRAME)
+
+    def measured(self) -> None:
+        """Handles new statistics of the pipeline."""
+        running_s = asyncio.get_running_loop().time() - self._running_since
+        if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
+            self._lifecycle.reset_backoff()
+        self._publish()
+
+    def failed(self, fault: Fault) -> None:
+        """Handles the fault of a pipeline, or of the attempt to build one."""
+        _log.error("%s", fault.text)
+        if self._lifecycle.state is State.STOPPING:
+            return
+        self._last_error = fault.text
+        self._move(Event.FAILURE)
+        if fault.blame is Blame.ENCODER and self._pipeline:
+            self._encoders.pass_over(self._pipeline.plan.encoder.name, fault.text)
+            self._encoder_failed = True
+
+    def _retry(self) -> None:
+        self._retry_timer = None
+        self._move(Event.RETRY)
+
+    def _follow_desired(self, *, new_request: bool) -> None:
+        """Moves the lifecycle towards the desired state, as far as no pipeline must be stopped first."""
+        state, torn_down = self._lifecycle.state, self._pipeline is None
+        if not self._desired.enabled:
             if state is not State.DISABLED and (state is not State.FAULTED or torn_down):
                 self._move(Event.DISABLE)
-        elif state is State.DISABLED or (state is State.FAULTED and torn_down and renewed):
+        elif state is State.DISABLED or (state is State.FAULTED and torn_down and new_request):
             if state is State.DISABLED:
                 self._last_error = ""
             self._move(Event.ENABLE)
         elif state is State.FAULTED:
-            self._retry_now = self._retry_now or renewed
-        elif self._runner and self._runner.plan.listener.passphrase != self._wish.passphrase:
-            # Another session: who had the old passphrase must not go on watching.
+            self._retry_now = self._retry_now or new_request
+        elif self._pipeline and self._pipeline.plan.listener.passphrase != self._desired.passphrase:
+            # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
-        self._changed_now()
+        self._wake.set()
+        self._publish()
+
+    def _restart_unwatched_timer(self) -> None:
+        """Restarts the timer that disables the preview when no gateway watches it."""
+        limit_s = self._settings.timeouts.without_gateway_s
+        if self._unwatched_timer:
+            self._unwatched_timer.cancel()
+            self._unwatched_timer = None
+        if self._watchers == 0 and self._desired.enabled and limit_s > 0:
+            loop = asyncio.get_running_loop()
+            self._unwatched_timer = loop.call_later(limit_s, self._disable_unwatched)
+
+    def _disable_unwatched(self) -> None:
+        self._unwatched_timer = None
+        limit_s = self._settings.timeouts.without_gateway_s
+        self._last_error = f"the preview stopped by itself: no gateway has watched it for {limit_s:g} s"
+        _log.warning("%s", self._last_error)
+        # Revision 0, so that the same revision counts as a new request.
+        self._desired = DesiredState(profile=self._desired.profile)
+        self._follow_desired(new_request=True)
 
     def _move(self, event: Event) -> None:
         before = self._lifecycle.state
@@ -165,9 +417,6 @@ class Supervisor:
             self._retry_timer = None
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
-        self._changed_now()
-
-    def _changed_now(self) -> None:
         self._wake.set()
         self._publish()
 
@@ -175,190 +424,7 @@ class Supervisor:
         changed, self._changed = self._changed, asyncio.Event()
         changed.set()
 
-    def _first_picture(self) -> None:
-        self._running_since = time.monotonic()
-        self._move(Event.FIRST_FRAME)
 
-    def _measured(self) -> None:
-        if (
-            time.monotonic() - self._running_since > _STEADY_AFTER_S
-            and self._lifecycle.state is State.RUNNING
-        ):
-            self._lifecycle.note_steady()
-        self._publish()
-
-    def _failed(self, fault: Fault) -> None:
-        """A pipeline, or the attempt to make one, failed."""
-        _log.error("%s", fault.sentence)
-        if self._lifecycle.state is State.STOPPING:
-            return
-        self._last_error = fault.sentence
-        self._move(Event.FAILURE)
-        if fault.blame is Blame.ENCODER and self._runner:
-            self._planner.pass_over(self._runner.plan.encoder.name, fault.sentence)
-            self._passed_over = True
-
-    def _retry(self) -> None:
-        self._retry_timer = None
-        self._move(Event.RETRY)
-
-    def _mind_being_alone(self) -> None:
-        """A preview nobody asks about any more ends by itself; a gateway that is back wishes anew."""
-        limit_s = self._settings.timeouts.without_gateway_s
-        if self._alone_timer:
-            self._alone_timer.cancel()
-            self._alone_timer = None
-        if self._watchers == 0 and self._wish.enabled and limit_s > 0:
-            self._alone_timer = asyncio.get_running_loop().call_later(limit_s, self._left_alone)
-
-    def _left_alone(self) -> None:
-        self._alone_timer = None
-        limit_s = self._settings.timeouts.without_gateway_s
-        self._last_error = (
-            f"nobody has watched the preview service for {limit_s:g} s, so it stopped by itself"
-        )
-        _log.warning("%s", self._last_error)
-        # Revision 0, so that the same wish, applied again, counts as a new one.
-        self._wish = Wish(profile=self._wish.profile)
-        self._follow_wish(renewed=True)
-
-    # --- what is done about it: only ever by the task that runs run() ---
-
-    async def _settle(self) -> None:
-        """Brings the pipeline to where the lifecycle is, until both agree."""
-        while await self._step():
-            self._publish()
-
-    async def _step(self) -> bool:
-        """One thing that is left to do; False when nothing is."""
-        state, runner = self._lifecycle.state, self._runner
-        if state is State.STOPPING:
-            await self._tear_down()
-            if not self._wish.enabled:
-                await self._finish_stopping()
-            self._move(Event.STOPPED)
-            self._after_stop()
-            return True
-        if state is State.FAULTED:
-            return await self._recover()
-        if state is State.STARTING and runner is None:
-            await self._start()
-            return True
-        if runner and runner.plan.profile is not self._wish.profile and state is not State.DISABLED:
-            await self._switch(runner)
-            return True
-        return False
-
-    def _after_stop(self) -> None:
-        if self._wish.enabled:
-            self._last_error = ""
-            self._move(Event.ENABLE)
-
-    async def _recover(self) -> bool:
-        if self._runner:
-            await self._tear_down()
-        if self._passed_over:
-            self._passed_over = False
-            await self._planner.try_encoders()
-            if self._planner.has_another:
-                self._lifecycle.note_fallback()
-                self._retry_now = True
-        if not self._wish.enabled:
-            self._move(Event.DISABLE)
-        elif self._retry_now:
-            self._retry_now = False
-            self._move(Event.RETRY)
-        elif self._retry_timer is None:
-            delay_s = self._lifecycle.retry_delay_s
-            _log.info("next attempt in %g s", delay_s)
-            self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
-            return False
-        else:
-            return False
-        return True
-
-    async def _start(self) -> None:
-        await self._planner.try_encoders()
-        if self._lifecycle.state is not State.STARTING:
-            return
-        try:
-            plan = self._planner.plan(self._wish)
-            self._tell_software(plan.choice)
-            runner = self._runner = self._new_runner(plan)
-        except UserError as error:
-            self._failed(Fault(Blame.OTHER, str(error)))
-            return
-        self._retry_now = False
-        self._note.begin(plan.encoder.name)
-        await runner.start()
-
-    def _new_runner(self, plan: Plan) -> Runner:
-        target = plan.target
-        return Runner(
-            plan,
-            self._settings.timeouts,
-            on_first_picture=self._first_picture,
-            on_fault=self._failed,
-            on_measured=self._measured,
-            controller=BitrateController(target.bitrate_kbps, target.floor_kbps)
-            if self._settings.adaptive.enabled
-            else None,
-        )
-
-    def _tell_software(self, choice: EncoderChoice) -> None:
-        """A robot that is meant to encode in hardware and doesn't has a fault, even though pictures flow."""
-        if self._planner.wants_hardware and not choice.hardware:
-            sentence = (
-                f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
-            )
-            _log.warning("%s", sentence)
-            self._last_error = sentence
-
-    async def _switch(self, runner: Runner) -> None:
-        profile = self._wish.profile
-        _log.info("profile %s -> %s", runner.plan.profile.value, profile.value)
-        await runner.switch(profile, self._settings.profiles.targets[profile])
-
-    async def _tear_down(self) -> None:
-        """Stops the pipeline. After a fault it does not wait long for the encoder: a viewer waits, too."""
-        runner = self._runner
-        if runner is None:
-            return
-        faulted = self._lifecycle.state is State.FAULTED
-        if faulted:
-            await keep_drawing(runner, self._settings.runtime_dir)
-        try:
-            rest = await runner.stop()
-        except HungError as error:
-            self._on_hung("", str(error))
-            return
-        self._stopping[rest] = runner.plan.encoder.name
-        await asyncio.wait({rest}, timeout=_PATIENCE_WITH_FAULTED_S if faulted else None)
-        self._runner = None
-        self._stopping = {rest: name for rest, name in self._stopping.items() if not _is_over(rest)}
-        if not self._stopping:
-            self._note.end()
-
-    async def _finish_stopping(self) -> None:
-        """Waits for encoders that were left behind; ends the process when one of them never comes back."""
-        if self._stopping:
-            await asyncio.wait(self._stopping)
-        hung = [name for rest, name in self._stopping.items() if not _is_over(rest)]
-        self._stopping.clear()
-        if hung:
-            self._on_hung(hung[0], "it hung when it was stopped")
-
-
-def _is_over(rest: "asyncio.Task[bool]") -> bool:
-    """Whether a pipeline is stopped; not when it is still at it or hangs for good."""
-    return rest.done() and rest.result()
-
-
-def _stream(runner: Runner) -> StreamStatus:
-    return StreamStatus(
-        target=runner.plan.target,
-        bitrate_kbps=runner.bitrate_kbps,
-        bitrate_reason=runner.bitrate_reason,
-        codec=runner.plan.encoder.codec,
-        encrypted=runner.plan.listener.encrypted,
-    )
+def _has_finished(teardown: "asyncio.Task[bool]") -> bool:
+    """Whether an encoder is stopped; not while it is stopping, nor when it hangs."""
+    return teardown.done() and teardown.result()

@@ -1,77 +1,108 @@
-"""A note to the next process about the encoder in use.
+"""Crash marker: which encoder was in use when the previous process crashed or hung.
 
-A driver can take this process with it: by a crash, or by a hang that only the end of the process resolves.
-The next process would find that the encoder proves itself in its trial, use it, and die again; the note makes
-it pass that encoder over for a while. A process that was killed from outside says nothing about its encoder.
+A driver can end this process, by a crash or by a hang that only the end of the process resolves. The encoder
+would prove itself in the next process's trial, be used and end that process, too; the marker makes the next
+process pass it over for a while. A process that was killed from outside (SIGKILL, SIGTERM) blames no encoder.
 
-One small file in the runtime directory (a tmpfs, so a reboot forgets it), written when an encoder begins and
-removed when it has stopped well.
+Two files in the runtime directory: the marker, written when an encoder starts and removed when it has stopped
+properly, and the report that Python's fault handler writes on SIGSEGV, SIGABRT, SIGBUS, SIGFPE and SIGILL.
 """
 
+import faulthandler
 import json
 import logging
-import time
 from pathlib import Path
-from typing import Final
-
-from preview.encoders.selection import Selection
+from typing import IO, Final, Protocol
 
 _log = logging.getLogger(__name__)
 
-_NAME: Final = "encoder-in-use.json"
+_MARKER: Final = "encoder-in-use.json"
+_REPORT: Final = "crash.txt"
 _IN_USE: Final = ""
-"""No verdict yet: only a crash makes one of it."""
+"""Reason of a marker that blames the encoder only together with a crash report."""
 
 
-class EncoderNote:
-    """The file.
+class Selection(Protocol):
+    """Encoder selection that can exclude an encoder."""
+
+    def pass_over(self, name: str, reason: str) -> None:
+        """Excludes an encoder for a while."""
+
+
+class CrashMarkerFile:
+    """The marker of this process, and what the previous one left.
 
     Args:
-        runtime_dir: where it is; made when it doesn't exist.
+        directory: runtime directory, created when missing. When it is not writable, a warning is logged and
+            the next process must find out by itself.
     """
 
-    def __init__(self, runtime_dir: Path) -> None:
-        self._path = runtime_dir / _NAME
+    def __init__(self, directory: Path) -> None:
+        self._marker = directory / _MARKER
+        self._report = directory / _REPORT
+        self._report_file: IO[bytes] | None = None
 
-    def begin(self, encoder: str) -> None:
-        """An encoder is about to be used."""
-        self.leave(encoder, _IN_USE)
-
-    def leave(self, encoder: str, why: str) -> None:
-        """Writes the note; without a writable directory the next process must find out by itself."""
+    def blame_previous(self, selection: Selection) -> None:
+        """Has the encoder that ended the previous process passed over; starts this process's crash report."""
+        crash = self.begin_report()
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._path.write_text(json.dumps({"encoder": encoder, "why": why}), encoding="utf-8")
-        except OSError as error:
-            _log.warning("no note about encoder %s in %s: %s", encoder, self._path, error)
-
-    def end(self) -> None:
-        """The encoder has stopped well."""
-        try:
-            self._path.unlink(missing_ok=True)
-        except OSError as error:
-            _log.warning("the note %s can't be removed: %s", self._path, error)
-
-    def tell(self, selection: Selection, crash: str) -> None:
-        """Has the encoder that the last process left a note about passed over, if that one was to blame.
-
-        Args:
-            selection: what passes it over.
-            crash: what the last process died of; empty when it did not crash.
-        """
-        try:
-            note = json.loads(self._path.read_text(encoding="utf-8"))
-            name, why = str(note["encoder"]), str(note["why"])
+            marker = json.loads(self._marker.read_text(encoding="utf-8"))
+            name, reason = str(marker["encoder"]), str(marker["why"])
         except FileNotFoundError:
             return
         except (OSError, ValueError, KeyError, TypeError) as error:
-            _log.warning("the note %s can't be used: %s", self._path, error)
+            _log.warning("the crash marker %s can't be read: %s", self._marker, error)
             return
-        self.end()
-        if why == _IN_USE and not crash:
-            _log.info("the last process was ended from outside while encoder %s was in use", name)
+        self.clear()
+        if reason == _IN_USE and not crash:
+            _log.info("the previous process was ended from outside while encoder %s was in use", name)
             return
-        why = why or f"the process crashed while it was in use ({crash})"
-        sentence = f"encoder {name} is passed over: {why}"
-        _log.warning("%s", sentence)
-        selection.pass_over(name, sentence, time.monotonic())
+        reason = reason or f"the process crashed while it was in use ({crash})"
+        text = f"encoder {name} is passed over: {reason}"
+        _log.warning("%s", text)
+        selection.pass_over(name, text)
+
+    def begin_report(self) -> str:
+        """Enables the crash report of this process.
+
+        Returns:
+            The cause of the previous process's crash, for example "Segmentation fault"; empty for none.
+        """
+        previous = ""
+        try:
+            self._report.parent.mkdir(parents=True, exist_ok=True)
+            if self._report.exists():
+                previous = _cause(self._report.read_text(encoding="utf-8", errors="replace"))
+            # Kept open: on a signal the handler can only write to an open file.
+            self._report_file = self._report.open("wb")
+        except OSError as error:
+            _log.warning("no crash report in %s: %s", self._report, error)
+        else:
+            faulthandler.enable(self._report_file, all_threads=False)
+        return previous
+
+    def set(self, encoder: str, reason: str = _IN_USE) -> None:
+        """Writes the marker.
+
+        Args:
+            encoder: name of the encoder that is about to be used, or that hangs.
+            reason: what it did, for people. Empty: nothing yet; counts only if this process crashes.
+        """
+        try:
+            self._marker.parent.mkdir(parents=True, exist_ok=True)
+            self._marker.write_text(json.dumps({"encoder": encoder, "why": reason}), encoding="utf-8")
+        except OSError as error:
+            _log.warning("no crash marker for encoder %s in %s: %s", encoder, self._marker, error)
+
+    def clear(self) -> None:
+        """Removes the marker: no encoder is in use."""
+        try:
+            self._marker.unlink(missing_ok=True)
+        except OSError as error:
+            _log.warning("the crash marker %s can't be removed: %s", self._marker, error)
+
+
+def _cause(report: str) -> str:
+    """Returns CAUSE of the first line "Fatal Python error: CAUSE"."""
+    first = report.partition("\n")[0]
+    return first.partition(": ")[2] or first

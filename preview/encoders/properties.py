@@ -1,79 +1,108 @@
-"""Tells an encoder element what it shall do, in its own words. Sets only what the element really has."""
+"""The encoder within a pipeline: its elements, caps and properties.
+
+The trial that proves an encoder and the pipeline that uses it are built from the same pieces. Imports little,
+because every trial is a process of its own.
+"""
 
 from typing import Any, Final
 
 from common.gst import GObject, Gst, GstVideo
 from preview.encoders.catalogue import Encoder, KeyFrameBy
+from preview.values import Codec, Target
 
+_PARSERS: Final = {Codec.H264: "h264parse", Codec.H265: "h265parse"}
+_MEDIA_TYPES: Final = {Codec.H264: "video/x-h264", Codec.H265: "video/x-h265"}
 _VBV_MS: Final = 150
-_LARGEST_FRAME_KBIT: Final = 448
-"""What a frame may have so that its PES packet stays below 64 KiB: a longer one has no length, and a
-receiver would have to wait for the next frame to know that this one has ended."""
+_MAX_FRAME_KBIT: Final = 448
+"""Keeps a frame's PES packet below 64 KiB. A longer one has no PES_packet_length (16 bits, ISO/IEC 13818-1
+2.4.3.7), and a receiver would need the next frame to find its end."""
+
+
+def chain(encoder: Encoder) -> str:
+    """Returns the description from raw video of any form to an elementary stream, one access unit per buffer.
+
+    Its elements `size` (a capsfilter), `encoder` and `parser` are meant to be found by name.
+    """
+    return " ! ".join(
+        [
+            "videoscale ! videoconvert",
+            *([encoder.spelling.upload] if encoder.spelling.upload else []),
+            "capsfilter name=size",
+            f"{encoder.element} name=encoder",
+            f"{_PARSERS[encoder.codec]} name=parser config-interval=-1",
+            f"{_MEDIA_TYPES[encoder.codec]},stream-format=byte-stream,alignment=au",
+        ]
+    )
+
+
+def size_caps(encoder: Encoder, target: Target) -> Any:
+    """Returns the caps of the encoder's input, for the capsfilter `size`."""
+    return Gst.Caps.from_string(
+        f"{encoder.spelling.input_caps},width={target.width_px},height={target.height_px}"
+        ",pixel-aspect-ratio=1/1"
+    )
 
 
 def configure(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int, highest_kbps: int) -> None:
-    """Sets everything, before the element runs.
+    """Sets all properties of an element that is not yet started.
 
     Args:
-        element: the encoder.
-        encoder: its entry.
-        bitrate_kbps: to begin with.
-        gop_frames: the longest distance between key frames.
-        highest_kbps: what another profile may raise the bit rate to. Options can't be changed while the
-            element runs, and a bit rate above `vbv-maxrate` is cut down to it.
+        element: the encoder element.
+        encoder: its entry in the catalogue.
+        bitrate_kbps: initial bit rate.
+        gop_frames: GOP length in frames.
+        highest_kbps: highest bit rate that a profile may switch to. x265's options can't change while it
+            runs, and it cuts a bit rate above `vbv-maxrate` down to it.
     """
     spelling = encoder.spelling
+    size_kbit = max(1, highest_kbps * vbv_ms(highest_kbps) // 1000)
     for name, value in spelling.fixed.items():
-        more = _vbv_options(highest_kbps) if name == spelling.vbv_options else ""
-        _set(element, name, value + more)
-    set_figures(element, encoder, bitrate_kbps, gop_frames)
+        vbv = f":vbv-maxrate={highest_kbps}:vbv-bufsize={size_kbit}" if name == spelling.vbv_options else ""
+        _set(element, name, value + vbv)
+    set_rates(element, encoder, bitrate_kbps, gop_frames)
 
 
-def _vbv_options(highest_kbps: int) -> str:
-    size_kbit = highest_kbps * vbv_ms(highest_kbps) // 1000
-    return f":vbv-maxrate={highest_kbps}:vbv-bufsize={max(1, size_kbit)}"
-
-
-def set_gop(element: Any, encoder: Encoder, gop_frames: int) -> None:
-    """Sets the longest distance between key frames, in frames."""
+def set_rates(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
+    """Sets bit rate and GOP length, as a change of profile does."""
     for name in encoder.spelling.gop:
         _set(element, name, str(gop_frames))
+    set_bitrate(element, encoder, bitrate_kbps, gop_frames)
 
 
-def set_bitrate(element: Any, encoder: Encoder, bitrate_kbps: int) -> None:
-    """Sets the bit rate; while playing only where the catalogue says that it may be."""
-    for name in encoder.spelling.bitrate:
-        _set(element, name, str(bitrate_kbps * encoder.spelling.unit.value))
-    if encoder.spelling.vbv_ms:
-        _set(element, encoder.spelling.vbv_ms, str(vbv_ms(bitrate_kbps)))
+def set_bitrate(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
+    """Sets the bit rate, also while playing.
 
-
-def set_bitrate_live(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
-    """Sets the bit rate and nothing else, while playing."""
-    set_bitrate(element, encoder, bitrate_kbps)
-    _set_controls(element, encoder, bitrate_kbps, gop_frames)
-
-
-def set_figures(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
-    """Sets bit rate and key frame distance together, as a change of profile does."""
-    set_gop(element, encoder, gop_frames)
-    set_bitrate(element, encoder, bitrate_kbps)
-    _set_controls(element, encoder, bitrate_kbps, gop_frames)
+    Args:
+        element: the encoder element.
+        encoder: its entry in the catalogue.
+        bitrate_kbps: the bit rate.
+        gop_frames: GOP length in effect; V4L2 controls are set together.
+    """
+    spelling = encoder.spelling
+    for name in spelling.bitrate:
+        _set(element, name, str(bitrate_kbps * spelling.unit.value))
+    if spelling.vbv_ms:
+        _set(element, spelling.vbv_ms, str(vbv_ms(bitrate_kbps)))
+    if spelling.controls:
+        values = {"bitrate": bitrate_kbps * 1000, "gop": gop_frames}
+        controls = ((n, values[v] if isinstance(v, str) else v) for n, v in spelling.controls.items())
+        # One structure; the element hands it to the driver at once, even while playing.
+        _set(element, "extra-controls", ",".join(["controls", *(f"{n}=(int){v}" for n, v in controls)]))
 
 
 def vbv_ms(bitrate_kbps: int) -> int:
-    """The rate buffer in ms: small, and never so large that a key frame outgrows its PES packet."""
-    return max(1, min(_VBV_MS, _LARGEST_FRAME_KBIT * 1000 // max(bitrate_kbps, 1)))
+    """Returns the size of the rate buffer in ms: small, and limits a key frame to one PES packet."""
+    return max(1, min(_VBV_MS, _MAX_FRAME_KBIT * 1000 // max(bitrate_kbps, 1)))
 
 
 def request_key_frame(element: Any, encoder: Encoder, sink_pad: Any) -> None:
-    """Asks for a key frame with its headers, at once.
+    """Requests a key frame with its parameter sets, at once.
 
     Args:
-        element: the encoder.
-        encoder: its entry.
-        sink_pad: the listener's pad, from where an event travels up through muxer and parser, so that
-            these repeat their headers, too.
+        element: the encoder element.
+        encoder: its entry in the catalogue.
+        sink_pad: sink pad of the listener. The event travels upstream from there through muxer and parser,
+            which then repeat their tables and headers.
     """
     if encoder.spelling.key_frame_by is KeyFrameBy.SIGNAL:
         if GObject.signal_lookup(KeyFrameBy.SIGNAL.value, element):
@@ -82,18 +111,7 @@ def request_key_frame(element: Any, encoder: Encoder, sink_pad: Any) -> None:
     sink_pad.push_event(GstVideo.video_event_new_upstream_force_key_unit(Gst.CLOCK_TIME_NONE, True, 0))
 
 
-def _set_controls(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
-    """V4L2 controls travel as one structure; the element hands them on at once, even while playing."""
-    if not encoder.spelling.controls:
-        return
-    figures = {"bitrate": bitrate_kbps * 1000, "gop": gop_frames}
-    values = {
-        name: figures[value] if isinstance(value, str) else value
-        for name, value in encoder.spelling.controls.items()
-    }
-    _set(element, "extra-controls", ",".join(["controls", *(f"{n}=(int){v}" for n, v in values.items())]))
-
-
 def _set(element: Any, name: str, value: str) -> None:
+    """Sets a property that the element has; versions and forks lack some."""
     if element.find_property(name) is not None:
         Gst.util_set_object_arg(element, name, value)

@@ -1,5 +1,6 @@
-"""The two crossings between the loop and the threads: GStreamer's threads hand over, blocking calls go out.
+"""The two ways between the event loop and other threads.
 
+GStreamer's threads only schedule calls on the loop, and calls that may block run in a thread of their own.
 Everything else in the service runs on the asyncio loop.
 """
 
@@ -12,43 +13,36 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-class Crossing:
-    """Hands calls from foreign threads to the loop it was made on."""
+def call_on_loop(loop: asyncio.AbstractEventLoop, callback: Callable[..., None], *arguments: Any) -> None:
+    """Schedules a call on the loop, from any thread; ignored when the loop is closed.
 
-    def __init__(self) -> None:
-        self._loop = asyncio.get_running_loop()
-
-    def hand_over(self, callback: Callable[..., None], *arguments: Any) -> None:
-        """Has the loop call `callback` soon. The only thing a streaming thread may do."""
-        with suppress(RuntimeError):  # The loop is closed: nobody is left to be told.
-            self._loop.call_soon_threadsafe(callback, *arguments)
+    The only thing that a streaming thread may do besides its work on the stream.
+    """
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback, *arguments)
 
 
 async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
-    """Runs a call that may block, or never return, in a thread of its own.
+    """Runs a call that may block, or never return, in a daemon thread of its own, and returns its result.
 
     Raises:
-        TimeoutError: it is not done within `deadline_s`. Its thread stays behind; it does not keep the
-            process from ending.
+        TimeoutError: no result within `deadline_s`. The thread is left behind and does not keep the process
+            from exiting.
     """
-    crossing = Crossing()
-    done: asyncio.Future[T] = asyncio.get_running_loop().create_future()
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[T] = loop.create_future()
 
-    def settle(result: T | None, error: BaseException | None) -> None:
-        if done.done():
-            return
-        if error is not None:
-            done.set_exception(error)
-        else:
-            done.set_result(result)  # type: ignore[arg-type]  # None only where T allows it
+    def settle(set_outcome: Callable[[Any], None], outcome: Any) -> None:
+        if not done.done():
+            set_outcome(outcome)
 
     def run() -> None:
         try:
             result = work()
-        except BaseException as error:  # noqa: BLE001  # handed to whoever waits, whatever it is
-            crossing.hand_over(settle, None, error)
+        except BaseException as error:  # noqa: BLE001  # raised again by the awaiting coroutine
+            call_on_loop(loop, settle, done.set_exception, error)
         else:
-            crossing.hand_over(settle, result, None)
+            call_on_loop(loop, settle, done.set_result, result)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
     return await asyncio.wait_for(done, deadline_s)
