@@ -30,7 +30,7 @@ from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.methods import CONTRACT, method_at
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
-from preview.rpc.mapping import wish
+from preview.rpc.mapping import desired_state
 
 Target = Callable[[bytes], None]
 
@@ -51,7 +51,7 @@ def gateways_wish(data: bytes) -> None:
     request = preview_pb.ApplyDesiredStateRequest()
     if _parses(request, data):
         with suppress(InvalidRequestError):
-            wish(request.desired)
+            desired_state(request.desired)
 
 
 def previews_truth(data: bytes) -> None:

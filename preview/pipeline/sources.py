@@ -1,7 +1,7 @@
-"""Where the pictures come from: each kind of source as the beginning of a pipeline, checked before use.
+"""Sources: each kind as the first elements of a pipeline, checked before use.
 
-Nothing here needs GStreamer: a source is a description, some property values that must not be quoted into
-it, and the sentence for its failure.
+Pure: a source is a GStreamer description, property values that can't be quoted into it, and the remedy for
+its failure.
 """
 
 import stat
@@ -21,16 +21,16 @@ _REMEDY_GST = "Try it with gst-launch-1.0, and correct source.description"
 
 @dataclass(frozen=True, slots=True)
 class SourcePlan:
-    """The beginning of a pipeline.
+    """First elements of a pipeline.
 
     Args:
-        label: what to call it before a person.
-        description: elements as gst-launch takes them, ending in raw video.
+        label: name for people.
+        description: elements in the syntax of gst-launch, ending in raw video.
         remedy: what to do when it fails.
         properties: element name in the description -> property -> value, set after parsing.
-        any_rate: makes whatever size and rate it is asked for; others are reduced after the source.
-        capture_fps: the rate to ask the source for. None: its own.
-        loops: starts again when it ends.
+        any_rate: generates any size and frame rate; other sources are converted.
+        capture_fps: frame rate to negotiate with the source. None: its own.
+        loops: restarts at its end.
     """
 
     label: str
@@ -43,20 +43,19 @@ class SourcePlan:
 
 
 def plan(source: TestSource | V4l2Source | FileSource | GstSource, fastest_fps: int) -> SourcePlan:
-    """Says how the configured source begins a pipeline.
+    """Returns the first elements for a configured source.
 
     Args:
-        source: as configured.
-        fastest_fps: what the fastest profile asks for.
+        source: section of the configuration.
+        fastest_fps: frame rate of the fastest profile.
 
     Raises:
-        UserError: it can't be used as things stand.
+        UserError: the source can't be used: it is missing, unreadable or of another type.
     """
     match source:
         case TestSource():
-            return SourcePlan(
-                "test picture", "videotestsrc is-live=true horizontal-speed=4", "", any_rate=True
-            )
+            description = "videotestsrc is-live=true horizontal-speed=4"
+            return SourcePlan("test pattern", description, "", any_rate=True)
         case V4l2Source():
             return _camera(source, fastest_fps)
         case FileSource():
@@ -75,7 +74,6 @@ def _camera(source: V4l2Source, fastest_fps: int) -> SourcePlan:
         raise UserError(f"camera {device} is not a device", "Name a device such as /dev/video11")
     return SourcePlan(
         f"camera {device}",
-        # A camera's driver may hold on to its buffers: a copy where the encoder has no pool of its own.
         "v4l2src name=camera do-timestamp=true",
         _REMEDY_CAMERA,
         properties={"camera": {"device": device}},
@@ -84,10 +82,10 @@ def _camera(source: V4l2Source, fastest_fps: int) -> SourcePlan:
 
 
 def find_card(card: str, class_dir: Path = CLASS_DIR) -> str:
-    """The device node of a card, the lowest number when it has several.
+    """Returns the device node of a card, the one with the lowest number when it has several.
 
     Raises:
-        UserError: no such card; says which there are.
+        UserError: there is no such card; the error lists the existing ones.
     """
     names = {entry: _card_name(entry) for entry in class_dir.glob("video*")}
     matches = [entry.name for entry, name in names.items() if name == card]
@@ -101,7 +99,7 @@ def _card_name(entry: Path) -> str:
     try:
         return (entry / "name").read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
-        return ""  # It was unplugged while we looked.
+        return ""  # Unplugged in the meantime.
 
 
 def _file(path: Path) -> SourcePlan:
@@ -114,7 +112,7 @@ def _file(path: Path) -> SourcePlan:
         raise UserError(f"video file {path} is empty", _REMEDY_FILE)
     return SourcePlan(
         f"video file {path}",
-        # Only the picture is decoded; clocksync plays it at its own speed.
+        # Only video is decoded; clocksync plays it at its own speed.
         'filesrc name=file ! decodebin caps="video/x-raw(ANY)" expose-all-streams=false'
         " ! clocksync name=pace",
         _REMEDY_FILE,
