@@ -84,8 +84,8 @@ def view(
         session.print_json(json_form(account))
     elif headless or recording:
         session.out.print(account.line(), soft_wrap=True)
-    if recording and recording.trouble:
-        raise recording.trouble
+    if recording and recording.error:
+        raise recording.error
 
 
 def _nothing() -> None:

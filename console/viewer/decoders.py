@@ -5,17 +5,13 @@ from collections.abc import Callable, Mapping
 from typing import Final, TypeAlias
 
 from common.errors import UserError
-from console.receiver.decoder_probe import HARDWARE, first_proven, present
+from console.receiver.decoder_probe import HARDWARE, proven_decoder
 from console.receiver.errors import StreamError, UndecodableError
 
 _WAIT_S: Final = 3.0
 """How long the first call waits for trials; after that it begins in software."""
 
 Prove: TypeAlias = Callable[[str], str | None]
-
-
-def _prove(codec: str) -> str | None:
-    return first_proven(codec, present(codec))
 
 
 class Decoders:
@@ -25,7 +21,7 @@ class Decoders:
         prove: gives the element for a codec, or None; only tests give another one.
     """
 
-    def __init__(self, prove: Prove = _prove) -> None:
+    def __init__(self, prove: Prove = proven_decoder) -> None:
         self._prove = prove
         self._proven: dict[str, str] = {}
         self._distrusted = self._waited = False

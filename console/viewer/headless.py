@@ -52,8 +52,8 @@ def watch_headless(
         worker.start()
         while not (stop.is_set() or _enough(books, frames)):
             _check(worker.newest(), session.state(), books, patience_s)
-            if recording and recording.trouble:
-                raise recording.trouble
+            if recording and recording.error:
+                raise recording.error
             with books.news:
                 books.news.wait_for(lambda: stop.is_set() or _enough(books, frames), _LOOK_S)
     finally:

@@ -9,11 +9,11 @@ from typing import Final, TypeAlias
 from common.errors import UserError
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoPictureError, StreamError, UndecodableError
+from console.receiver.errors import NoFrameError, StreamError, UndecodableError
 from console.receiver.frame import Frame, PixelFormat
+from console.receiver.options import ReceiverOptions
 from console.receiver.receiver import Receiver
 from console.receiver.recording import Recording
-from console.receiver.setup import Setup
 from console.viewer.calling import Patience, Pauses, address_of
 from console.viewer.decoders import Decoders
 from console.viewer.state import Facts, ViewState, view_state
@@ -21,12 +21,12 @@ from console.viewer.state import Facts, ViewState, view_state
 _LOOK_S: Final = 0.1
 """How often a call that brings nothing looks whether it is still wanted."""
 
-Connect: TypeAlias = Callable[[StreamAddress, Setup], Receiver]
+Connect: TypeAlias = Callable[[StreamAddress, ReceiverOptions], Receiver]
 OnPicture: TypeAlias = Callable[[Frame], None]
 
 
-def _connect(address: StreamAddress, setup: Setup) -> Receiver:
-    return Receiver(address, queue_size=1, setup=setup)
+def _connect(address: StreamAddress, setup: ReceiverOptions) -> Receiver:
+    return Receiver(address, queue_size=1, options=setup)
 
 
 def _ignore(_frame: Frame) -> None:
@@ -166,7 +166,7 @@ class VideoSession:
 
     def _call(self, address: StreamAddress) -> UserError:
         """Shows one call's pictures until it is over, and says why it is."""
-        setup = Setup(self._pixels, self._decoders.chosen(), self._recording)
+        setup = ReceiverOptions(self._pixels, self._decoders.chosen(), self._recording)
         try:
             with self._connect(address, setup) as receiver:
                 return self._take_pictures(receiver, address)
@@ -182,7 +182,7 @@ class VideoSession:
                 return StreamError("nobody wants this stream any more", "")
             try:
                 frame = receiver.next_frame(_LOOK_S)
-            except NoPictureError as silence:
+            except NoFrameError as silence:
                 if time.monotonic() > self._patience.ends_s(called_s, picture_s):
                     if picture_s:
                         return _silent(address)

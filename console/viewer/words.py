@@ -33,7 +33,7 @@ def recording_line(recording: Recording | None) -> str:
     """What is kept; empty when nothing is to be."""
     if recording is None:
         return ""
-    if recording.trouble:
-        return recording.trouble.what
+    if recording.error:
+        return recording.error.what
     gaps = f", {plural(recording.gaps, 'gap')}" if recording.gaps else ""
     return f"recording {recording.file.name}: {recording.size_bytes / _MIB:.1f} MiB{gaps}"

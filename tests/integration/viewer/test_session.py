@@ -145,7 +145,7 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
         kept_while_live = recording.size_bytes
         seen = session.figures().pictures
     recording.close()
-    assert recording.trouble is None
+    assert recording.error is None
     assert recording.gaps == 0
     assert recording.size_bytes >= kept_while_live > 0
     assert recording.size_bytes % 188 == 0
@@ -157,12 +157,12 @@ def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:
     recording = Recording(Path("/dev/full"))
     with following(ground.target, recording=recording) as session:
         ground.switch_on()
-        wait_until(lambda: recording.trouble, "the disk is full")
+        wait_until(lambda: recording.error, "the disk is full")
         before = session.figures().pictures
         wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on")
         assert session.figures().redials == 0
     recording.close()
-    assert "ended early: No space left" in str(recording.trouble)
+    assert "ended early: No space left" in str(recording.error)
 
 
 def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(ground: VideoGround) -> None:
@@ -178,8 +178,8 @@ def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(gr
             ground.preview.start_again()
             before = session.figures().pictures
             wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on", 30)
-        recording.close(within_s=0.2)
-        assert "the disk does not answer" in str(recording.trouble)
+        recording.close(timeout_s=0.2)
+        assert "the disk does not answer" in str(recording.error)
     finally:
         os.close(master)
         os.close(slave)

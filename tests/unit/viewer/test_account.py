@@ -8,7 +8,7 @@ from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.account import Bookkeeper
 from console.viewer.words import figures_line, recording_line
-from tests.unit.receiver.pictures import frame
+from tests.unit.receiver.frames import frame
 
 MIB = 1 << 20
 
@@ -60,7 +60,7 @@ def test_the_recording_is_told(tmp_path: Path) -> None:
     account = Bookkeeper().account(0, recording)
     assert account.recording == {"file": str(recording.file), "bytes": MIB, "gaps": 0}
     assert account.line() == f"no picture, {recording.file}: 1.0 MiB"
-    recording.leave_out()
+    recording.add_gap()
     assert "with 1 gap: the disk was too slow" in Bookkeeper().account(0, recording).line()
 
 
@@ -75,7 +75,7 @@ def test_the_line_of_the_recording(tmp_path: Path) -> None:
     assert recording_line(None) == ""
     recording = kept(tmp_path)
     assert recording_line(recording) == "recording drive.ts: 1.0 MiB"
-    recording.leave_out()
+    recording.add_gap()
     assert recording_line(recording).endswith(", 1 gap")
 
 

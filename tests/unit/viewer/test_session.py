@@ -11,13 +11,13 @@ from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.errors import UndecodableError, ended, from_srt
 from console.receiver.frame import Frame
-from console.receiver.inbox import Inbox
+from console.receiver.frame_queue import FrameQueue
+from console.receiver.options import ReceiverOptions
 from console.receiver.receiver import Receiver
-from console.receiver.setup import Setup
 from console.viewer.session import VideoSession
 from console.viewer.state import Phase
 from tests.support.waiting import wait_until
-from tests.unit.receiver.pictures import frame
+from tests.unit.receiver.frames import frame
 from tests.unit.viewer.previews import preview
 
 
@@ -26,13 +26,13 @@ class Exchange:
     """Every call that was made; a test puts pictures and ends into the inboxes."""
 
     refuse: bool = False
-    calls: list[tuple[StreamAddress, Inbox]] = field(default_factory=list)
+    calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
 
-    def connect(self, address: StreamAddress, _setup: Setup) -> Receiver:
-        return Receiver(address, queue_size=1, dial=self._dial)
+    def connect(self, address: StreamAddress, options: ReceiverOptions) -> Receiver:
+        return Receiver(address, queue_size=1, options=options, connect=self._dial)
 
-    def _dial(self, address: StreamAddress, inbox: Inbox) -> "Exchange":
+    def _dial(self, address: StreamAddress, inbox: FrameQueue, _options: ReceiverOptions) -> "Exchange":
         self.calls.append((address, inbox))
         self.open += 1
         if self.refuse:
