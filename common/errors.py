@@ -70,12 +70,6 @@ class InvalidRequestError(DomainError):
         self.violations = violations
 
 
-class NotNowError(DomainError):
-    """The request is in order, but the state of things forbids it; it may work later."""
-
-    reason = Reason.NOT_NOW
-
-
 class UnknownServiceError(DomainError):
     """Nobody here has that name."""
 

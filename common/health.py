@@ -9,7 +9,7 @@ from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthServicer, add_HealthServicer_to_server
 
 from common.errors import UnknownServiceError
-from common.rpc import Context
+from common.interceptors import RpcContext
 
 _State: TypeAlias = Literal[0, 1, 2, 3]
 _SERVING = HealthCheckResponse.SERVING
@@ -44,7 +44,7 @@ class Health(HealthServicer):
         self._changed = asyncio.Event()
 
     async def Check(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: Context
+        self, request: HealthCheckRequest, context: RpcContext
     ) -> HealthCheckResponse:
         """The state now."""
         state = self._states.get(request.service)
@@ -53,7 +53,7 @@ class Health(HealthServicer):
         return HealthCheckResponse(status=state)
 
     async def Watch(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: Context
+        self, request: HealthCheckRequest, context: RpcContext
     ) -> AsyncIterator[HealthCheckResponse]:
         """The state now and whenever it changes, until the caller leaves."""
         last = None

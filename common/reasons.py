@@ -11,7 +11,6 @@ class Reason(StrEnum):
 
     INVALID_REQUEST = "INVALID_REQUEST"
     """The request makes no sense as it stands; google.rpc.BadRequest names the fields."""
-    NOT_NOW = "NOT_NOW"
     """The state of things forbids it."""
     UNKNOWN_SERVICE = "UNKNOWN_SERVICE"
     """The health service knows no service of that name."""

@@ -1,12 +1,5 @@
-"""How much something wants to be noticed, in a terminal as in a window."""
+"""Alias of `SeverityStyle`, until the window imports it from console.presentation."""
 
-from enum import Enum
+from console.presentation.severity_style import SeverityStyle as Tone
 
-
-class Tone(Enum):
-    """Colours follow it. The words beside it say the same without colour."""
-
-    GOOD = "good"
-    QUIET = "quiet"
-    WARNING = "warning"
-    BAD = "bad"
+__all__ = ["Tone"]

@@ -1,52 +1,5 @@
-"""Values as people read them: a number with its unit, an age, a size. "-" stands for "not known"."""
+"""Alias of console.presentation.formatting, until viewer, monitor and window import that."""
 
-from typing import Final
+from console.presentation.formatting import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
 
-UNKNOWN: Final = "-"
-
-_SECOND_MS: Final = 1000
-_MINUTE_S: Final = 60
-_HOUR_S: Final = 3600
-_GIB: Final = 1 << 30
-
-
-def quantity(value: float | None, unit: str, digits: int = 1) -> str:
-    """A number and its unit: 29.8 fps."""
-    return UNKNOWN if value is None else f"{value:.{digits}f} {unit}"
-
-
-def signed(value: float | None, digits: int = 2) -> str:
-    """A number whose sign says the direction: +0.50."""
-    # Adding zero turns -0.0 into 0.0; what rounds to zero has no direction.
-    return UNKNOWN if value is None else f"{round(value, digits) + 0.0:+.{digits}f}"
-
-
-def age(age_ms: int | None) -> str:
-    """How old something is: 40 ms, 3.4 s, 2 min 05 s, 3 h 12 min."""
-    if age_ms is None:
-        return UNKNOWN
-    if age_ms < _SECOND_MS:
-        return f"{age_ms} ms"
-    seconds = age_ms / _SECOND_MS
-    if seconds < _MINUTE_S:
-        return f"{seconds:.1f} s"
-    if seconds < _HOUR_S:
-        return f"{int(seconds // _MINUTE_S)} min {int(seconds % _MINUTE_S):02} s"
-    return f"{int(seconds // _HOUR_S)} h {int(seconds % _HOUR_S // _MINUTE_S):02} min"
-
-
-def gibibytes(count: int | None) -> str:
-    """A size of memory: 1.2 GiB."""
-    return quantity(None if count is None else count / _GIB, "GiB")
-
-
-def plural(count: int | None, noun: str) -> str:
-    """A count and its noun: 1 viewer, 2 viewers."""
-    if count is None:
-        return f"{UNKNOWN} {noun}s"
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-def joined(*parts: str) -> str:
-    """The parts that are not empty, with commas between."""
-    return ", ".join(part for part in parts if part)
+__all__ = ["UNKNOWN", "age", "gibibytes", "joined", "plural", "quantity", "signed"]

@@ -10,8 +10,8 @@ from gateway.ros.cutting import cut
 from gateway.ros.decoding import longest_list
 from gateway.ros.placing import place
 from gateway.ros.readers import reader_for
-from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.status import overlay_snapshot
+from gateway.rpc.recipient import Recipient
 from gateway.status.board import Board, SourceKind
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, SourceRule, take
@@ -70,5 +70,5 @@ def _serve(source: SourceSettings, value: Any) -> None:
         events=(),
         now_s=2.0,
     )
-    answer = overlay_snapshot(now, Caller("127.0.0.1", may_watch=True)).SerializeToString()
+    answer = overlay_snapshot(now, Recipient("127.0.0.1", sees_passphrase=True)).SerializeToString()
     assert len(answer) < 1_000_000

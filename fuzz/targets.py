@@ -7,45 +7,43 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from types import MappingProxyType
-from typing import Final
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
-from google.protobuf.message_factory import GetMessageClass
 
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from console.client.mapping.methods import METHODS
-from console.robots.book import parse_book
 from console.robots.login import parse_login
+from console.robots.robots_file import parse_robots_file
 from fuzz.robot import robots_message
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
-from gateway.config import load_settings
+from gateway.config import GatewaySettings, load_settings
+from gateway.links.link import LinkLostError
+from gateway.links.preview.wire import from_wire
 from gateway.metrics.endpoint import answer
-from gateway.preview_link.wire import UnknownSpeechError, from_wire
 from gateway.ros.cutting import cut
-from gateway.rpc.limits import MOST_REQUEST_BYTES
-from gateway.rpc.requests import Requests, hold_to_rules
-from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
+from gateway.rpc.interceptors.validation import Validation
+from gateway.rpc.methods import CONTRACT, method_at
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import wish
 
 Target = Callable[[bytes], None]
 
-_REQUESTS: Final = [
-    Requests(GetMessageClass(method.input_type), MOST_REQUEST_BYTES)
-    for method in DESCRIPTOR.services_by_name["RobotGateway"].methods
-]
+_VALIDATION: Final = Validation(GatewaySettings().limits.request_bytes)
+_METHODS: Final = [method_at(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
 
 
 def operators_request(data: bytes) -> None:
-    """The request of every method, as the gateway reads it and holds it to the schema's rules."""
-    for requests in _REQUESTS:
+    """The request of every method, parsed and checked against the schema's rules."""
+    for method in _METHODS:
+        call: Any = SimpleNamespace(method=method, request=None)
         with suppress(DomainError):
-            hold_to_rules(requests.read(data))
+            _VALIDATION.on_request(call, data)
 
 
 def gateways_wish(data: bytes) -> None:
@@ -60,7 +58,7 @@ def previews_truth(data: bytes) -> None:
     """What the preview service reports, as the gateway takes it in."""
     state = preview_pb.ActualState()
     if _parses(state, data):
-        with suppress(UnknownSpeechError):
+        with suppress(LinkLostError):
             from_wire(state)
 
 
@@ -120,7 +118,7 @@ def login(data: bytes) -> None:
 def known_robots(data: bytes) -> None:
     """The file of known robots. What is wrong with it is told in one line."""
     try:
-        parse_book(Path("config.toml"), data.decode("utf-8", "replace"))
+        parse_robots_file(Path("config.toml"), data.decode("utf-8", "replace"))
     except UserError as error:
         _must_be_one_line(str(error))
 

@@ -15,7 +15,7 @@ from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
-from console.words import plural
+from console.presentation.formatting import plural
 
 Item = Event | EventGap | CaughtUp | Outage
 

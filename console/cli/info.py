@@ -10,7 +10,7 @@ from rich.text import Text
 
 from console.cli.json_form import json_form
 from console.client import GatewayInfo
-from console.words import UNKNOWN, age
+from console.presentation.formatting import UNKNOWN, age
 
 _MS_PER_S: Final = 1000
 

@@ -11,10 +11,10 @@ from common.errors import ExitCode, UserError
 from console.cli.options import JsonOption, json_wanted
 from console.cli.session import print_json, standard_output
 from console.client import Credentials, GatewayClient, parse_target
-from console.robots import read_book, read_credentials
-from console.robots.book import check_name
+from console.robots import read_credentials, read_robots_file
+from console.robots.credentials import read_public
 from console.robots.login import keep_login, parse_login
-from console.robots.private import read_public
+from console.robots.robots_file import check_name
 
 _STANDARD_INPUT = "-"
 
@@ -68,5 +68,5 @@ def _text(path: Path) -> str:
 
 
 def _with_new_authority(name: str, ca: Path) -> tuple[str, Credentials]:
-    known = read_credentials(read_book().find(name))
+    known = read_credentials(read_robots_file().find(name))
     return "", replace(known, ca_certificate=read_public(ca, "CA certificate file"))

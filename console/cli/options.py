@@ -8,13 +8,13 @@ import typer
 from common.errors import UserError
 from console.cli.session import Session, open_session
 from console.client.target import DEFAULT_TARGET
-from console.robots import read_book
+from console.robots import read_robots_file
 
 
 def robot_names(incomplete: str) -> list[tuple[str, str]]:
     """What the shell offers after --robot: the names that begin so, each with its address."""
     try:
-        robots = read_book().robots
+        robots = read_robots_file().robots
     except UserError:
         # A line in the middle of somebody's typing helps nobody; the command itself will say it.
         return []

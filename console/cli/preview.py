@@ -8,10 +8,10 @@ import typer
 from common.errors import UserError
 from console.cli.json_form import json_form
 from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
-from console.cli.rows import preview_rows
 from console.cli.session import Session
 from console.cli.tables import rows_table
 from console.client import PreviewChange, PreviewProfile, PreviewState
+from console.presentation.status_table import preview_rows
 
 preview_app = typer.Typer(help="Turn the live preview on or off.", pretty_exceptions_enable=False)
 

@@ -11,10 +11,10 @@ from common.errors import UserError
 from console.cli.options import JsonOption, json_wanted, robot_names
 from console.cli.session import print_json, standard_output
 from console.client import parse_target
-from console.robots import Robot, RobotBook, read_book
-from console.robots.book import FILE_KEYS
+from console.robots import Robot, RobotsFile, read_robots_file
 from console.robots.credentials import forget_credentials
-from console.robots.edit import drop_robot, put_robot, set_default
+from console.robots.robots_file import FILE_KEYS
+from console.robots.robots_file_edit import drop_robot, put_robot, set_default
 
 robots_app = typer.Typer(
     help="The robots known by name; without a further word, lists them.", pretty_exceptions_enable=False
@@ -29,7 +29,7 @@ NameArgument = Annotated[
 def robots(context: typer.Context, as_json: JsonOption = False) -> None:
     """The robots known by name; without a further word, lists them."""
     if context.invoked_subcommand is None:
-        _show(context, read_book(), as_json)
+        _show(context, read_robots_file(), as_json)
     elif as_json:
         context.obj = replace(context.obj, as_json=True)
 
@@ -45,7 +45,7 @@ def add(
     as_json: JsonOption = False,
 ) -> None:
     """Give a robot a name. The first one becomes the default."""
-    known = read_book().robots.get(name)
+    known = read_robots_file().robots.get(name)
     wanted = replace(known, target=target) if known else Robot(target=target)
     if known and not new_address and known.target != parse_target(target):
         raise UserError(
@@ -69,7 +69,7 @@ def default(context: typer.Context, name: NameArgument, as_json: JsonOption = Fa
     _show(context, set_default(name), as_json)
 
 
-def robots_json(book: RobotBook) -> dict[str, Any]:
+def robots_json(book: RobotsFile) -> dict[str, Any]:
     """As scripts read it."""
     return {
         "file": str(book.path),
@@ -86,7 +86,7 @@ def _files(robot: Robot) -> dict[str, str | None]:
     return {key: str(path) if path else None for key, path in paths.items()}
 
 
-def _show(context: typer.Context, book: RobotBook, as_json: bool) -> None:
+def _show(context: typer.Context, book: RobotsFile, as_json: bool) -> None:
     out = standard_output()
     if json_wanted(context, as_json):
         print_json(out, robots_json(book))
@@ -96,7 +96,7 @@ def _show(context: typer.Context, book: RobotBook, as_json: bool) -> None:
         out.print(f"No robot has a name yet ({book.path}).\nType: robotctl robots add NAME HOST:PORT")
 
 
-def _table(book: RobotBook) -> Table:
+def _table(book: RobotsFile) -> Table:
     table = Table.grid(padding=(0, 2))
     for _ in range(3):
         table.add_column(no_wrap=True)

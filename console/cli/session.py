@@ -11,7 +11,7 @@ from rich.console import Console
 
 from common.errors import ExitCode, UserError
 from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
-from console.robots import Robot, choose, read_book, read_credentials
+from console.robots import Robot, choose, read_credentials, read_robots_file
 
 # Where nobody looks at columns, lines are left long rather than broken.
 _WIDTH_OF_A_FILE = 160
@@ -52,7 +52,7 @@ class Session:
         Raises:
             UserError: a file is missing, others may read a secret, or it would be sent in the clear.
         """
-        shown = read_credentials(read_book().find(self.name) if self.name else self.robot)
+        shown = read_credentials(read_robots_file().find(self.name) if self.name else self.robot)
         # A window would learn that these won't do only in a thread of its own, too late for one line.
         shown.channel_credentials(parse_target(self.target))
         return shown

@@ -1,4 +1,4 @@
-"""Rows and overlays as calm tables: no boxes, colour only where something wants to be noticed."""
+"""Statuses and overlays as terminal tables: no boxes, and colour only for what needs attention."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -7,44 +7,60 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from console.cli.rows import Row, status_rows
-from console.client.results import Detections, Freshness, OverlaySnapshot, SystemStatus
-from console.tone import Tone
-from console.words import age
+from console.client.results import Detections, OverlaySnapshot, SystemStatus
+from console.presentation.formatting import age
+from console.presentation.severity_style import SeverityStyle
+from console.presentation.status_table import Row, View, status_rows
 
-STYLES: Final = {Tone.GOOD: "green", Tone.QUIET: "dim", Tone.WARNING: "bold yellow", Tone.BAD: "bold red"}
+STYLES: Final = {
+    SeverityStyle.GOOD: "green",
+    SeverityStyle.QUIET: "dim",
+    SeverityStyle.WARNING: "bold yellow",
+    SeverityStyle.BAD: "bold red",
+}
 
 
 def status_view(status: SystemStatus, target: str) -> RenderableType:
-    """The whole status."""
+    """Returns the whole status under a headline."""
     return Group(headline(status, target), Text(), rows_table(status_rows(status)))
 
 
 def headline(status: SystemStatus, target: str) -> Text:
-    """Who is speaking."""
+    """Returns the robot's name, address and gateway version."""
     name = status.gateway_name or "robot"
     return Text.assemble((name, "bold"), (f"  {target}, gateway {status.gateway_version or '?'}", "dim"))
 
 
 def rows_table(rows: Iterable[Row]) -> Table:
-    """One line per row; long texts wrap inside their column."""
-    table = Table.grid(padding=(0, 2))
-    table.add_column(no_wrap=True)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    table.add_column(justify="right", no_wrap=True, style="dim")
+    """Returns one line per row; long texts wrap inside their column."""
+    table = grid("nowrap", "nowrap", "fold", "right")
     for row in rows:
-        body = "dim" if row.tone is Tone.WARNING and row.mark == "STALE" else ""
-        table.add_row(row.label, Text(row.mark, style=STYLES[row.tone]), Text(row.text, style=body), row.age)
+        body = "dim" if row.style is SeverityStyle.WARNING and row.mark == "STALE" else ""
+        text = Text(row.text, style=body)
+        table.add_row(row.label, Text(row.mark, style=STYLES[row.style]), text, Text(row.age, style="dim"))
+    return table
+
+
+def grid(*columns: str) -> Table:
+    """Returns an empty table without lines.
+
+    Args:
+        columns: One each: "nowrap" stays on one line, "right" too and is aligned right, "fold" wraps.
+    """
+    table = Table.grid(padding=(0, 2))
+    for column in columns:
+        table.add_column(
+            no_wrap=column != "fold", overflow="fold", justify="right" if column == "right" else "left"
+        )
     return table
 
 
 def overlay_view(snapshot: OverlaySnapshot, target: str) -> RenderableType:
-    """Detections and events under one line of health."""
+    """Returns detections and events under a headline."""
     parts: list[RenderableType] = [
         headline(snapshot.status, target),
         Text(),
-        rows_table([_detections_row(snapshot.detections)]),
+        rows_table([_detections_row(snapshot)]),
     ]
     if snapshot.detections.items:
         parts += [Text(), _detections_table(snapshot.detections)]
@@ -53,27 +69,17 @@ def overlay_view(snapshot: OverlaySnapshot, target: str) -> RenderableType:
     return Group(*parts)
 
 
-def _detections_row(detections: Detections) -> Row:
-    match detections.freshness:
-        case Freshness.MISSING:
-            return Row("detections", "no data", Tone.QUIET, "")
-        case Freshness.STALE:
-            mark, tone = "STALE", Tone.WARNING
-        case Freshness.FRESH:
-            mark, tone = "fresh", Tone.GOOD
+def _detections_row(snapshot: OverlaySnapshot) -> Row:
+    detections = snapshot.detections
     listed = len(detections.items)
     capped = f", the first {listed} of them below" if listed < (detections.count or 0) else ""
-    image = f"{detections.source_width_px}x{detections.source_height_px}"
-    text = f"{detections.count} in a picture of {image} pixels{capped}"
-    return Row("detections", mark, tone, text, age(detections.age_ms))
+    size = f"{detections.source_width_px}x{detections.source_height_px}"
+    text = f"{detections.count} in a frame of {size} pixels{capped}"
+    return View(snapshot.status).measured("detections", detections, text)
 
 
 def _detections_table(detections: Detections) -> Table:
-    table = Table.grid(padding=(0, 2))
-    for _ in range(2):
-        table.add_column(no_wrap=True)
-    for _ in range(3):
-        table.add_column(justify="right", no_wrap=True)
+    table = grid("nowrap", "nowrap", "right", "right", "right")
     table.add_row("class", "track", "score", "centre (px)", "size (px)", style="dim")
     for item in detections.items:
         table.add_row(
@@ -87,10 +93,8 @@ def _detections_table(detections: Detections) -> Table:
 
 
 def _events_table(snapshot: OverlaySnapshot) -> Table:
-    table = Table.grid(padding=(0, 2))
-    for _ in range(2):
-        table.add_column(justify="right", no_wrap=True, style="dim")
-    table.add_column(overflow="fold")
+    table = grid("right", "right", "fold")
     for event in snapshot.events:
-        table.add_row(f"#{event.sequence}", f"{age(event.age_ms)} ago", Text(event.message))
+        when = Text(f"{age(event.age_ms)} ago", style="dim")
+        table.add_row(Text(f"#{event.sequence}", style="dim"), when, Text(event.message))
     return table

@@ -8,7 +8,7 @@ from console.cli.live.program import watch_on_a_terminal
 from console.cli.look import Look, looks
 from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
-from console.cli.watch_line import watch_line
+from console.presentation.status_line import status_line
 
 
 def watch_until_stopped(session: Session, interval_s: float, count: int | None) -> None:
@@ -42,7 +42,7 @@ class _Lines:
 
     def show(self, look: Look) -> None:
         now = datetime.now().astimezone().strftime("%H:%M:%S")
-        said = f"{look.trouble.kind}: {look.trouble.what}" if look.trouble else watch_line(look.status)
+        said = f"{look.trouble.kind}: {look.trouble.what}" if look.trouble else status_line(look.status)
         print(f"{now}  {said}", file=self._session.out.file, flush=True)
 
 

@@ -27,7 +27,6 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
-from console.client.following import Outage
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,
@@ -44,6 +43,7 @@ from console.client.results import (
     SystemStatus,
     WatchedStatus,
 )
+from console.client.streams import Outage
 from console.client.target import DEFAULT_TARGET, parse_target
 
 __all__ = [

@@ -1,21 +1,18 @@
-"""The client for asyncio: the same methods, to be awaited."""
+"""The asyncio client. The blocking one (blocking.py) is a facade over it."""
 
-import asyncio
 from collections.abc import AsyncIterator
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self
 
-import grpc
-
-from console.client.aio_stream import follow
 from console.client.clock import Clock, Offset
 from console.client.credentials import NO_CREDENTIALS, Credentials
-from console.client.error_table import error_from
-from console.client.errors import Cancelled, GatewayError
-from console.client.exchange import Done, Exchange, Exchanges, Pause, Send, Step, advance
-from console.client.feed import EventFeed
-from console.client.following import Following, Followings, Open, Outage
-from console.client.mapping.methods import METHODS, STREAMS, PreviewWish
+from console.client.event_feed import EventFeed
+from console.client.mapping.methods import (
+    GET_GATEWAY_INFO,
+    GET_OVERLAY_SNAPSHOT,
+    GET_SYSTEM_STATUS,
+    PreviewRequest,
+)
 from console.client.options import ClientOptions
 from console.client.results import (
     CaughtUp,
@@ -30,15 +27,16 @@ from console.client.results import (
     SystemStatus,
     WatchedStatus,
 )
+from console.client.streams import Outage, Streams
 from console.client.target import DEFAULT_TARGET, parse_target
-
-ResultT = TypeVar("ResultT")
+from console.client.transport import GrpcTransport
+from console.client.unary import UnaryCalls
 
 
 class AsyncGatewayClient:
-    """A robot's gateway, for one asyncio loop. Make it inside the loop that uses it.
+    """Client of one robot's gateway. Belongs to the asyncio loop that it is created in.
 
-    The connection is made at the first call and made again whenever it breaks. Cancelling a task that waits
+    It connects at the first call and reconnects whenever the connection breaks. Cancelling a task that waits
     for an answer cancels the call.
 
     Example:
@@ -47,11 +45,11 @@ class AsyncGatewayClient:
 
     Args:
         target: HOST or HOST:PORT.
-        options: how patient to be.
-        credentials: what proves who asks; None where the robot doesn't want to know.
+        options: Deadlines, retries and keepalive.
+        credentials: Token and certificates; None for a robot without authentication.
 
     Raises:
-        UserError: the target is not an address, or the credentials would be sent in the clear. Every method
+        UserError: The target is not an address, or the credentials would be sent in the clear. Every method
             raises a `GatewayError`.
     """
 
@@ -63,75 +61,90 @@ class AsyncGatewayClient:
     ) -> None:
         options = options or ClientOptions()
         self.target = parse_target(target)
-        self._exchanges = Exchanges(options)
-        self._followings = Followings(options)
         self.clock = Clock()
-        self._closed = asyncio.Event()
-        self._metadata = (credentials or NO_CREDENTIALS).metadata()
-        self._channel = _channel(self.target, options, credentials or NO_CREDENTIALS)
-        self._calls = {
-            method.name: self._channel.unary_unary(
-                method.path, request_serializer=method.encode, response_deserializer=method.decode
-            )
-            for method in METHODS
-        }
-        self._streams = {
-            method.name: self._channel.unary_stream(
-                method.path, request_serializer=method.encode, response_deserializer=method.decode
-            )
-            for method in STREAMS
-        }
+        self._transport = GrpcTransport(self.target, options, credentials or NO_CREDENTIALS)
+        self._calls = UnaryCalls(self._transport, options)
+        self._streams = Streams(self._transport, options)
 
     @property
     def reconnects(self) -> int:
-        """Connections that streams made after their first one, of all streams together."""
-        return self._followings.reconnects
+        """Connections after the first one of each stream, of all streams together."""
+        return self._streams.reconnects
 
     @property
     def retries(self) -> int:
         """Attempts beyond the first, of all calls together."""
-        return self._exchanges.retries
+        return self._calls.retries
 
     async def status(self) -> SystemStatus:
-        """Everything the gateway knows about the robot."""
-        return await self._run(self._exchanges.status())
+        """Returns the status of the whole robot."""
+        return await self._calls.read(GET_SYSTEM_STATUS)
 
     async def overlay(self) -> OverlaySnapshot:
-        """Status, detections and the newest events, at one instant."""
-        return await self._run(self._exchanges.overlay())
+        """Returns status, detections and the newest events, all of one instant."""
+        return await self._calls.read(GET_OVERLAY_SNAPSHOT)
 
     async def info(self) -> GatewayInfo:
-        """What is known of the gateway program: its build, its calls, its configuration."""
-        return await self._run(self._exchanges.info())
+        """Returns the gateway program's build, call counts and configuration."""
+        return await self._calls.read(GET_GATEWAY_INFO)
 
     async def enable_preview(
         self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
     ) -> PreviewChange:
-        """As `GatewayClient.enable_preview`."""
-        return await self._run(self._exchanges.set_preview(PreviewWish(True, profile), settle_within_s))
+        """Turns the preview on, or changes its profile, and waits until frames leave or the start failed.
+
+        Args:
+            profile: UNKNOWN keeps the current one.
+            settle_within_s: How long to wait for that; 0 returns the gateway's first answer.
+
+        Returns:
+            The gateway's message and the newest preview status: RUNNING, FAULTED (see `last_error`), or
+            still STARTING when time ran out.
+        """
+        return await self._calls.set_preview(PreviewRequest(True, profile), settle_within_s)
 
     async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
-        """As `GatewayClient.disable_preview`."""
-        return await self._run(self._exchanges.set_preview(PreviewWish(False), settle_within_s))
+        """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""
+        return await self._calls.set_preview(PreviewRequest(False), settle_within_s)
 
     async def ping(self) -> Offset:
-        """Asks for the robot's time. `clock` learns from each call, so that a few of them make it better."""
-        return await self._run(self._exchanges.ping(self.clock))
+        """Returns the offset of the robot's clock. Each call improves `clock`."""
+        return await self._calls.ping(self.clock)
 
     def watch_status(self, min_interval_s: float = 0.1) -> AsyncIterator[WatchedStatus | Outage]:
-        """As `GatewayClient.watch_status`."""
-        return self._follow(self._followings.status(min_interval_s))
+        """Yields the status at once, on every change, and once a second without one. Never ends.
+
+        A slow reader gets the newest next. A broken connection is made again; meanwhile an `Outage` comes
+        for each failed attempt. Closing the iterator ends the stream on the robot.
+
+        Args:
+            min_interval_s: Least time between two statuses; the gateway looks for changes 20 times a second.
+
+        Raises:
+            GatewayError: No gateway answers at the beginning, or it refuses; not for a later outage.
+        """
+        return self._streams.status(min_interval_s)
 
     def events(
         self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN
     ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
-        """As `GatewayClient.events`."""
-        return self._follow(self._followings.events(EventFeed(after, least)))
+        """Yields each event once and in order; events that are not available any more, as an `EventGap`.
+
+        `CaughtUp` comes after the last past event, and then as a keepalive. Every item but an `Outage` has
+        the position to resume from, in another client or another run of the program. Never ends.
+
+        Args:
+            after: Position of the last item received; None begins with the oldest event kept.
+            least: Events of lower severity are left out; UNKNOWN leaves out none.
+
+        Raises:
+            GatewayError: As `watch_status`.
+        """
+        return self._streams.events(EventFeed(after, least))
 
     async def close(self) -> None:
-        """Ends the connection. Calls under way in other tasks end with `Cancelled`."""
-        self._closed.set()
-        await self._channel.close()
+        """Closes the connection. Pending calls and streams in other tasks end with `Cancelled`."""
+        await self._transport.close()
 
     async def __aenter__(self) -> Self:
         return self
@@ -143,48 +156,3 @@ class AsyncGatewayClient:
         traceback: TracebackType | None,
     ) -> None:
         await self.close()
-
-    def _follow(self, following: Following) -> AsyncIterator[Any]:
-        return follow(following, self._begin, self._send, self.target, self._closed)
-
-    def _begin(self, step: Open) -> Any:
-        return self._streams[step.method.name](step.request, metadata=self._metadata)
-
-    async def _run(self, exchange: Exchange[ResultT]) -> ResultT:
-        step = advance(exchange, None)
-        while not isinstance(step, Done):
-            step = advance(exchange, await self._carry_out(step))
-        return step.result
-
-    async def _carry_out(self, step: Step) -> Any:
-        if self._closed.is_set():
-            return Cancelled("this client is closed")
-        if isinstance(step, Pause):
-            await asyncio.sleep(step.seconds)
-            return None
-        return await self._send(step)
-
-    async def _send(self, step: Send[Any, Any]) -> Any | GatewayError:
-        try:
-            return await self._calls[step.method.name](
-                step.request, timeout=step.timeout_s, metadata=self._metadata
-            )
-        except grpc.RpcError as failure:
-            return error_from(failure, self.target, step.timeout_s)
-        except asyncio.CancelledError:
-            # gRPC says so, too, when another task closed the channel under this call.
-            if not self._closed.is_set() or _being_cancelled():
-                raise
-            return Cancelled("this client was closed")
-
-
-def _being_cancelled() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
-
-
-def _channel(target: str, options: ClientOptions, credentials: Credentials) -> grpc.aio.Channel:
-    encryption = credentials.channel_credentials(target)
-    if encryption is None:
-        return grpc.aio.insecure_channel(target, options=options.channel_options())
-    return grpc.aio.secure_channel(target, encryption, options=options.channel_options())

@@ -1,52 +1,57 @@
-"""How patient a client is: deadlines, retries, and how soon a dead link is noticed."""
+"""A client's deadlines, retries and keepalive."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+
+from common import backoff
 
 _MS_PER_S = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backoff:
-    """Pauses between attempts: they grow, up to a limit, and never go on for ever."""
+    """Settings of the exponential backoff between attempts."""
 
     first_s: float = 0.1
     factor: float = 2.0
     longest_s: float = 0.4
     give_up_after_s: float = 1.0
-    """No attempt is begun later than this after the first one."""
+    """No attempt begins later than this after the first one."""
+
+    def start(self) -> backoff.Backoff:
+        """Returns the pauses, beginning with the first."""
+        return backoff.Backoff(self.first_s, self.longest_s, self.factor)
 
     def pauses(self) -> Iterator[float]:
-        """The pause before each further attempt, in seconds."""
-        pause_s = self.first_s
+        """Yields the pause before each further attempt, in seconds, without end."""
+        pauses = self.start()
         while True:
-            yield pause_s
-            pause_s = min(pause_s * self.factor, self.longest_s)
+            yield pauses.next_s()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClientOptions:
-    """Everything a client can be told. A robot that is not there is reported in about 2 s by default."""
+    """Deadlines, retries and keepalive. By default an absent robot is reported after about 2 s."""
 
     answer_within_s: float = 2.0
     """Deadline of a status or overlay call, retries included. The gateway answers from memory."""
     preview_within_s: float = 8.0
     """Deadline of a preview call: the robot may wait for the pipeline before it answers."""
     settle_poll_s: float = 0.1
-    """Pause between looks at a preview that is starting or stopping."""
+    """Polling interval of a preview that is starting or stopping."""
     connect_within_s: float = 1.0
-    """Deadline of one attempt to connect, name look-up included separately with the same deadline."""
+    """Deadline of one connection attempt. Name resolution has the same deadline on top."""
     backoff: Backoff = field(default_factory=Backoff)
     stream_backoff: Backoff = field(default_factory=lambda: Backoff(longest_s=2.0, give_up_after_s=math.inf))
-    """Pauses between the connections of a stream, which is made again for as long as somebody reads it."""
+    """Pauses between the connections of a stream, which reconnects for as long as it is read."""
     keepalive_every_s: float = 2.0
-    """Pause between pings on a silent connection."""
+    """Interval of pings on a silent connection."""
     keepalive_within_s: float = 2.0
     """Deadline of a ping's answer. A half-dead link is noticed after the sum of both at the latest."""
 
     def channel_options(self) -> list[tuple[str, int]]:
-        """The same for gRPC's channel, which counts in ms."""
+        """Returns the same as gRPC channel arguments, which count in ms."""
         connect_ms = round(self.connect_within_s * _MS_PER_S)
         return [
             # The shortest pause between attempts is also how long gRPC lets one attempt take.
@@ -63,6 +68,6 @@ class ClientOptions:
             ("grpc.http2.max_pings_without_data", 0),
             # A robot is never behind the office's web proxy.
             ("grpc.enable_http_proxy", 0),
-            # Clients share nothing: closing one never hurts another.
+            # Clients share nothing: closing one never affects another.
             ("grpc.use_local_subchannel_pool", 1),
         ]

@@ -1,8 +1,20 @@
-"""The robots that a person knows by name: where each answers, and what proves who asks."""
+"""Robots known by name: their addresses and credentials."""
 
 from console.client import Credentials
-from console.robots.book import Robot, RobotBook, book_path, read_book
 from console.robots.choice import choose
 from console.robots.credentials import read_credentials
+from console.robots.robots_file import Robot, RobotsFile, read_robots_file, robots_file_path
 
-__all__ = ["Credentials", "Robot", "RobotBook", "book_path", "choose", "read_book", "read_credentials"]
+read_book = read_robots_file
+"""The name that scripts know it by (docs/client.md)."""
+
+__all__ = [
+    "Credentials",
+    "Robot",
+    "RobotsFile",
+    "choose",
+    "read_book",
+    "read_credentials",
+    "read_robots_file",
+    "robots_file_path",
+]

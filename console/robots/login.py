@@ -1,4 +1,4 @@
-"""What a robot's keeper hands over, read and kept: `robot-gateway credentials add` prints it.
+"""A login: one user's credentials for one robot, as `robot-gateway credentials add` prints them.
 
 # Robot Gateway login 1
 robot: lab2
@@ -16,9 +16,9 @@ from typing import Final
 from common.errors import ExitCode, UserError
 from common.private_files import write_private
 from console.client import Credentials
-from console.robots.book import Robot, RobotBook, book_path
 from console.robots.credentials import credentials_directory
-from console.robots.edit import put_robot
+from console.robots.robots_file import Robot, RobotsFile, robots_file_path
+from console.robots.robots_file_edit import put_robot
 
 _HEAD: Final = "# Robot Gateway login 1"
 _WORDS: Final = ("robot", "name", "role", "token")
@@ -28,12 +28,12 @@ _LARGEST: Final = 64 * 1024
 
 @dataclass(frozen=True, slots=True)
 class Login:
-    """One person's way in to one robot.
+    """The content of a login.
 
     Args:
-        name: of the person, as the robot's keeper calls them.
-        role: what they may do.
-        credentials: what they show.
+        name: The user, as the robot knows them.
+        role: Their role: viewer, operator or admin.
+        credentials: Token or client certificate, and the robot's certificate authority.
     """
 
     name: str
@@ -42,14 +42,14 @@ class Login:
 
 
 def parse_login(text: str) -> Login:
-    """The login that a text is.
+    """Returns the login that a text contains.
 
     Raises:
-        UserError: it is none, or a part is missing. The line quotes nothing of it.
+        UserError: It is not a login, or a part is missing. The line quotes nothing of it.
     """
     lines = text[:_LARGEST].splitlines()
     if not lines or lines[0].strip() != _HEAD:
-        raise _no_login("it does not begin as one")
+        raise _not_a_login("it does not begin as one")
     words: dict[str, str] = {}
     parts: dict[str, list[str]] = {}
     part: list[str] | None = None
@@ -62,11 +62,11 @@ def parse_login(text: str) -> Login:
         elif part is not None:
             part.append(line)
     if "authority" not in parts:
-        raise _no_login("the robot's certificate authority is not in it")
+        raise _not_a_login("the robot's certificate authority is not in it")
     if ("certificate" in parts) != ("key" in parts):
-        raise _no_login("a certificate and its key belong together")
+        raise _not_a_login("a certificate and its key belong together")
     if not (words.get("token") or "key" in parts):
-        raise _no_login("neither a token nor a key is in it")
+        raise _not_a_login("neither a token nor a key is in it")
     pems = {key: ("\n".join(those) + "\n").encode() for key, those in parts.items()}
     shown = Credentials(
         ca_certificate=pems["authority"],
@@ -77,27 +77,27 @@ def parse_login(text: str) -> Login:
     return Login(words.get("name", ""), words.get("role", ""), shown)
 
 
-def keep_login(name: str, target: str, shown: Credentials, path: Path | None = None) -> RobotBook:
-    """Writes the files, each its owner's alone, and the robot's entry that names them.
+def keep_login(name: str, target: str, credentials: Credentials, path: Path | None = None) -> RobotsFile:
+    """Writes the credentials, each file readable by its owner only, and the robot's entry that names them.
 
     Args:
-        name: what people call the robot.
+        name: The robot's name.
         target: HOST:PORT of its gateway.
-        shown: what proves who asks. What is None is forgotten.
-        path: another file than this person's own.
+        credentials: To be stored; the file of a part that is None is deleted.
+        path: Another file than this user's own.
 
     Raises:
-        UserError: the name or the address won't do, or something can't be written.
+        UserError: The name or the address is not allowed, or a file can't be written.
     """
-    path = path or book_path()
-    # First without any file: whatever is wrong with name or address is known before a secret is written.
+    path = path or robots_file_path()
+    # First without any file: a wrong name or address is reported before a secret is written.
     put_robot(name, Robot(target=target), path=path)
     directory = credentials_directory(path, name)
     files = {
-        "ca_certificate_file": (directory / "ca.pem", shown.ca_certificate),
-        "client_certificate_file": (directory / "client.pem", shown.client_certificate),
-        "client_key_file": (directory / "client-key.pem", shown.client_key),
-        "token_file": (directory / "token", shown.token.encode() if shown.token else None),
+        "ca_certificate_file": (directory / "ca.pem", credentials.ca_certificate),
+        "client_certificate_file": (directory / "client.pem", credentials.client_certificate),
+        "client_key_file": (directory / "client-key.pem", credentials.client_key),
+        "token_file": (directory / "token", credentials.token.encode() if credentials.token else None),
     }
     kept: dict[str, Path] = {}
     for key, (file, content) in files.items():
@@ -109,9 +109,9 @@ def keep_login(name: str, target: str, shown: Credentials, path: Path | None = N
     return put_robot(name, Robot(target=target, **kept), path=path)
 
 
-def _no_login(why: str) -> UserError:
+def _not_a_login(why: str) -> UserError:
     return UserError(
-        f"this is no login: {why}",
+        f"this is not a login: {why}",
         "On the robot: robot-gateway credentials add NAME --role ROLE prints one",
         exit_code=ExitCode.USAGE,
     )

@@ -7,8 +7,8 @@ from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.access.command import to_type
 from gateway.access.credential import State
+from gateway.access_control import read_access
 from gateway.config import SecuritySettings
-from gateway.door import read_access
 
 
 def access_finding(settings: SecuritySettings) -> Finding:

@@ -4,7 +4,7 @@ import asyncio
 import time
 from typing import Final, NoReturn
 
-from gateway.metrics.histogram import Histogram
+from common.histogram import Histogram
 
 _LOOK_EVERY_S: Final = 0.25
 _BOUNDS_S: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.values import (
     Battery,
     CommandSource,
@@ -72,8 +71,6 @@ class Board:
     network: Received[Network] | None = None
     onboard_battery: Received[Battery] | None = None
     """The computer's own battery, as its operating system tells it."""
-    access: AccessView = UNGUARDED
-    """How the gateway's own door is doing."""
     presence: dict[str, Presence] = field(default_factory=dict)
     """Who offers each source, by its name ("odometry", "mux_input.keyboard")."""
     unusable: dict[str, str] = field(default_factory=dict)

@@ -9,12 +9,12 @@ from gateway.status.preview import PreviewState, Profile
 
 
 class ControlResult(Enum):
-    """What became of a control action."""
+    """How a control action ended."""
 
     ACCEPTED = "accepted"
     REFUSED = "refused"
     FAILED = "failed"
-    """By an error of our own."""
+    """By a defect of the gateway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +65,17 @@ class ClientLeft:
 
 @dataclass(frozen=True, slots=True)
 class ControlAction:
-    """Somebody asked for something that changes the robot.
+    """A call that changes the robot, or tried to; also what the audit log records.
 
     Attributes:
-        who: the caller's name where the gateway asks for one; else empty.
+        who: the caller's name; empty where callers are not authenticated.
         address: where the call came from.
         method: of the contract.
-        request: what was asked for, for a person.
-        answer: what was answered, for a person.
+        request: its parameters as text.
+        answer: what the caller was answered, as text.
+        role: the caller's; empty like `who`.
+        credential: ID of the one that was shown; empty like `who`.
+        request_id: as in the logs.
     """
 
     who: str
@@ -81,6 +84,9 @@ class ControlAction:
     request: str
     result: ControlResult
     answer: str
+    role: str = ""
+    credential: str = ""
+    request_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)

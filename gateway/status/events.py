@@ -84,8 +84,6 @@ class EventLog:
         self._sequence = 0
         self._on_overlay: deque[OperatorEvent] = deque(maxlen=ON_OVERLAY)
         self._overlay_sequence = 0
-        self.on_event: Callable[[], None] = lambda: None
-        """Called after each event; one listener, who tells everybody else."""
 
     @property
     def sequence(self) -> int:
@@ -100,7 +98,6 @@ class EventLog:
         if news.sentence is not None:
             self._overlay_sequence += 1
             self._on_overlay.append(OperatorEvent(self._overlay_sequence, now_s, news.sentence))
-        self.on_event()
         return event
 
     def newest(self) -> tuple[OperatorEvent, ...]:

@@ -102,6 +102,7 @@ def take(
     now_s: float,
     faults: tuple[Fault, ...] = (),
     gateway: Runtime = UNKNOWN,
+    access: AccessView = UNGUARDED,
 ) -> Snapshot:
     """What is true at `now_s`, from the newest values alone."""
     odometry = sample(board.odometry, rules.stale_after_ms(SourceKind.ODOMETRY), now_s)
@@ -134,7 +135,7 @@ def take(
         sources=tuple(_sources(rules, board, now_s)),
         events=events,
         faults=faults,
-        access=board.access,
+        access=access,
     )
 
 

@@ -11,8 +11,8 @@ from rich.text import Text
 
 from common.errors import UserError
 from console.cli.tables import status_view
-from console.cli.watch_line import watch_line
 from console.client import GatewayClient, SystemStatus
+from console.presentation.status_line import status_line
 from demo_program.ground import DEFAULT_GRPC_PORT, Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
@@ -77,5 +77,5 @@ def _lines(robot: GatewayClient, programs: Programs) -> None:
         status = status_or_none(robot)
         if status is None:
             raise UserError(f"{robot.target} does not answer")
-        print(watch_line(status), file=sys.stdout, flush=True)
+        print(status_line(status), file=sys.stdout, flush=True)
         time.sleep(_LINE_EVERY_S)

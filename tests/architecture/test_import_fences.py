@@ -64,15 +64,18 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("simrobot/", ("gateway", "preview", "console")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
-        ("gateway/ros/", ("gateway.rpc", "gateway.preview_link", *WIRE)),
+        ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
         ("gateway/rpc/", ("gateway.ros",)),
-        ("gateway/preview_link", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
+        ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
+        ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
+        ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
         (
             "preview/lifecycle.py",
             (*HEAVY, *WIRE, "asyncio", "common.gst", "preview.pipeline", "preview.encoders"),
         ),
         ("preview/rpc/", ("common.gst",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
+        ("console/presentation/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/robots/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/viewer/", (*HEAVY, *WIRE, "common.gst", "console.window", "console.cli")),
         (
@@ -96,9 +99,19 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/authority.py",)),
         ("yaml", ("common/config.py",)),
-        ("google.protobuf", ("gateway/rpc/", "gateway/preview_link", "preview/rpc/", "console/client/")),
+        ("tomlkit", ("console/robots/robots_file_edit.py",)),
+        (
+            "google.protobuf",
+            (
+                "common/interceptors.py",
+                "gateway/rpc/",
+                "gateway/links/",
+                "preview/rpc/",
+                "console/client/",
+            ),
+        ),
         ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
-        ("omniseer.preview", ("gateway/preview_link", "preview/rpc/")),
+        ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
     ],
 )
 def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from common.free import free_tcp_port
 from console.client import Credentials, GatewayClient, PreviewState, Unreachable
-from console.robots import read_book, read_credentials
+from console.robots import read_credentials, read_robots_file
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.directory import CredentialDirectory
@@ -68,7 +68,7 @@ class Guarded:
 
     def stored(self) -> Credentials:
         """What the laptop has kept last."""
-        return read_credentials(read_book(self.home / "robotctl/config.toml").find(ROBOT))
+        return read_credentials(read_robots_file(self.home / "robotctl/config.toml").find(ROBOT))
 
     def client(self) -> GatewayClient:
         """The test's own connection."""

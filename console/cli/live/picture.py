@@ -11,9 +11,9 @@ from rich.text import Text
 from console.cli.live.keys import Key
 from console.cli.live.wishes import Note
 from console.cli.look import Look
-from console.cli.rows import status_rows
 from console.cli.tables import STYLES, headline, rows_table
-from console.words import age, plural
+from console.presentation.formatting import age, plural
+from console.presentation.status_table import status_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def picture(
     if look.trouble:
         old = f"NO ANSWER, the values below are {age(look.silent_ms)} old"
         trouble = Text.assemble((old, "bold red"), f" - {look.trouble.what}")
-    said = Text(note.text, style=STYLES[note.tone]) if note else Text()
+    said = Text(note.text, style=STYLES[note.style]) if note else Text()
     return Fitted(
         Group(headline(look.status, target), trouble, Text()),
         rows_table(status_rows(look.status)),

@@ -7,10 +7,10 @@ from typing import Final
 
 from console.cli.live.keys import PROFILES, Key
 from console.client import GatewayError, PreviewChange, PreviewProfile, PreviewState, PreviewStatus
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 
-_GOOD_NEWS_FOR_S: Final = 5.0
-_BAD_NEWS_FOR_S: Final = 15.0
+_GOOD_FOR_S: Final = 5.0
+_BAD_FOR_S: Final = 15.0
 _WANTED: Final = (PreviewState.STARTING, PreviewState.RUNNING, PreviewState.FAULTED)
 
 
@@ -27,7 +27,7 @@ class Note:
     """A sentence about the newest wish."""
 
     text: str
-    tone: Tone
+    style: SeverityStyle
     until_s: float = float("inf")
 
 
@@ -50,10 +50,12 @@ class Wishes:
             return None
         wish = self._meant(key, preview)
         if wish is None:
-            self._say(f"{self._marked.value}: p turns the preview on with it", Tone.QUIET, _BAD_NEWS_FOR_S)
+            self._say(
+                f"{self._marked.value}: p turns the preview on with it", SeverityStyle.QUIET, _BAD_FOR_S
+            )
             return None
         self._under_way = wish
-        self._note = Note(f"{_in_words(wish)}: the robot is asked ...", Tone.QUIET)
+        self._note = Note(f"{_in_words(wish)}: the robot is asked ...", SeverityStyle.QUIET)
         return wish
 
     def done(self, outcome: PreviewChange | GatewayError) -> None:
@@ -61,14 +63,16 @@ class Wishes:
         wish, self._under_way = self._under_way, None
         assert wish
         if isinstance(outcome, GatewayError):
-            self._say(f"{_in_words(wish)}: not done, {outcome}", Tone.BAD, _BAD_NEWS_FOR_S)
+            self._say(f"{_in_words(wish)}: not done, {outcome}", SeverityStyle.BAD, _BAD_FOR_S)
         elif not outcome.accepted:
-            self._say(f"{_in_words(wish)}: the robot refused: {outcome.message}", Tone.BAD, _BAD_NEWS_FOR_S)
+            self._say(
+                f"{_in_words(wish)}: the robot refused: {outcome.message}", SeverityStyle.BAD, _BAD_FOR_S
+            )
         elif outcome.preview.state is PreviewState.FAULTED:
-            self._say(outcome.message, Tone.BAD, _BAD_NEWS_FOR_S)
+            self._say(outcome.message, SeverityStyle.BAD, _BAD_FOR_S)
         else:
             self._marked = PreviewProfile.UNKNOWN
-            self._say(outcome.message, Tone.QUIET, _GOOD_NEWS_FOR_S)
+            self._say(outcome.message, SeverityStyle.QUIET, _GOOD_FOR_S)
 
     def note(self) -> Note | None:
         """What is to be said of the newest wish at this moment."""
@@ -93,8 +97,8 @@ class Wishes:
         self._marked = PROFILES[key]
         return None
 
-    def _say(self, text: str, tone: Tone, for_s: float) -> None:
-        self._note = Note(text, tone, self._clock() + for_s)
+    def _say(self, text: str, style: SeverityStyle, for_s: float) -> None:
+        self._note = Note(text, style, self._clock() + for_s)
 
 
 def _in_words(wish: Wish) -> str:

@@ -38,7 +38,7 @@ ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True, slots=True)
-class PreviewWish:
+class PreviewRequest:
     """What the operator wants of the preview. A profile that is UNKNOWN keeps the current one."""
 
     enabled: bool
@@ -46,7 +46,7 @@ class PreviewWish:
 
 
 @dataclass(frozen=True, slots=True)
-class EventsWanted:
+class EventsRequest:
     """Which events are asked for.
 
     Args:
@@ -93,7 +93,7 @@ def _encode_info_request(_: None) -> bytes:
     return robot_gateway_pb2.GetGatewayInfoRequest().SerializeToString()
 
 
-def _encode_preview_wish(wish: PreviewWish) -> bytes:
+def _encode_preview_wish(wish: PreviewRequest) -> bytes:
     request = robot_gateway_pb2.SetPreviewModeRequest(
         enabled=wish.enabled, profile=profile_number(wish.profile)
     )
@@ -122,7 +122,7 @@ def _encode_watch_request(min_interval_s: float) -> bytes:
     return robot_gateway_pb2.WatchSystemStatusRequest(min_interval_ms=milliseconds).SerializeToString()
 
 
-def _encode_events_request(wanted: EventsWanted) -> bytes:
+def _encode_events_request(wanted: EventsRequest) -> bytes:
     request = robot_gateway_pb2.SubscribeEventsRequest(min_severity=severity_number(wanted.least))
     if wanted.after is not None:
         request.after.run_id, request.after.sequence = wanted.after.run_id, wanted.after.sequence
@@ -155,7 +155,7 @@ GET_SYSTEM_STATUS: Final[Method[None, SystemStatus]] = Method(
     "GetSystemStatus", _encode_status_request, _decode_status, idempotent=True
 )
 # A wish names the state that is wanted, not a change: to wish twice is to wish once.
-SET_PREVIEW_MODE: Final[Method[PreviewWish, PreviewChange]] = Method(
+SET_PREVIEW_MODE: Final[Method[PreviewRequest, PreviewChange]] = Method(
     "SetPreviewMode", _encode_preview_wish, _decode_preview_change, idempotent=True
 )
 GET_OVERLAY_SNAPSHOT: Final[Method[None, OverlaySnapshot]] = Method(
@@ -168,7 +168,7 @@ PING: Final[Method[None, RobotTime]] = Method("Ping", _encode_ping_request, _dec
 WATCH_SYSTEM_STATUS: Final[Method[float, WatchedStatus]] = Method(
     "WatchSystemStatus", _encode_watch_request, _decode_watched, idempotent=True
 )
-SUBSCRIBE_EVENTS: Final[Method[EventsWanted, Event | EventGap | CaughtUp | None]] = Method(
+SUBSCRIBE_EVENTS: Final[Method[EventsRequest, Event | EventGap | CaughtUp | None]] = Method(
     "SubscribeEvents", _encode_events_request, _decode_event_item, idempotent=True
 )
 METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT, GET_GATEWAY_INFO, PING)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from gateway.rpc.tally import Counts
+from gateway.rpc.interceptors.stats import MethodStats
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Snapshot
 from omniseer.gateway.v1 import gateway_info_pb2 as pb
@@ -23,7 +23,7 @@ def gateway_facts(runtime: Runtime) -> pb.GatewayFacts:
 
 
 def gateway_info(
-    snapshot: Snapshot, methods: Mapping[str, Counts], wall_clock_unix_ms: int, configuration_json: str
+    snapshot: Snapshot, methods: Mapping[str, MethodStats], wall_clock_unix_ms: int, configuration_json: str
 ) -> GetGatewayInfoResponse:
     """Everything about the gateway program."""
     return GetGatewayInfoResponse(

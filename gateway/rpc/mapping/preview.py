@@ -3,8 +3,8 @@
 from typing import Final
 
 from common.bind import bracketed
-from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
+from gateway.rpc.recipient import Recipient
 from gateway.status.freshness import Sample
 from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
@@ -20,15 +20,17 @@ _NO_STREAM: Final = Stream(
 )
 
 
-def preview_status(preview: PreviewView, measured: Sample[Measurement], caller: Caller) -> pb.PreviewStatus:
-    """The preview as `caller` may see it."""
+def preview_status(
+    preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
+) -> pb.PreviewStatus:
+    """The preview as `recipient` may see it."""
     stream = preview.stream or _NO_STREAM
     encoder = preview.encoder
     return pb.PreviewStatus(
         state=PREVIEW_STATES[preview.state],
         profile=PROFILES[preview.profile],
         last_error=preview.last_error,
-        endpoint=_endpoint(preview.listener, stream, preview.passphrase, caller)
+        endpoint=_endpoint(preview.listener, stream, preview.passphrase, recipient)
         if preview.listener
         else None,
         encoder=_encoder(encoder, stream) if encoder else None,
@@ -41,17 +43,18 @@ def preview_status(preview: PreviewView, measured: Sample[Measurement], caller: 
     )
 
 
-def _endpoint(listener: Listener, stream: Stream, passphrase: str, caller: Caller) -> pb.StreamEndpoint:
+def _endpoint(listener: Listener, stream: Stream, passphrase: str, recipient: Recipient) -> pb.StreamEndpoint:
     encrypted = stream.encrypted or bool(passphrase)
+    host = recipient.robot_host
     return pb.StreamEndpoint(
         transport=pb.STREAM_TRANSPORT_SRT,
-        host=caller.robot_host,
+        host=host,
         port=listener.port,
-        uri=f"srt://{bracketed(caller.robot_host)}:{listener.port}?mode=caller&latency={listener.latency_ms}",
+        uri=f"srt://{bracketed(host)}:{listener.port}?mode=caller&latency={listener.latency_ms}",
         latency_ms=listener.latency_ms,
         codec=CODECS[stream.codec],
         container=pb.STREAM_CONTAINER_MPEG_TS,
-        passphrase=passphrase if caller.may_watch else "",
+        passphrase=passphrase if recipient.sees_passphrase else "",
         encrypted=encrypted,
     )
 

@@ -3,13 +3,13 @@
 import math
 from typing import Final
 
-from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import HEALTH_STATES
 from gateway.rpc.mapping.faults import fault_message
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.sources import source_status
+from gateway.rpc.recipient import Recipient
 from gateway.status.command import Command
 from gateway.status.events import OperatorEvent
 from gateway.status.freshness import Sample
@@ -21,7 +21,7 @@ from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
 _NOBODY: Final = "unknown"
 
 
-def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.SystemStatus:
+def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2.SystemStatus:
     """Everything but detections and events.
 
     `teleop` stays unset: this gateway has no such values, and unset reads as "not available".
@@ -29,7 +29,7 @@ def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.Syste
     return system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
         gateway_version=snapshot.identity.version,
-        preview=preview_status(snapshot.preview, snapshot.preview_measured, caller),
+        preview=preview_status(snapshot.preview, snapshot.preview_measured, recipient),
         vision=_vision(snapshot.vision),
         health=_health(snapshot),
         platform=platform_status(snapshot),
@@ -42,10 +42,10 @@ def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.Syste
     )
 
 
-def overlay_snapshot(snapshot: Snapshot, caller: Caller) -> overlay_pb2.OverlaySnapshot:
+def overlay_snapshot(snapshot: Snapshot, recipient: Recipient) -> overlay_pb2.OverlaySnapshot:
     """Everything, from the same instant."""
     return overlay_pb2.OverlaySnapshot(
-        status=system_status(snapshot, caller),
+        status=system_status(snapshot, recipient),
         detections=_detections(snapshot.detections),
         events=[_event(event, snapshot.at_s) for event in snapshot.events],
     )

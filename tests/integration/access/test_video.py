@@ -55,7 +55,7 @@ async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Pa
             await eventually(
                 switched, lambda reply: reply.preview.state == PREVIEW_RUNNING, "the preview is running"
             )
-            passphrase = double.wishes[-1].passphrase
+            passphrase = double.applied[-1].passphrase
             assert len(passphrase) >= 10
             status = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=shown, timeout=5)
             overlay = await calls.GetOverlaySnapshot(GetOverlaySnapshotRequest(), metadata=shown, timeout=5)
@@ -90,12 +90,12 @@ async def test_who_is_let_in_no_more_knows_a_passphrase_that_is_worth_nothing(tm
             await calls.SetPreviewMode(SetPreviewModeRequest(enabled=True), metadata=shown, timeout=5)
             await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=bens.metadata(), timeout=5)
 
-            async def wishes() -> list[Any]:
-                return list(double.wishes)
+            async def applied() -> list[Any]:
+                return list(double.applied)
 
-            (before,) = await eventually(wishes, len, "the wish has arrived")
+            (before,) = await eventually(applied, len, "the request has arrived")
             robot.keeper.revoke(ben.credential_id)
-            known = await eventually(wishes, lambda seen: len(seen) > 1, "another wish")
+            known = await eventually(applied, lambda seen: len(seen) > 1, "another request")
             assert [each.enabled for each in known] == [True, True]
             assert known[1].passphrase not in {"", before.passphrase}
             assert (await status()).preview.endpoint.passphrase == known[1].passphrase
@@ -124,7 +124,7 @@ async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, o
                 lambda reply: reply.preview.state == PREVIEW_RUNNING,
                 "the preview is running",
             )
-            assert (await near.status()).preview.endpoint.passphrase == double.wishes[-1].passphrase
+            assert (await near.status()).preview.endpoint.passphrase == double.applied[-1].passphrase
             endpoint = (await far.status()).preview.endpoint
             assert endpoint.encrypted
             assert not endpoint.passphrase

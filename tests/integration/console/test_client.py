@@ -216,7 +216,7 @@ def test_what_must_not_happen_twice_is_asked_once(
     robot: Face, double: GatewayDouble, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     once = replace(GET_SYSTEM_STATUS, idempotent=False)
-    monkeypatch.setattr("console.client.exchange.GET_SYSTEM_STATUS", once)
+    monkeypatch.setattr("console.client.aio.GET_SYSTEM_STATUS", once)
     double.failures.append(UNAVAILABLE)
     with pytest.raises(Unreachable):
         robot.status()

@@ -23,6 +23,7 @@ from console.client.options import Backoff, ClientOptions
 from tests.support.bad_links import Relay
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.waiting import wait_until
 
 QUICK = ClientOptions(stream_backoff=Backoff(first_s=0.02, longest_s=0.1))
 
@@ -83,16 +84,20 @@ def test_closing_the_client_ends_its_streams(gateway: GatewayProgram) -> None:
     closing.join()
 
 
-def test_a_stream_that_nobody_reads_any_more_leaves_no_thread(gateway: GatewayProgram) -> None:
+def test_a_stream_that_is_not_read_any_more_ends_on_the_robot(gateway: GatewayProgram) -> None:
     with GatewayClient(f"127.0.0.1:{gateway.port}") as client:
         stream = client.watch_status()
         next_status(stream)
-        assert any(thread.name == "gateway-stream" for thread in threading.enumerate())
+        assert tasks_of(client) == 1
         stream.close()  # type: ignore[attr-defined]  # it is a generator
-        for thread in threading.enumerate():
-            if thread.name == "gateway-stream":
-                thread.join(10)
-                assert not thread.is_alive()
+        wait_until(lambda: tasks_of(client) == 0, "the stream's task has ended")
+    assert not any(thread.name == "gateway-client" for thread in threading.enumerate())
+
+
+def tasks_of(client: GatewayClient) -> int:
+    """How many streams the client receives."""
+    loop = client._loop._loop
+    return sum(task.get_name() == "gateway-stream" for task in asyncio.all_tasks(loop))
 
 
 async def test_the_asyncio_client_does_the_same(gateway: GatewayProgram) -> None:

@@ -72,14 +72,6 @@ def test_the_overlay_has_the_newest_few_with_a_count_of_its_own() -> None:
     assert log.sequence == 2 * (ON_OVERLAY + 3)
 
 
-def test_the_listener_hears_of_every_event() -> None:
-    log, heard = EventLog("run"), []
-    log.on_event = lambda: heard.append(log.sequence)
-    log.add(news("one"), 0.0)
-    log.add(news("two"), 0.0)
-    assert heard == [1, 2]
-
-
 class Subscriber:
     """Keeps what it is told, as a client would, and can prove that nothing is missing in silence."""
 

@@ -10,14 +10,14 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
-from gateway.preview_link import wire
-from gateway.rpc.caller import Caller
-from gateway.rpc.controls import Controls
+from gateway.links.preview import wire
+from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.server import SERVICE, changes_the_robot, method_handlers
-from gateway.rpc.tally import Counts, Tally
+from gateway.rpc.methods import method_at
+from gateway.rpc.recipient import Recipient
+from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board, SourceKind
 from gateway.status.events import OperatorEvent
 from gateway.status.faults.fault import Condition, Fault, Severity
@@ -60,7 +60,7 @@ from omniseer.gateway.v1 import (
 from omniseer.preview.v1 import preview_service_pb2
 
 NOW_S = 1000.0
-CALLER = Caller(robot_host="10.1.2.3", may_watch=True)
+CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
 FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "look at it")
 NOT_SERVED = {
     # Declared by the locked contract, implemented with teleoperation.
@@ -104,24 +104,22 @@ def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
 def test_every_method_of_the_contract_has_a_handler() -> None:
     service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
     assert service.full_name == SERVICE
-    handlers = method_handlers(_AnyGateway())  # type: ignore[arg-type]  # only bound, never called
-    assert set(handlers) == {method.name for method in service.methods}
-    for method in service.methods:
-        assert handlers[method.name].response_streaming is method.server_streaming
+    anything: Any = _AnyService()
+    methods = Services(anything, anything, anything, anything).methods()
+    assert set(methods) == {method.name for method in service.methods}
 
 
-def test_who_may_only_look_changes_nothing() -> None:
+def test_a_viewer_can_change_nothing() -> None:
     methods = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods_by_name
-    assert {name for name in methods if changes_the_robot(name)} == {"SetPreviewMode"}
+    changing = {name for name in methods if method_at(f"/{SERVICE}/{name}").changes_robot}
+    assert changing == {"SetPreviewMode"}
 
 
-class _AnyGateway:
-    """Has whatever it is asked for."""
-
-    tally, controls = Tally(), Controls(lambda _: None)
+class _AnyService:
+    """Has every method."""
 
     def __getattr__(self, name: str) -> Any:
-        return _AnyGateway()
+        return name
 
 
 def everything() -> Snapshot:
@@ -204,7 +202,7 @@ def test_a_full_snapshot_sets_every_field_of_the_contract() -> None:
 
 
 def test_the_info_sets_every_field_of_its_answer() -> None:
-    info = gateway_info(everything(), {"GetSystemStatus": Counts(3, 2, 1)}, 1_700_000_000_000, "{}")
+    info = gateway_info(everything(), {"GetSystemStatus": MethodStats(3, 2, 1)}, 1_700_000_000_000, "{}")
     assert not list(unset(info, robot_gateway_pb2.GetGatewayInfoResponse.DESCRIPTOR))
 
 
@@ -232,8 +230,8 @@ def test_an_active_fault_has_no_end_and_one_that_is_over_has() -> None:
     assert (over.active, over.age_ms, over.cleared_age_ms) == (False, 13_000, 10_000)
 
 
-def test_the_passphrase_goes_only_to_those_who_may_watch() -> None:
-    stranger = Caller(robot_host="fe80::1", may_watch=False)
+def test_the_passphrase_goes_only_to_those_who_sees_passphrase() -> None:
+    stranger = Recipient(robot_host="fe80::1", sees_passphrase=False)
     overlay = overlay_snapshot(everything(), stranger)
     assert overlay.status.preview.endpoint.encrypted
     assert overlay.status.preview.endpoint.passphrase == ""

@@ -1,0 +1,182 @@
+"""The gRPC channel of a client: methods in, results or `GatewayError`s out. Belongs to one asyncio loop."""
+
+import asyncio
+from collections import deque
+from collections.abc import Mapping
+from typing import Any, Final, TypeVar
+
+import grpc
+
+from console.client.credentials import Credentials
+from console.client.error_table import error_from, stream_error_from
+from console.client.errors import Cancelled, DeadlineExceeded, GatewayError
+from console.client.mapping.methods import METHODS, STREAMS, Method
+from console.client.options import ClientOptions
+
+RequestT = TypeVar("RequestT")
+ResultT = TypeVar("ResultT")
+
+_MOST_WAITING: Final = 64
+"""Unread items of a lossless stream; from there on HTTP/2 flow control holds the gateway back."""
+
+
+class GrpcTransport:
+    """One channel. It connects at the first call and reconnects whenever the connection breaks.
+
+    Args:
+        target: HOST:PORT of the gateway.
+        options: Keepalive and connection deadlines.
+        credentials: Sent with every call.
+
+    Raises:
+        UserError: The credentials would be sent in the clear.
+    """
+
+    def __init__(self, target: str, options: ClientOptions, credentials: Credentials) -> None:
+        self._target = target
+        self._metadata = credentials.metadata()
+        encryption = credentials.channel_credentials(target)
+        arguments = options.channel_options()
+        self._channel = (
+            grpc.aio.secure_channel(target, encryption, options=arguments)
+            if encryption
+            else grpc.aio.insecure_channel(target, options=arguments)
+        )
+        self._calls = _by_name(self._channel.unary_unary, METHODS)
+        self._streams = _by_name(self._channel.unary_stream, STREAMS)
+        self._closed = asyncio.Event()
+
+    async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
+        """Returns the result of one attempt at a unary call.
+
+        Raises:
+            GatewayError: The attempt failed, or the client is closed.
+        """
+        self.check_open()
+        try:
+            result: ResultT = await self._calls[method.name](
+                request, timeout=timeout_s, metadata=self._metadata
+            )
+        except grpc.RpcError as failure:
+            raise error_from(failure, self._target, timeout_s) from None
+        except asyncio.CancelledError:
+            # gRPC raises it, too, when another task closed the channel under this call.
+            if not self._closed.is_set() or _being_cancelled():
+                raise
+            raise Cancelled("this client was closed") from None
+        return result
+
+    def open(self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool) -> "Responses":
+        """Starts a server-streaming call.
+
+        Args:
+            method: One of `STREAMS`.
+            request: Its request.
+            newest_only: Whether an unread item is replaced by a newer one.
+
+        Raises:
+            Cancelled: The client is closed.
+        """
+        self.check_open()
+        call = self._streams[method.name](request, metadata=self._metadata)
+        return Responses(call, self, newest_only=newest_only)
+
+    async def sleep(self, seconds: float) -> None:
+        """Sleeps.
+
+        Raises:
+            Cancelled: The client was closed meanwhile.
+        """
+        try:
+            async with asyncio.timeout(seconds):
+                await self._closed.wait()
+        except TimeoutError:
+            return
+        self.check_open()
+
+    def check_open(self) -> None:
+        """Raises `Cancelled` once the client is closed."""
+        if self._closed.is_set():
+            raise Cancelled("this client is closed")
+
+    def end_of_stream(self, failure: grpc.RpcError | None) -> GatewayError:
+        """Returns the error for a stream that the other side ended; without failure, for an orderly end."""
+        error = error_from(failure, self._target, 0.0) if failure else None
+        return stream_error_from(error, self._target)
+
+    async def close(self) -> None:
+        """Closes the channel. Pending calls and streams end with `Cancelled`."""
+        self._closed.set()
+        await self._channel.close()
+
+
+class Responses:
+    """The items of one server-streaming call, received by a task of its own."""
+
+    def __init__(self, call: Any, transport: GrpcTransport, *, newest_only: bool) -> None:
+        self._transport = transport
+        self._capacity = None if newest_only else _MOST_WAITING
+        self._items: deque[Any] = deque(maxlen=1 if newest_only else None)
+        self._error: GatewayError | None = None
+        self._changed = asyncio.Condition()
+        self._task = asyncio.create_task(self._receive(call), name="gateway-stream")
+
+    async def read(self, within_s: float) -> Any:
+        """Returns the next item.
+
+        Raises:
+            GatewayError: The stream ended, the client is closed, or nothing came within `within_s` seconds.
+        """
+        self._transport.check_open()
+        try:
+            async with asyncio.timeout(within_s), self._changed:
+                await self._changed.wait_for(lambda: self._items or self._error)
+                if not self._items:
+                    assert self._error, "the condition that was waited for"
+                    raise self._error
+                self._changed.notify_all()
+                return self._items.popleft()
+        except TimeoutError:
+            raise DeadlineExceeded(f"the robot gateway sent nothing for {within_s:.1f} s") from None
+
+    def cancel(self) -> None:
+        """Ends the call."""
+        self._task.cancel()
+
+    async def _receive(self, call: Any) -> None:
+        error: GatewayError
+        try:
+            async for item in call:
+                async with self._changed:
+                    await self._changed.wait_for(self._has_room)
+                    self._items.append(item)
+                    self._changed.notify_all()
+            error = self._transport.end_of_stream(None)
+        except grpc.RpcError as failure:
+            error = self._transport.end_of_stream(failure)
+        except asyncio.CancelledError:
+            call.cancel()
+            # gRPC raises it, too, when the channel was closed under the call.
+            if self._task.cancelling():
+                raise
+            error = Cancelled("this client was closed")
+        async with self._changed:
+            self._error = error
+            self._changed.notify_all()
+
+    def _has_room(self) -> bool:
+        return self._capacity is None or len(self._items) < self._capacity
+
+
+def _by_name(multicallable: Any, methods: tuple[Method[Any, Any], ...]) -> Mapping[str, Any]:
+    return {
+        method.name: multicallable(
+            method.path, request_serializer=method.encode, response_deserializer=method.decode
+        )
+        for method in methods
+    }
+
+
+def _being_cancelled() -> bool:
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0

@@ -1,0 +1,1 @@
+"""How a status reads for people, in a terminal as in a window. Pure text: needs neither of them."""

@@ -1,0 +1,51 @@
+"""The four styles that a value is presented in, by severity."""
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import Final
+
+from console.client.results import FaultSeverity, Freshness, HealthState, PreviewState
+
+
+class SeverityStyle(Enum):
+    """Selects a colour. Colour never stands alone: the text beside it says the same."""
+
+    GOOD = "good"
+    QUIET = "quiet"
+    WARNING = "warning"
+    BAD = "bad"
+
+
+FAULT_STYLES: Final[Mapping[FaultSeverity, SeverityStyle]] = MappingProxyType(
+    {
+        FaultSeverity.ERROR: SeverityStyle.BAD,
+        FaultSeverity.WARNING: SeverityStyle.WARNING,
+        FaultSeverity.INFO: SeverityStyle.QUIET,
+        FaultSeverity.UNKNOWN: SeverityStyle.WARNING,
+    }
+)
+FRESHNESS_STYLES: Final[Mapping[Freshness, SeverityStyle]] = MappingProxyType(
+    {
+        Freshness.FRESH: SeverityStyle.GOOD,
+        Freshness.STALE: SeverityStyle.WARNING,
+        Freshness.MISSING: SeverityStyle.QUIET,
+    }
+)
+HEALTH_STYLES: Final[Mapping[HealthState, SeverityStyle]] = MappingProxyType(
+    {
+        HealthState.OK: SeverityStyle.GOOD,
+        HealthState.DEGRADED: SeverityStyle.WARNING,
+        HealthState.UNKNOWN: SeverityStyle.QUIET,
+    }
+)
+PREVIEW_STYLES: Final[Mapping[PreviewState, SeverityStyle]] = MappingProxyType(
+    {
+        PreviewState.RUNNING: SeverityStyle.GOOD,
+        PreviewState.STARTING: SeverityStyle.WARNING,
+        PreviewState.STOPPING: SeverityStyle.WARNING,
+        PreviewState.FAULTED: SeverityStyle.BAD,
+        PreviewState.DISABLED: SeverityStyle.QUIET,
+        PreviewState.UNKNOWN: SeverityStyle.QUIET,
+    }
+)

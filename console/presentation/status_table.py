@@ -1,0 +1,386 @@
+"""The one table of a robot's status: which rows there are, in which order, and what each says.
+
+A terminal shows the whole of it with full texts; the monitor's side panel shows the compact density, because
+health, faults and preview have places of their own in the window.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Flag, auto
+from typing import Any, Final
+
+from console.client.results import (
+    Battery,
+    Compute,
+    Detections,
+    EffectiveCommand,
+    Freshness,
+    Mission,
+    Network,
+    Odometry,
+    PreviewMeasurement,
+    PreviewState,
+    PreviewStatus,
+    Sample,
+    SourceState,
+    SystemStatus,
+    TeleopState,
+    Vision,
+)
+from console.presentation.formatting import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
+from console.presentation.severity_style import (
+    FAULT_STYLES,
+    FRESHNESS_STYLES,
+    HEALTH_STYLES,
+    PREVIEW_STYLES,
+    SeverityStyle,
+)
+
+
+class Density(Flag):
+    """How much room there is."""
+
+    FULL = auto()
+    COMPACT = auto()
+
+
+BOTH: Final = Density.FULL | Density.COMPACT
+_MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
+_UNREADABLE: Final = (SourceState.QOS_MISMATCH, SourceState.WRONG_TYPE, SourceState.TYPE_MISSING)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table."""
+
+    label: str
+    mark: str
+    """One word: "fresh", "STALE", "no data", "RUNNING" ..."""
+    style: SeverityStyle
+    text: str
+    age: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A status, and how it is looked at.
+
+    Args:
+        status: The newest one.
+        detections: The newest ones; None where the view has none.
+        density: One of the two.
+        silent_ms: Time since the status was received; ages count on by it.
+        outdated: Whether that is so long that fresh values count as stale.
+    """
+
+    status: SystemStatus
+    density: Density = Density.FULL
+    detections: Detections | None = None
+    silent_ms: int = 0
+    outdated: bool = False
+
+    @property
+    def compact(self) -> bool:
+        """Whether texts must be short."""
+        return self.density is Density.COMPACT
+
+    def age(self, age_ms: int | None) -> str:
+        """Returns an age as of now; empty in the compact density where there is none."""
+        if age_ms is None:
+            return "" if self.compact else UNKNOWN
+        return age(age_ms + self.silent_ms)
+
+    def label(self, label: str) -> str:
+        """Returns the label as the density writes it."""
+        return label.capitalize() if self.compact else label
+
+    def measured(self, label: str, sample: Sample, text: str) -> Row:
+        """Returns the row of a measured part: marked by its freshness, empty while it is missing."""
+        freshness = sample.freshness
+        if freshness is Freshness.FRESH and self.outdated:
+            freshness = Freshness.STALE
+        text = text if sample.available else ""
+        return Row(
+            self.label(label),
+            _MARKS[freshness],
+            FRESHNESS_STYLES[freshness],
+            _unbroken(text) if self.compact else text,
+            self.age(sample.age_ms),
+        )
+
+
+def table_rows(view: View) -> list[Row]:
+    """Returns the rows of the table, the most important first."""
+    return [row for entry in TABLE if view.density in entry.density for row in entry.rows(view)]
+
+
+def status_rows(status: SystemStatus) -> list[Row]:
+    """Returns all rows with their full texts."""
+    return table_rows(View(status))
+
+
+def preview_rows(preview: PreviewStatus) -> Iterator[Row]:
+    """Yields the preview's state, then its error, fallback, figures and address as far as there are any."""
+    yield Row(
+        "preview", preview.state.value.upper(), PREVIEW_STYLES[preview.state], _preview_summary(preview)
+    )
+    if preview.last_error:
+        yield Row("", "error", SeverityStyle.BAD, preview.last_error)
+    if preview.encoder and preview.encoder.fallback_reason:
+        reason = f"wanted {preview.encoder.wanted}, {preview.encoder.fallback_reason}"
+        yield Row("", "fallback", SeverityStyle.WARNING, reason)
+    if preview.bitrate_reason:
+        yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
+    if preview.measured.available:
+        freshness = preview.measured.freshness
+        text = _stream(preview.measured, preview.target_bitrate_kbps)
+        stream_age = age(preview.measured.age_ms)
+        yield Row("stream", _MARKS[freshness], FRESHNESS_STYLES[freshness], text, stream_age)
+    if preview.endpoint and preview.state is PreviewState.RUNNING:
+        encryption = "encrypted" if preview.endpoint.encrypted else ""
+        latency = f"latency {preview.endpoint.latency_ms} ms"
+        yield Row("", "watch", SeverityStyle.QUIET, joined(preview.endpoint.uri, latency, encryption))
+
+
+def _health(view: View) -> Iterator[Row]:
+    health = view.status.health
+    yield Row("health", health.state.value.upper(), HEALTH_STYLES[health.state], health.summary)
+
+
+def _faults(view: View) -> Iterator[Row]:
+    for fault in view.status.faults:
+        if fault.active:
+            text = f"{fault.message} -> {fault.remedy}" if fault.remedy else fault.message
+            yield Row(
+                "fault", fault.severity.value, FAULT_STYLES[fault.severity], text, view.age(fault.age_ms)
+            )
+        else:
+            cleared_age = view.age(fault.cleared_age_ms)
+            yield Row("fault", "cleared", SeverityStyle.QUIET, fault.message, cleared_age)
+
+
+def _preview(view: View) -> Iterator[Row]:
+    return preview_rows(view.status.preview)
+
+
+def _objects(view: View) -> Iterator[Row]:
+    configured = {source.name for source in view.status.sources}
+    # An older gateway does not list its sources.
+    if view.detections and (not configured or "detections" in configured):
+        yield view.measured("objects", view.detections, plural(view.detections.count, "object"))
+
+
+def _access(view: View) -> Iterator[Row]:
+    if view.status.insecure:
+        risk = "not encrypted, any computer on the network can switch the preview"
+        yield Row(view.label("access"), "OPEN", SeverityStyle.WARNING, risk)
+
+
+def _sources(view: View) -> Iterator[Row]:
+    for source in view.status.sources:
+        if view.compact:
+            # The other rows show that a value is missing; this one, that it can never come.
+            if source.state in _UNREADABLE:
+                style = SeverityStyle.WARNING if source.required else SeverityStyle.QUIET
+                label = view.label(source.name.replace("_", " "))
+                yield Row(label, "no data", style, source.detail, view.age(source.age_ms))
+        elif source.state is not SourceState.RECEIVING and source.detail not in _fault_messages(view.status):
+            mark = source.state.value.replace("_", " ")
+            text = source.detail or source.name
+            yield Row("source", mark, SeverityStyle.QUIET, text, view.age(source.age_ms))
+
+
+def _fault_messages(status: SystemStatus) -> set[str]:
+    return {fault.message for fault in status.faults if fault.active}
+
+
+def _gateway(view: View) -> Iterator[Row]:
+    gateway = view.status.gateway
+    # An older gateway does not report its uptime; a silent one may not be up any more.
+    if gateway.uptime_ms is None or view.outdated:
+        return
+    text = plural(gateway.client_count, "client")
+    if not view.compact:
+        text = joined(
+            text,
+            plural(gateway.requests_served, "answer"),
+            plural(gateway.requests_refused, "refusal") if gateway.requests_refused else "",
+            f"revision {gateway.revision[:12]}" if gateway.revision else "",
+        )
+    yield Row(view.label("gateway"), "up", SeverityStyle.QUIET, text, view.age(gateway.uptime_ms))
+
+
+def _teleop(view: View) -> Iterator[Row]:
+    teleop = view.status.teleop
+    if teleop.state is TeleopState.UNKNOWN:
+        return
+    linear, angular = quantity(teleop.max_linear_mps, "m/s"), quantity(teleop.max_angular_rad_s, "rad/s")
+    limits = f"at most {linear}, {angular}"
+    style = SeverityStyle.GOOD if teleop.enabled else SeverityStyle.QUIET
+    text = joined(_unbroken(limits) if view.compact else limits, teleop.last_error)
+    command_age = "" if view.compact else view.age(teleop.last_command.age_ms)
+    yield Row(view.label("teleop"), teleop.state.value.upper(), style, text, command_age)
+
+
+def _motion(odometry: Odometry, compact: bool) -> str:
+    return joined(
+        quantity(odometry.linear_speed_mps, "m/s", 2),
+        "" if compact else f"forward {signed(odometry.vx_mps)} m/s",
+        "" if compact else f"left {signed(odometry.vy_mps)} m/s",
+        f"turning {signed(odometry.wz_rad_s)} rad/s",
+    )
+
+
+def _vision(vision: Vision, compact: bool) -> str:
+    inference = f"inference {quantity(vision.last_infer_ms, 'ms')}"
+    errors, fatal = vision.infer_error_count or 0, vision.capture_fatal_error_count or 0
+    if compact:
+        return joined(
+            quantity(vision.consumer_fps, "fps"),
+            inference,
+            plural(errors + fatal, "error") if errors + fatal else "",
+        )
+    return joined(
+        f"camera {quantity(vision.producer_fps, 'fps')}",
+        f"evaluated {quantity(vision.consumer_fps, 'fps')}",
+        inference,
+        plural(errors, "inference error") if errors else "",
+        plural(fatal, "camera error") if fatal else "",
+    )
+
+
+def _battery(battery: Battery, compact: bool) -> str:
+    if battery.present is False:
+        return "not installed"
+    return joined(
+        quantity(battery.charge_percent, "%", 0),
+        "" if compact and battery.voltage_v is None else quantity(battery.voltage_v, "V"),
+        {True: "charging", False: "discharging", None: ""}[battery.charging],
+        "" if compact else battery.source or "",
+    )
+
+
+def _command(command: EffectiveCommand, compact: bool) -> str:
+    source = command.active_source or "unknown"
+    forward, turning = f"{signed(command.vx_mps)} m/s", f"{signed(command.wz_rad_s)} rad/s"
+    if compact:
+        return joined(source, forward, turning)
+    left = f"left {signed(command.vy_mps)} m/s"
+    return joined(f"from {source}", f"forward {forward}", left, f"turning {turning}")
+
+
+def _mode(mission: Mission, _compact: bool) -> str:
+    return mission.mode or ""
+
+
+def _compute(compute: Compute, compact: bool) -> str:
+    temperature, disk = compute.cpu_temperature_c, compute.disk_used_percent
+    used, total = gibibytes(compute.ram_used_bytes), gibibytes(compute.ram_total_bytes)
+    return joined(
+        f"CPU {quantity(compute.cpu_percent, '%', 0)}",
+        "" if temperature is None else quantity(temperature, "°C", 0),
+        "throttled by heat" if compute.thermal_throttled else "",
+        f"memory {quantity(compute.ram_used_percent, '%', 0) if compact else f'{used} of {total}'}",
+        "" if disk is None else f"disk {quantity(disk, '%', 0)}",
+    )
+
+
+def _network(network: Network, compact: bool) -> str:
+    signal, quality = network.wifi_signal_dbm, network.link_quality_percent
+    return joined(
+        network.interface_name or ("" if compact else UNKNOWN),
+        "connected" if network.connected else "not connected",
+        "" if signal is None else f"{signal} dBm",
+        "" if compact or quality is None else f"link quality {quality} %",
+    )
+
+
+def _video(measured: PreviewMeasurement, _compact: bool) -> str:
+    return joined(
+        quantity(measured.fps, "fps", 0),
+        quantity(measured.bitrate_kbps, "kbit/s", 0),
+        plural(measured.viewer_count, "viewer"),
+        f"loss {quantity(measured.worst_loss_percent, '%')}" if measured.worst_loss_percent else "",
+    )
+
+
+def _stream(measured: PreviewMeasurement, target_kbps: int) -> str:
+    return joined(
+        f"{quantity(measured.bitrate_kbps, 'kbit/s', 0)} of {target_kbps}",
+        quantity(measured.fps, "fps"),
+        plural(measured.viewer_count, "viewer"),
+        "" if measured.worst_rtt_ms is None else f"round trip {quantity(measured.worst_rtt_ms, 'ms')}",
+        "" if measured.worst_loss_percent is None else f"loss {quantity(measured.worst_loss_percent, '%')}",
+    )
+
+
+def _preview_summary(preview: PreviewStatus) -> str:
+    encoder, video = preview.encoder, preview.video
+    return joined(
+        preview.profile.value if preview.profile.value != "unknown" else "",
+        f"{video.width_px}x{video.height_px} at {video.fps:g} fps" if video else "",
+        f"{encoder.name} ({'hardware' if encoder.hardware else 'software'})" if encoder else "",
+        "" if preview.service_reachable else "preview service not reachable",
+        plural(preview.counters.faults, "fault") if preview.counters.faults else "",
+    )
+
+
+def _unbroken(text: str) -> str:
+    """Returns the text with line breaks possible behind commas only, never between a number and its unit."""
+    return ", ".join(part.replace(" ", "\u00a0") for part in text.split(", "))
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One entry of the table.
+
+    Args:
+        rows: Makes its rows; none where it has nothing to show.
+        density: The densities that show it.
+    """
+
+    rows: Callable[[View], Iterator[Row]]
+    density: Density = BOTH
+
+
+def _measured(
+    label: str,
+    sample: Callable[[SystemStatus], Any],
+    text: Callable[[Any, bool], str],
+    density: Density = BOTH,
+    *,
+    optional: bool = False,
+) -> Entry:
+    """Returns the entry of one measured part; an optional one has no row on a robot that never reports it."""
+
+    def rows(view: View) -> Iterator[Row]:
+        part = sample(view.status)
+        row = view.measured(label, part, text(part, view.compact))
+        if row.text or not optional:
+            yield row
+
+    return Entry(rows, density)
+
+
+TABLE: Final = (
+    Entry(_health, Density.FULL),
+    Entry(_faults, Density.FULL),
+    _measured("motion", lambda status: status.odometry, _motion),
+    _measured("vision", lambda status: status.vision, _vision),
+    Entry(_objects),
+    Entry(_preview, Density.FULL),
+    _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
+    _measured("command", lambda status: status.effective_command, _command, optional=True),
+    _measured("mode", lambda status: status.mission, _mode, optional=True),
+    _measured("computer", lambda status: status.platform.compute, _compute, optional=True),
+    _measured(
+        "computer battery", lambda status: status.platform.power.onboard_battery, _battery, optional=True
+    ),
+    _measured("network", lambda status: status.platform.network, _network, optional=True),
+    _measured("video", lambda status: status.preview.measured, _video, Density.COMPACT, optional=True),
+    Entry(_teleop),
+    Entry(_access),
+    Entry(_gateway),
+    Entry(_sources),
+)
+"""All rows, in the order of an operator's interest."""

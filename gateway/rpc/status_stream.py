@@ -1,0 +1,142 @@
+"""The status for all watchers: one snapshot per tick, serialised once for all who are due.
+
+A watcher has no queue. While its response is on the way it is not due; when it comes back it gets the newest.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final, NoReturn
+
+from gateway.rpc.mapping.status import system_status
+from gateway.rpc.ports import SnapshotSource
+from gateway.rpc.recipient import Recipient
+from gateway.rpc.response_cache import REUSE_S
+from gateway.status.change import essence
+from gateway.status.pace import TICK_MS, Pace
+from gateway.status.snapshot import Snapshot
+from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
+
+_TICK_S: Final = TICK_MS / 1000
+_GROUP_SIZE: Final = 4
+"""Watchers that are woken together: serving them takes some tenths of a millisecond."""
+_GROUP_SPACING_S: Final = 0.003
+_SPREAD_S: Final = _TICK_S * 0.9
+"""The last group of a tick is served before the next tick."""
+_NS_PER_S: Final = 1_000_000_000
+
+
+@dataclass(eq=False, slots=True)
+class _Watcher:
+    pace: Pace
+    wake: asyncio.Future[None] | None = None
+    """What it waits for; None while a response is on the way to it."""
+
+
+class StatusStream:
+    """Serves WatchSystemStatus on one event loop; without `run`, watchers get their first response only.
+
+    Args:
+        state: where snapshots come from.
+        clock: seconds, monotonic; the one that snapshots are dated by.
+    """
+
+    def __init__(self, state: SnapshotSource, clock: Callable[[], float]) -> None:
+        self._state = state
+        self._clock = clock
+        self._watchers: set[_Watcher] = set()
+        self._watched = asyncio.Event()
+        self._tick = 0
+        self._version = 0
+        self._snapshot = state.snapshot()
+        self._essence = essence(self._snapshot)
+        self._responses: dict[Recipient, bytes] = {}
+        self.skipped = 0
+        """Responses that came due while the one before was still on its way: those readers got newer ones."""
+
+    @property
+    def watcher_count(self) -> int:
+        """How many streams are open."""
+        return len(self._watchers)
+
+    async def run(self) -> NoReturn:
+        """Ticks while there are watchers, until cancelled."""
+        due_s = self._clock()
+        while True:
+            if not self._watchers:
+                self._watched.clear()
+                await self._watched.wait()
+            # After a stall the beat starts anew: missed ticks are not made up for.
+            due_s = max(due_s + _TICK_S, self._clock())
+            await asyncio.sleep(due_s - self._clock())
+            self._tick += 1
+            self._refresh()
+            self._wake_due()
+
+    async def responses(self, min_interval_ms: int, recipient: Recipient) -> AsyncIterator[bytes]:
+        """Yields serialised responses until the caller leaves: one at once, then whenever one is due."""
+        loop = asyncio.get_running_loop()
+        # A caller that has just switched the preview, and then watches, sees that in the first response.
+        self._refresh_if_older_than(REUSE_S)
+        with self._watching(min_interval_ms) as watcher:
+            while True:
+                yield self._newest(recipient)
+                # The next one may have come due while this one was on its way.
+                if not watcher.pace.due(self._tick, self._version):
+                    watcher.wake = loop.create_future()
+                    await watcher.wake
+                    watcher.wake = None
+                watcher.pace.given(self._tick, self._version)
+
+    @contextmanager
+    def _watching(self, min_interval_ms: int) -> Iterator[_Watcher]:
+        watcher = _Watcher(Pace(min_interval_ms, self._tick, self._version))
+        self._watchers.add(watcher)
+        self._watched.set()
+        try:
+            yield watcher
+        finally:
+            self._watchers.discard(watcher)
+
+    def _refresh(self) -> None:
+        self._snapshot = self._state.snapshot()
+        self._responses.clear()
+        seen = essence(self._snapshot)
+        if seen != self._essence:
+            self._essence = seen
+            self._version += 1
+
+    def _refresh_if_older_than(self, seconds: float) -> None:
+        if self._clock() - self._snapshot.at_s > seconds:
+            self._refresh()
+
+    def _newest(self, recipient: Recipient) -> bytes:
+        # Older than a tick only for the first watcher after a while, or when the loop was held up.
+        self._refresh_if_older_than(_TICK_S)
+        response = self._responses.get(recipient)
+        if response is None:
+            response = self._responses[recipient] = _serialised(self._snapshot, recipient)
+        return response
+
+    def _wake_due(self) -> None:
+        """Wakes groups spread over the tick: any other call waits for one group only."""
+        watchers = [each for each in self._watchers if each.pace.due(self._tick, self._version)]
+        due = [each.wake for each in watchers if each.wake is not None]
+        self.skipped += len(watchers) - len(due)
+        loop = asyncio.get_running_loop()
+        groups = [due[begin : begin + _GROUP_SIZE] for begin in range(0, len(due), _GROUP_SIZE)]
+        for number, group in enumerate(groups):
+            loop.call_later(number * min(_GROUP_SPACING_S, _SPREAD_S / len(groups)), _wake, group)
+
+
+def _wake(waiting: Iterable[asyncio.Future[None]]) -> None:
+    for each in waiting:
+        if not each.done():
+            each.set_result(None)
+
+
+def _serialised(snapshot: Snapshot, recipient: Recipient) -> bytes:
+    return WatchSystemStatusResponse(
+        status=system_status(snapshot, recipient), monotonic_ns=int(snapshot.at_s * _NS_PER_S)
+    ).SerializeToString()

@@ -1,0 +1,81 @@
+"""The compact density of the status table: what the side panel of a window shows."""
+
+from dataclasses import replace
+
+import pytest
+
+from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
+from console.presentation.severity_style import SeverityStyle
+from console.presentation.status_table import Density, Row, View, table_rows
+from omniseer.gateway.v1 import overlay_pb2, source_pb2
+from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.gateway_double import healthy_status
+
+
+@pytest.fixture
+def message() -> overlay_pb2.OverlaySnapshot:
+    return overlay_pb2.OverlaySnapshot(status=healthy_status())
+
+
+def view(message: overlay_pb2.OverlaySnapshot) -> View:
+    snapshot = GET_OVERLAY_SNAPSHOT.decode(message.SerializeToString())
+    return View(snapshot.status, Density.COMPACT, snapshot.detections)
+
+
+def by_label(view: View) -> dict[str, Row]:
+    return {row.label: row for row in table_rows(view)}
+
+
+def test_a_healthy_robot(message: overlay_pb2.OverlaySnapshot) -> None:
+    rows = by_label(view(message))
+    assert list(rows) == ["Motion", "Vision", "Objects", "Battery"]
+    assert rows["Motion"] == Row(
+        "Motion", "fresh", SeverityStyle.GOOD, "0.50\u00a0m/s, turning\u00a0+0.30\u00a0rad/s", "12 ms"
+    )
+    assert rows["Vision"].text == "29.5\u00a0fps, inference\u00a012.5\u00a0ms"
+    assert rows["Battery"].text == "78\u00a0%"
+    assert (rows["Objects"].mark, rows["Objects"].style) == ("no data", SeverityStyle.QUIET)
+
+
+def test_ages_count_on_and_fresh_values_become_stale(message: overlay_pb2.OverlaySnapshot) -> None:
+    later = replace(view(message), silent_ms=988)
+    assert (by_label(later)["Motion"].mark, by_label(later)["Motion"].age) == ("fresh", "1.0 s")
+    outdated = by_label(replace(later, outdated=True))
+    assert {row.mark for row in outdated.values()} == {"STALE", "no data"}
+    assert outdated["Motion"].style is SeverityStyle.WARNING
+
+
+def test_a_source_that_can_never_come_has_a_row(message: overlay_pb2.OverlaySnapshot) -> None:
+    for name, state in (
+        ("odometry", source_pb2.SOURCE_STATE_QOS_MISMATCH),
+        ("mux_input", source_pb2.SOURCE_STATE_SILENT),
+    ):
+        message.status.sources.add(name=name, state=state, required=True, detail=f"{name}: because")
+    rows = by_label(view(message))
+    assert rows["Odometry"] == Row("Odometry", "no data", SeverityStyle.WARNING, "odometry: because", "")
+    assert "Mux input" not in rows
+    assert "Objects" not in rows, "this robot has no detections configured"
+
+
+def test_how_the_robot_is_set_up(message: overlay_pb2.OverlaySnapshot) -> None:
+    message.status.insecure = True
+    message.status.teleop.state = states.TELEOP_ENABLED
+    message.status.teleop.enabled = True
+    message.status.teleop.max_linear_mps = 0.5
+    message.status.gateway.boot_id, message.status.gateway.uptime_ms = "a", 90_000
+    message.status.gateway.client_count = 2
+    rows = by_label(view(message))
+    assert (rows["Access"].mark, rows["Access"].style) == ("OPEN", SeverityStyle.WARNING)
+    assert (rows["Teleop"].mark, rows["Teleop"].style) == ("ENABLED", SeverityStyle.GOOD)
+    assert (rows["Gateway"].text, rows["Gateway"].age) == ("2 clients", "1 min 30 s")
+    assert "Gateway" not in by_label(replace(view(message), outdated=True)), "it may not be up any more"
+
+
+def test_a_row_never_breaks_between_a_number_and_its_unit(message: overlay_pb2.OverlaySnapshot) -> None:
+    compute = message.status.platform.compute
+    compute.available, compute.cpu_percent, compute.ram_used_percent = True, 34, 41
+    compute.cpu_temperature_available, compute.cpu_temperature_c = True, 51
+    compute.thermal_throttled_available = compute.thermal_throttled = True
+    text = by_label(view(message))["Computer"].text
+    assert text.replace("\u00a0", " ") == "CPU 34 %, 51 °C, throttled by heat, memory 41 %"
+    assert all("," in part for part in text.split(" ")[:-1])

@@ -1,0 +1,49 @@
+import pytest
+
+from console.presentation.formatting import age, gibibytes, joined, plural, quantity, signed
+
+
+@pytest.mark.parametrize(
+    ("age_ms", "text"),
+    [
+        (None, "-"),
+        (0, "0 ms"),
+        (999, "999 ms"),
+        (1000, "1.0 s"),
+        (59_900, "59.9 s"),
+        (60_000, "1 min 00 s"),
+        (125_000, "2 min 05 s"),
+        (3_600_000, "1 h 00 min"),
+        (11_520_000, "3 h 12 min"),
+    ],
+)
+def test_ages(age_ms: int | None, text: str) -> None:
+    assert age(age_ms) == text
+
+
+def test_numbers_carry_their_unit() -> None:
+    assert quantity(29.84, "fps") == "29.8 fps"
+    assert quantity(2500.4, "kbit/s", 0) == "2500 kbit/s"
+    assert quantity(None, "fps") == "-"
+    assert gibibytes(3 << 30) == "3.0 GiB"
+    assert gibibytes(None) == "-"
+
+
+def test_a_direction_has_a_sign_and_rest_has_none_of_its_own() -> None:
+    assert signed(0.5) == "+0.50"
+    assert signed(-0.5) == "-0.50"
+    assert signed(-0.001) == "+0.00"
+    assert signed(None) == "-"
+
+
+def test_counts() -> None:
+    assert [plural(n, "viewer") for n in (0, 1, 2, None)] == [
+        "0 viewers",
+        "1 viewer",
+        "2 viewers",
+        "- viewers",
+    ]
+
+
+def test_empty_parts_leave_no_comma() -> None:
+    assert joined("a", "", "b") == "a, b"
