@@ -13,10 +13,10 @@ from console.cli.options import JsonOption, RobotOption, TargetOption, session_o
 from console.cli.qt import needing_qt
 from console.cli.stopping import until_stopped
 from console.client import parse_target
-from console.monitor.renewed import Login
+from console.monitor.credential_refresh import LoadCredentials
 from console.receiver.recording import Recording
-from console.viewer.account import Account
 from console.viewer.headless import watch_headless
+from console.viewer.summary import ViewSummary
 
 _GSTREAMER: Final = (
     "Type: sudo apt-get install gir1.2-gst-plugins-base-1.0 gstreamer1.0-plugins-good"
@@ -78,14 +78,14 @@ def view(
                 patience_s=patience_s,
                 recording=recording,
                 stop=stopped.event,
-                login=session.credentials,
+                load=session.credentials,
             )
     if session.as_json:
         session.print_json(json_form(account))
     elif headless or recording:
         session.out.print(account.line(), soft_wrap=True)
-    if recording and recording.trouble:
-        raise recording.trouble
+    if recording and recording.error:
+        raise recording.error
 
 
 def _nothing() -> None:
@@ -99,7 +99,7 @@ def _need_gstreamer() -> None:
         raise UserError(f"video needs GStreamer: {error.what}", _GSTREAMER) from error
 
 
-def _window() -> Callable[[str, Recording | None, Login], Account]:
+def _window() -> Callable[[str, Recording | None, LoadCredentials], ViewSummary]:
     with needing_qt("--headless works without"):
         from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
     return run_view

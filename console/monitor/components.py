@@ -1,4 +1,4 @@
-"""The robot by component: one line each with a mark, the values and their age."""
+"""Formats the status by component: one line each with a mark, the values and their age."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from console.client.results import (
     TeleopState,
     Vision,
 )
-from console.monitor.state import MonitorState
+from console.monitor.monitor_state import MonitorState
 from console.tone import Tone
 from console.words import age, joined, plural, quantity, signed
 
@@ -36,10 +36,10 @@ class Component:
 
     Args:
         name: the part of the robot.
-        mark: "fresh", "STALE" or "no data": what the colour says, in a word.
-        tone: how much it wants to be noticed.
-        values: what is known, with units.
-        age: how old that is.
+        mark: "fresh", "STALE" or "no data": the meaning of the colour, in a word.
+        tone: colour and shape of the line.
+        values: the known values, with units.
+        age: their age.
     """
 
     name: str
@@ -50,10 +50,10 @@ class Component:
 
 
 def components(state: MonitorState, now_s: float) -> list[Component]:
-    """All lines, in the order of an operator's interest; empty before the first snapshot."""
+    """Returns all lines, in the order of an operator's interest; empty before the first snapshot."""
     if state.snapshot is None:
         return []
-    lines = _Lines(state.silent_ms(now_s), state.outdated(now_s))
+    lines = _Lines(state.snapshot_age_ms(now_s), state.outdated(now_s))
     status = state.snapshot.status
     return [
         *lines.always(state.snapshot),
@@ -64,10 +64,10 @@ def components(state: MonitorState, now_s: float) -> list[Component]:
 
 
 class _Lines:
-    """Makes lines of samples that are older than they say by the time since they came."""
+    """Formats samples, whose ages grow by the age of their snapshot."""
 
-    def __init__(self, silent_ms: int, outdated: bool) -> None:
-        self._silent_ms = silent_ms
+    def __init__(self, snapshot_age_ms: int, outdated: bool) -> None:
+        self._snapshot_age_ms = snapshot_age_ms
         self._outdated = outdated
 
     def always(self, snapshot: OverlaySnapshot) -> Iterator[Component]:
@@ -82,7 +82,7 @@ class _Lines:
         )
 
     def where_there_is_something(self, status: SystemStatus) -> Iterator[Component]:
-        """What this robot never reports has no line."""
+        """Yields lines only for what this robot reports."""
         platform = status.platform
         onboard = platform.power.onboard_battery
         offered: tuple[tuple[str, Sample, str], ...] = (
@@ -98,7 +98,7 @@ class _Lines:
                 yield self._of(name, sample, values)
 
     def without_an_age(self, status: SystemStatus) -> Iterator[Component]:
-        """How the robot is set up."""
+        """Yields lines about the robot's set-up."""
         teleop, gateway = status.teleop, status.gateway
         if teleop.state is not TeleopState.UNKNOWN:
             turning = quantity(teleop.max_angular_rad_s, "rad/s")
@@ -106,11 +106,13 @@ class _Lines:
             tone = Tone.GOOD if teleop.enabled else Tone.QUIET
             yield Component("Teleop", teleop.state.value, tone, joined(limits, teleop.last_error), "")
         if status.insecure:
-            risk = "not encrypted, everybody on the network may switch the preview"
+            risk = "not encrypted, anyone on the network can switch the preview"
             yield Component("Access", "OPEN", Tone.WARNING, risk, "")
         if gateway.uptime_ms is not None and not self._outdated:
             clients = plural(gateway.client_count, "client")
-            yield Component("Gateway", "up", Tone.QUIET, clients, age(gateway.uptime_ms + self._silent_ms))
+            yield Component(
+                "Gateway", "up", Tone.QUIET, clients, age(gateway.uptime_ms + self._snapshot_age_ms)
+            )
 
     def source(self, source: Source) -> Component:
         tone = Tone.WARNING if source.required else Tone.QUIET
@@ -126,16 +128,16 @@ class _Lines:
         return Component(name, mark, tone, _unbroken(values) if sample.available else "", self._age(sample))
 
     def _age(self, sample: Sample) -> str:
-        return "" if sample.age_ms is None else age(sample.age_ms + self._silent_ms)
+        return "" if sample.age_ms is None else age(sample.age_ms + self._snapshot_age_ms)
 
 
 def _unbroken(values: str) -> str:
-    """The same; a line of it ends behind a comma, never between a number and its unit."""
+    """Returns the same with no-break spaces, so that a line never ends between a number and its unit."""
     return ", ".join(part.replace(" ", "\u00a0") for part in values.split(", "))
 
 
 def _worth_a_line(source: Source) -> bool:
-    """Whether nothing can come of it, which no other line says; that nothing comes, the others do say."""
+    """Whether the source can never deliver; one that is merely silent shows in its own line as stale."""
     return source.state in (SourceState.QOS_MISMATCH, SourceState.WRONG_TYPE, SourceState.TYPE_MISSING)
 
 

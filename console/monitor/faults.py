@@ -1,9 +1,9 @@
-"""Faults as the window lists them: what is wrong, then what to do."""
+"""Formats faults for the window: what is wrong, then the remedy."""
 
 from dataclasses import dataclass
 
 from console.client.results import Fault, FaultSeverity
-from console.monitor.state import MonitorState
+from console.monitor.monitor_state import MonitorState
 from console.tone import Tone
 from console.words import age
 
@@ -20,11 +20,11 @@ class FaultLine:
     """One fault.
 
     Args:
-        mark: its severity, or "over".
-        tone: how much it wants to be noticed.
-        message: what is wrong, with the component that has it.
-        remedy: what to do; empty when it is over.
-        since: how long it has been there, or over.
+        mark: its severity, or "cleared".
+        tone: colour and shape of the line.
+        message: the fault, after the name of its component.
+        remedy: what to do; empty once it is cleared.
+        since: how long it has been active, or cleared.
     """
 
     mark: str
@@ -35,17 +35,17 @@ class FaultLine:
 
 
 def fault_lines(state: MonitorState, now_s: float) -> list[FaultLine]:
-    """The worst first, then those that are over; empty when nothing is wrong or nothing is known."""
+    """Returns the active faults, the worst first, then the cleared ones; empty before the first snapshot."""
     if state.snapshot is None:
         return []
-    silent_ms = state.silent_ms(now_s)
-    return [_line(fault, silent_ms) for fault in state.snapshot.status.faults]
+    snapshot_age_ms = state.snapshot_age_ms(now_s)
+    return [_line(fault, snapshot_age_ms) for fault in state.snapshot.status.faults]
 
 
-def _line(fault: Fault, silent_ms: int) -> FaultLine:
+def _line(fault: Fault, snapshot_age_ms: int) -> FaultLine:
     message = f"{fault.component}: {fault.message}" if fault.component else fault.message
     if fault.active:
-        since = f"for {age(fault.age_ms + silent_ms)}"
+        since = f"for {age(fault.age_ms + snapshot_age_ms)}"
         return FaultLine(fault.severity.value, _TONES[fault.severity], message, fault.remedy, since)
-    over = "" if fault.cleared_age_ms is None else f"{age(fault.cleared_age_ms + silent_ms)} ago"
-    return FaultLine("over", Tone.QUIET, message, "", over)
+    since = "" if fault.cleared_age_ms is None else f"{age(fault.cleared_age_ms + snapshot_age_ms)} ago"
+    return FaultLine("cleared", Tone.QUIET, message, "", since)

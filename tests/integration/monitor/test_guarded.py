@@ -49,7 +49,7 @@ class Person:
         press(self.window, Qt.Key.Key_P)
 
     def notes(self) -> str:
-        return " ".join(line.text.text() for line in self.window.preview.notes.shown)  # type: ignore[attr-defined]
+        return " ".join(line.text.text() for line in self.window.preview.notes.shown)
 
     def events(self) -> str:
         return "\n".join(self.window.side.events.lines)

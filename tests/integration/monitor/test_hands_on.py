@@ -209,8 +209,8 @@ def test_what_the_robot_says_is_never_markup(desk_work: Desk) -> None:
         id="x", severity=3, component="<b>battery</b>", message=text, remedy="<a href='x'>y</a>", active=True
     )
     faults = desk_work.window.side.faults
-    until(lambda: text in faults.shown[0].message.text(), "the fault")  # type: ignore[attr-defined]
-    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText  # type: ignore[attr-defined]
+    until(lambda: text in faults.shown[0].message.text(), "the fault")
+    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText
 
 
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from console.tone import Tone
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
-from console.window.look import draw_shape
 from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
-from console.window.remembered import Remembered
+from console.window.theme import draw_shape
+from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until
 from tests.support.snapshots import event
@@ -147,7 +147,7 @@ def test_it_opens_as_it_was_left(desk: None) -> None:
     ],
 )
 def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, content: bytes) -> None:
-    file = Path(Remembered().file)
+    file = Path(WindowSettings().file)
     assert file.is_relative_to(own_settings)
     file.parent.mkdir(parents=True)
     file.write_bytes(content)
@@ -157,6 +157,6 @@ def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, co
 
 
 def test_a_settings_file_that_can_not_be_written_is_no_trouble(own_settings: Path, desk: None) -> None:
-    file = Path(Remembered().file)
+    file = Path(WindowSettings().file)
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

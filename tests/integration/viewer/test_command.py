@@ -179,7 +179,7 @@ def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
         done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "4")
     assert done.returncode == 3
     said = only_line(done.stderr)
-    assert "no picture for 4 s: the preview is running; no SRT listener answers" in said
+    assert "no frame for 4 s: the preview is running; no SRT listener answers" in said
     assert said.endswith("Look at: robotctl doctor")
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import pytest
 
 from console.client import GatewayClient
-from console.viewer.account import Bookkeeper
-from console.viewer.banner import banner
-from console.viewer.state import Phase
+from console.viewer.formatting import banner
+from console.viewer.playback import PlaybackState
+from console.viewer.summary import FrameCounter
 from gateway.access.role import Role
 from tests.support.guarded_program import ROBOT, Guarded, guarded_video
 from tests.support.qt import application, press, until
@@ -69,27 +69,39 @@ def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded)
 def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: Guarded) -> None:
     robot.switch_off()
     robot.log_in("dora", Role.VIEWER)
-    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
-        until(lambda: window.session.state().phase is Phase.OFF, "the preview is off")
-        press(window.window, Qt.Key.Key_P)
+    with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
+        until(lambda: window.robot.session.playback().state is PlaybackState.OFF, "the preview is off")
+        press(window, Qt.Key.Key_P)
         until(
-            lambda: "dora is viewer, and SetPreviewMode needs operator" in window.window.said.text(),
+            lambda: "dora is viewer, and SetPreviewMode needs operator" in window.notes.text(),
             "what is missing",
         )
         robot.admin.revoke("dora")
-        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
-        card = banner(window.session.state())
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
+            "no access",
+            TOLD_WITHIN_S,
+        )
+        card = banner(window.robot.session.playback())
         assert card
         assert (
             "was revoked. Ask whoever keeps this robot for access, then type: robotctl login" in card.detail
         )
         robot.log_in("dora", Role.OPERATOR)
-        until(lambda: window.session.state().phase is Phase.OFF, "the new login counts", TOLD_WITHIN_S)
-        press(window.window, Qt.Key.Key_P)
-        until(lambda: window.session.state().phase is Phase.LIVE, "video")
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.OFF,
+            "the new login counts",
+            TOLD_WITHIN_S,
+        )
+        press(window, Qt.Key.Key_P)
+        until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
         robot.admin.revoke("dora")
         # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
-        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
+            "no access",
+            TOLD_WITHIN_S,
+        )
 
 
 def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselves(robot: Guarded) -> None:
@@ -100,8 +112,8 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
     with GatewayClient(robot.target, credentials=emils) as client:
         known = client.status().preview.endpoint
     assert known
-    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
-        until(lambda: window.session.state().phase is Phase.LIVE, "video")
+    with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
+        until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
         robot.admin.revoke("emil")
         with robot.client() as client:
             wait_until(
@@ -113,7 +125,7 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
                 TOLD_WITHIN_S,
             )
         until(
-            lambda: (now := window.session.state()).phase is Phase.LIVE and now.redials > 0,
+            lambda: (now := window.robot.session.playback()).state is PlaybackState.LIVE and now.redials > 0,
             "her video is back",
             TOLD_WITHIN_S,
         )

@@ -6,8 +6,8 @@ import pytest
 
 from console.client import Unreachable
 from console.monitor.components import Component, components
-from console.monitor.link import Link, Phase
-from console.monitor.state import MonitorState
+from console.monitor.link import Link, LinkState
+from console.monitor.monitor_state import MonitorState
 from console.tone import Tone
 from omniseer.gateway.v1 import overlay_pb2, source_pb2
 from omniseer.gateway.v1 import states_pb2 as states
@@ -30,7 +30,7 @@ def test_a_healthy_robot() -> None:
 
 
 def test_nothing_is_claimed_before_the_first_answer() -> None:
-    assert components(MonitorState(Link(phase=Phase.CONNECTING, since_s=0)), NOW_S) == []
+    assert components(MonitorState(Link(state=LinkState.CONNECTING, since_s=0)), NOW_S) == []
 
 
 def test_stale_is_a_word_and_a_tone() -> None:
@@ -54,7 +54,7 @@ def test_what_was_fresh_when_the_robot_fell_silent_is_stale_now(silent_s: float)
 
 
 def test_without_a_connection_nothing_is_fresh() -> None:
-    link = Link(phase=Phase.LOST, since_s=NOW_S, trouble=Unreachable("gone"), attempts=1)
+    link = Link(state=LinkState.LOST, since_s=NOW_S, error=Unreachable("gone"), attempts=1)
     lines = components(replace(heard(), link=link), NOW_S)
     assert {line.mark for line in lines} == {"STALE", "no data"}
 

@@ -19,11 +19,11 @@ def change(made: overlay_pb2.OverlaySnapshot) -> None:
     made.status.faults.add(id="x", component="battery", message="low", active=False, cleared_age_ms=5000)
 
 
-def test_what_is_wrong_with_what_to_do_then_what_is_over() -> None:
+def test_what_is_wrong_with_what_to_do_then_the_cleared_ones() -> None:
     state = heard(snapshot(change))
     assert fault_lines(state, NOW_S) == [
         FaultLine("error", Tone.BAD, "odometry: stopped coming", "Look at the drive", "for 3.0 s"),
-        FaultLine("over", Tone.QUIET, "battery: low", "", "5.0 s ago"),
+        FaultLine("cleared", Tone.QUIET, "battery: low", "", "5.0 s ago"),
     ]
 
 

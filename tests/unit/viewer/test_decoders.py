@@ -30,7 +30,7 @@ def test_a_failure_with_hardware_is_given_to_software_once() -> None:
 def test_no_picture_at_all_is_given_to_software_too() -> None:
     decoders = started({"h264": "vah264dec"})
     decoders.chosen()
-    decoders.after_nothing()
+    decoders.after_no_frame()
     assert decoders.chosen() == {}
 
 

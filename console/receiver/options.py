@@ -1,4 +1,4 @@
-"""How a stream is to be received, apart from where it is."""
+"""Options of a receiver: everything but the address."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,13 +8,13 @@ from console.receiver.recording import Recording
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
-    """What a caller may want.
+class ReceiverOptions:
+    """Options of a receiver.
 
     Args:
-        pixels: the form of the pictures.
-        decoders: GStreamer's element by codec ("h264", "h265"); software for those not named.
-        recording: keeps the stream as it comes; None keeps nothing.
+        pixels: pixel format of the frames.
+        decoders: GStreamer's element by codec ("h264", "h265"); a codec without one is decoded in software.
+        recording: keeps the encoded stream, too; None records nothing.
     """
 
     pixels: PixelFormat = PixelFormat.I420

@@ -1,10 +1,10 @@
-"""Pictures made of nothing."""
+"""Frames without a decoder."""
 
 from console.receiver.frame import Frame, Plane
 
 
 class Memory:
-    """Stands in for a Gst.Buffer and notes what is copied out of it."""
+    """Stands in for a Gst.Buffer and counts the bytes that are copied out of it."""
 
     def __init__(self, content: bytes) -> None:
         self._content = content
@@ -16,7 +16,7 @@ class Memory:
 
 
 def frame(number: int = 0) -> Frame:
-    """A picture of 6 x 4 in rows of 8 bytes; `number` is its presentation time."""
+    """A frame of 6 x 4 in rows of 8 bytes; `number` is its presentation time."""
     luma = bytes(range(32))
     chroma = bytes([128] * 8)
     return Frame(

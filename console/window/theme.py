@@ -1,4 +1,4 @@
-"""Colours and shapes. Okabe and Ito's palette, for colour-blind people, too; no colour stands alone."""
+"""Theme: colours and shapes. The palette of Okabe and Ito is safe for colour-blind people, too."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -14,24 +14,24 @@ COLOURS: Final[Mapping[Tone, QColor]] = {
     Tone.WARNING: QColor("#E69F00"),
     Tone.BAD: QColor("#D55E00"),
 }
-"""Bluish green, orange, vermillion. What is QUIET has no colour of its own."""
+"""Bluish green, orange, vermillion. QUIET has no colour of its own."""
 CURVE_ON_LIGHT: Final = QColor("#0072B2")
 CURVE_ON_DARK: Final = QColor("#56B4E9")
 PALETTE_CHANGES: Final = (QEvent.Type.ApplicationPaletteChange, QEvent.Type.PaletteChange)
 _INK: Final = QColor("#000000")
-"""What is drawn on a coloured shape: black has a contrast of 5 or more on all three."""
+"""Ink on a coloured shape: black has a contrast (WCAG 2.1, 1.4.3) of 5 or more on all three."""
 _TINT: Final = 0.16
 _DIM: Final = 0.30
 _MIDDLE_GREY: Final = 128
 
 
 def is_dark(palette: QPalette) -> bool:
-    """Whether light text stands on a dark ground."""
+    """Whether the palette has light text on a dark ground."""
     return palette.color(QPalette.ColorRole.Window).lightness() < _MIDDLE_GREY
 
 
 def mixed(one: QColor, other: QColor, share: float) -> QColor:
-    """`share` (0 to 1) of the other colour in the one."""
+    """Returns a mix of two colours with `share` (0 to 1) of the other one."""
     mix = [
         a + (b - a) * share
         for a, b in zip(one.getRgbF()[:3], other.getRgbF()[:3], strict=True)  # type: ignore[index]
@@ -40,20 +40,20 @@ def mixed(one: QColor, other: QColor, share: float) -> QColor:
 
 
 def tinted_ground(palette: QPalette, tone: Tone) -> QColor:
-    """The ground behind a line of this tone."""
+    """Returns the ground behind a line of this tone."""
     ground = palette.color(QPalette.ColorRole.Window)
     colour = COLOURS.get(tone)
     return mixed(ground, colour, _TINT) if colour and tone is not Tone.GOOD else ground
 
 
 def dim_text(palette: QPalette) -> QColor:
-    """For what matters less: nearer to the ground than text is, and still easy to read."""
+    """Returns the colour of secondary text: nearer to the ground, and still easy to read."""
     text, ground = palette.color(QPalette.ColorRole.WindowText), palette.color(QPalette.ColorRole.Window)
     return mixed(text, ground, _DIM)
 
 
 class DimLabel(QLabel):
-    """A word that matters less, in the desktop's light or dark colours, also when these change."""
+    """Secondary text, in the desktop's light or dark colours, also when these change."""
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
@@ -61,7 +61,7 @@ class DimLabel(QLabel):
         self._colour()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
-        """The desktop may turn from light to dark."""
+        """Follows the desktop from light to dark."""
         super().changeEvent(event)
         if event.type() in PALETTE_CHANGES:
             self._colour()
@@ -77,7 +77,7 @@ class Marker(QWidget):
     """A small shape: a disc with a tick, a triangle with "!", a square with a cross, an empty ring.
 
     Args:
-        tone: which of them.
+        tone: selects the shape.
     """
 
     def __init__(self, tone: Tone = Tone.QUIET) -> None:
@@ -90,7 +90,7 @@ class Marker(QWidget):
 
     @property
     def tone(self) -> Tone:
-        """What it shows."""
+        """The tone shown."""
         return self._tone
 
     def show_tone(self, tone: Tone) -> None:
@@ -100,13 +100,13 @@ class Marker(QWidget):
             self.update()
 
     def show_blank(self, blank: bool) -> None:
-        """Shows nothing, but keeps its place."""
+        """Hides the shape, but keeps its place."""
         if blank is not self._blank:
             self._blank = blank
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Draws it."""
+        """Paints the shape."""
         if self._blank:
             return
         painter = QPainter(self)
@@ -115,7 +115,7 @@ class Marker(QWidget):
 
 
 def draw_shape(painter: QPainter, box: QRectF, tone: Tone, palette: QPalette) -> None:
-    """The shape of a tone, as large as the box."""
+    """Draws the shape of a tone, as large as the box."""
     outline = palette.color(QPalette.ColorRole.WindowText)
     painter.setPen(QPen(outline, 1))
     painter.setBrush(COLOURS.get(tone, QColor(Qt.GlobalColor.transparent)))

@@ -4,7 +4,7 @@ import pytest
 
 from common.errors import UserError
 from console.client.results import PreviewState, StreamTransport
-from console.viewer.calling import Patience, Pauses, address_of
+from console.viewer.redial import BLOCKED_PAUSE_S, address_of, deadline_s, redial_backoff
 from tests.unit.viewer.previews import NOTHING_KNOWN, preview
 
 
@@ -21,7 +21,7 @@ def test_a_preview_that_is_wanted_is_called_before_it_is_said_to_run(state: Prev
 
 
 @pytest.mark.parametrize("state", [PreviewState.DISABLED, PreviewState.STOPPING])
-def test_a_preview_nobody_wants_is_not_called(state: PreviewState) -> None:
+def test_a_preview_that_is_off_is_not_called(state: PreviewState) -> None:
     assert address_of(preview(state)) is None
 
 
@@ -30,23 +30,22 @@ def test_without_an_endpoint_there_is_nothing_to_call() -> None:
     assert address_of(preview(PreviewState.RUNNING, transport=StreamTransport.UNKNOWN)) is None
 
 
-def test_an_address_that_cannot_be_used_is_told() -> None:
+def test_an_address_that_cannot_be_used_is_reported() -> None:
     with pytest.raises(UserError, match="passphrase"):
         address_of(preview(PreviewState.RUNNING, passphrase="short"))
 
 
-def test_pauses_grow_to_their_limit_and_begin_anew_with_hope() -> None:
-    pauses = Pauses()
-    assert [pauses.next_s() for _ in range(5)] == [0.1, 0.2, 0.4, 0.5, 0.5]
-    pauses.reset()
-    assert pauses.next_s() == 0.1
+def test_pauses_grow_to_their_limit_and_begin_anew() -> None:
+    backoff = redial_backoff()
+    assert [backoff.next_s() for _ in range(5)] == [0.1, 0.2, 0.4, 0.5, 0.5]
+    backoff.reset()
+    assert backoff.next_s() == 0.1
 
 
 def test_what_calling_again_cannot_mend_is_called_seldom() -> None:
-    assert Pauses().next_s(blocked=True) >= 5
+    assert BLOCKED_PAUSE_S >= 5
 
 
 def test_silence_ends_a_call_sooner_than_a_slow_beginning() -> None:
-    patience = Patience(silent_s=1, first_s=4)
-    assert patience.ends_s(called_s=10, picture_s=None) == 14
-    assert patience.ends_s(called_s=10, picture_s=12) == 13
+    assert deadline_s(connected_s=10, frame_s=None) == 14
+    assert deadline_s(connected_s=10, frame_s=12) == 13
