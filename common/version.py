@@ -1,4 +1,8 @@
-"""Version and git revision of the installed project."""
+"""Version and git revision of the running program.
+
+The version has one home, pyproject.toml, and is read from the installed distribution's metadata. The
+revision names the exact commit (docs/decisions/0010-version-in-pyproject.md).
+"""
 
 import os
 import re
@@ -7,12 +11,12 @@ from pathlib import Path
 from typing import Final
 
 REVISION_VARIABLE: Final = "ROBOT_GATEWAY_REVISION"
-"""Set when an image is built, which contains no repository."""
+"""Environment variable that holds the revision; set in container images, which contain no repository."""
 _REVISION: Final = re.compile(r"[0-9a-f]{40}")
 
 
 def project_version() -> str:
-    """Returns MAJOR.MINOR.PATCH of the installed project; "0.0.0" if it is not installed."""
+    """Returns MAJOR.MINOR.PATCH of the installed distribution; "0.0.0" if there is none."""
     try:
         return version("robot-gateway")
     except PackageNotFoundError:
@@ -20,13 +24,16 @@ def project_version() -> str:
 
 
 def project_revision(repository: Path = Path(__file__).parents[1] / ".git") -> str:
-    """Returns the git revision (40 digits) of the environment, else of the repository; empty if unknown."""
-    found = os.environ.get(REVISION_VARIABLE, "").strip().lower() or _head(repository)
-    return found if _REVISION.fullmatch(found) else ""
+    """Returns the git commit as 40 hexadecimal digits, or "" if unknown.
+
+    The environment variable takes precedence over the checked-out commit of `repository`.
+    """
+    revision = os.environ.get(REVISION_VARIABLE, "").strip().lower() or _head_commit(repository)
+    return revision if _REVISION.fullmatch(revision) else ""
 
 
-def _head(repository: Path) -> str:
-    """Resolves HEAD from the files of the repository, because a robot has no git."""
+def _head_commit(repository: Path) -> str:
+    """Resolves HEAD as in gitrepository-layout(5): from files, because git is not installed on a robot."""
     try:
         head = (repository / "HEAD").read_text(encoding="ascii").strip()
         reference = head.removeprefix("ref: ")

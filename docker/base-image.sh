@@ -19,6 +19,7 @@ sources() {
   if [ -n "${DEBIAN_MIRROR:-}" ]; then
     echo "$DEBIAN_MIRROR $suite main"
   else
+    # shellcheck disable=SC2016  # apt expands these, not the shell
     apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
       awk -v suite=$suite '$2 ~ "^" suite "(-updates|-security)?$" && $3 == "main"' | sort -u
   fi
