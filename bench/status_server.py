@@ -35,10 +35,10 @@ from gateway.rpc.staying import Staying
 from gateway.rpc.subscribing import EventStreams
 from gateway.rpc.tally import Tally
 from gateway.rpc.watching import StatusWatch
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.event import ModeChanged, News
 from gateway.status.events import EventLog
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -51,6 +51,19 @@ from gateway.status.preview import (
 )
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import (
+    BATTERY,
+    COMPUTE,
+    DIAGNOSTICS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    MUX_INPUTS,
+    NETWORK,
+    ODOMETRY,
+    ONBOARD_BATTERY,
+    ROS_SOURCES,
+    VISION,
+)
 from gateway.status.values import (
     Battery,
     CommandSource,
@@ -172,26 +185,24 @@ async def _bring_news(board: Board, reconciler: Reconciler) -> None:
         now = time.monotonic()
         # A robot that moves: something changes all the time.
         speed_mps = 0.5 + number % 100 / 1000
-        board.odometry = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
-        board.mode = Received(Mode("exploring"), now)
-        board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
-        board.mux_inputs = {CommandSource.KEYBOARD: board.effective_command}
-        board.diagnostics = Received(_ALL_WELL, now)
-        board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
-        board.battery = Received(
-            Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now
-        )
-        board.compute = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
-        board.network = Received(
+        board[ODOMETRY] = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board[MODE] = Received(Mode("exploring"), now)
+        command = Received(Velocity(0.5, 0.0, 0.1), now)
+        board[EFFECTIVE_COMMAND] = board[MUX_INPUTS[CommandSource.KEYBOARD]] = command
+        board[DIAGNOSTICS] = Received(_ALL_WELL, now)
+        board[VISION] = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
+        battery = Received(Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now)
+        board[BATTERY] = board[ONBOARD_BATTERY] = battery
+        board[COMPUTE] = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
+        board[NETWORK] = Received(
             Network("wlan0", connected=True, wifi_signal_dbm=-61, link_quality_percent=70), now
         )
-        board.onboard_battery = board.battery
         reconciler.heard(_RUNNING, now)
         await asyncio.sleep(_NEWS_EVERY_S)
 
 
 _RULE = SourceRule(1000, required=True)
-_RULES = Rules(dict.fromkeys(SourceKind, _RULE), 3000, dict.fromkeys(CommandSource, _RULE))
+_RULES = Rules(dict.fromkeys(ROS_SOURCES, _RULE), 3000)
 _RUNNING = Actual(
     instance_id="bench",
     applied_revision=1,

@@ -25,7 +25,7 @@ from gateway.access.token import parse_token
 from gateway.config import load_settings
 from gateway.metrics.endpoint import answer
 from gateway.preview_link.wire import UnknownSpeechError, from_wire
-from gateway.ros.cutting import cut
+from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.limits import MOST_REQUEST_BYTES
 from gateway.rpc.requests import Requests, hold_to_rules
 from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
@@ -126,10 +126,10 @@ def known_robots(data: bytes) -> None:
 
 
 def long_list(data: bytes) -> None:
-    """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
-    shorter, left_out = cut(data, longest=100)
+    """A list that is truncated before decoding: the message keeps its length, nothing is added."""
+    shorter, truncated = truncate_list(data, max_items=100)
     assert len(shorter) == len(data)
-    assert left_out >= 0
+    assert truncated >= 0
 
 
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(

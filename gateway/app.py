@@ -171,7 +171,7 @@ def _stream_figures(tally: Tally, streams: Streams) -> StreamFigures:
 async def _observe(knowledge: Knowledge, link: PreviewLink, staying: Staying, door: Door) -> None:
     """Notes what changes, whether or not anybody asks: the preview at once, the rest at the next look."""
     while True:
-        knowledge.board.access = door.view()
+        knowledge.access = door.view()
         now = knowledge.snapshot()
         knowledge.observe(now)
         staying.look()

@@ -75,7 +75,7 @@ class Door:
     def view(self) -> AccessView:
         """How the door is doing."""
         trouble = self._audit.trouble
-        return self._watch.view(trouble) if self._watch else AccessView(audit_trouble=trouble)
+        return self._watch.view(trouble) if self._watch else AccessView(audit_error=trouble)
 
     def note(self, action: ControlAction) -> None:
         """Takes a control action into the audit log; to be called while the call is served."""

@@ -8,17 +8,18 @@ from typing import Final
 
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
+from gateway.observer import Observer
 from gateway.platform.boot import boot_id
 from gateway.rpc.tally import Tally
+from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
 from gateway.status.event import News
 from gateway.status.events import EventLog
-from gateway.status.faults.book import FaultBook
 from gateway.status.faults.rules import FaultRules
-from gateway.status.observer import Observer
+from gateway.status.faults.tracker import FaultTracker
 from gateway.status.preview import PreviewView
 from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Snapshot, take
 
 _log = logging.getLogger(__name__)
 
@@ -39,17 +40,19 @@ class Knowledge:
         self._identity = Identity(
             settings.name, project_version(), settings.security.insecure and not settings.security.guarded
         )
-        self._rules = _rules(settings)
+        self._rules = settings.status_rules()
         self._preview = preview
         self._tally = tally
         self._revision, self._boot_id = project_revision(), boot_id()
         self._started_s = time.monotonic()
-        self._book = FaultBook(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
+        self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
         self._observer = Observer(
-            self._book,
+            self._tracker,
             FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000, faults.expiry_days),
         )
         self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
+        self.access: AccessView = UNGUARDED
+        """The state of the access of this instant."""
 
     def snapshot(self) -> Snapshot:
         """What is true now, from memory."""
@@ -61,8 +64,9 @@ class Knowledge:
             board=self.board,
             preview=self._preview(),
             events=self.events.newest(),
-            faults=self._book.faults,
+            faults=self._tracker.faults,
             now_s=now_s,
+            access=self.access,
         )
 
     def observe(self, now: Snapshot) -> None:
@@ -85,12 +89,3 @@ class Knowledge:
             requests_refused=self._tally.refused,
             run_id=self.events.run_id,
         )
-
-
-def _rules(settings: GatewaySettings) -> Rules:
-    rules = {source: SourceRule(source.stale_after_ms, source.required) for source in settings.sources}
-    return Rules(
-        sources={source.kind: rule for source, rule in rules.items() if source.label is None},
-        mux_inputs={source.label: rule for source, rule in rules.items() if source.label},
-        platform_stale_after_ms=settings.platform.stale_after_ms,
-    )

@@ -18,7 +18,7 @@ from gateway.access.authority import Pair, belongs_together, certificate_facts
 from gateway.access.command import to_type
 from gateway.access.directory import read_pair, read_plain
 from gateway.access.store import Store
-from gateway.status.access import AccessView, CertificateEnd
+from gateway.status.access import AccessView, CertificateExpiry
 
 LOOK_EVERY_S: Final = 0.5
 """How often the files are looked at; a revoked credential is worth nothing a moment later."""
@@ -196,11 +196,11 @@ def _material(tls: TlsFiles) -> tuple[TlsMaterial, dict[str, int]]:
     return TlsMaterial(server, authority), ends_s
 
 
-def _ending(which: str, ends_s: int, now_s: float) -> CertificateEnd:
+def _ending(which: str, ends_s: int, now_s: float) -> CertificateExpiry:
     words, rotate = _ENDING[which]
-    return CertificateEnd(
+    return CertificateExpiry(
         key=which,
-        words=words,
+        name=words,
         ends_on=datetime.fromtimestamp(ends_s, UTC).date().isoformat(),
         left_s=ends_s - now_s,
         remedy=f"On the robot: {to_type(f'rotate {rotate}')}",

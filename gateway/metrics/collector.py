@@ -13,7 +13,7 @@ from prometheus_client.registry import Collector
 
 from gateway.metrics.calls import Calls
 from gateway.metrics.loop_delay import LoopDelay
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 

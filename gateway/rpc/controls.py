@@ -12,7 +12,7 @@ from common.rpc import Context
 from gateway.rpc.peer import address_of
 from gateway.rpc.tally import Behavior
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 _COMPONENT: Final = "gateway"
 _LONGEST_WORDS: Final = 200

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from gateway.status.event import ClientJoined, ClientLeft, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 STAYS_AFTER_S: Final = 2.0
 """A stream that has been open for this long belongs to somebody who stays."""

@@ -12,9 +12,9 @@ from typing import Final, NoReturn
 from gateway.rpc.answers import REUSE_S
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.status import system_status
-from gateway.status.change import essence
-from gateway.status.pace import TICK_MS, Pace
+from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot
+from gateway.status.watch_pacing import TICK_MS, WatchPacing
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
 
 _TICK_S: Final = TICK_MS / 1000
@@ -28,7 +28,7 @@ _NS_PER_S: Final = 1_000_000_000
 
 @dataclass(eq=False, slots=True)
 class _Watcher:
-    pace: Pace
+    pace: WatchPacing
     wake: asyncio.Future[None] | None = None
     """What it waits for; None while an answer is on the way to it."""
 
@@ -49,7 +49,7 @@ class StatusWatch:
         self._tick = 0
         self._version = 0
         self._snapshot = take()
-        self._essence = essence(self._snapshot)
+        self._change_key = change_key(self._snapshot)
         self._ready: dict[Caller, bytes] = {}
         self.skipped = 0
         """Answers that came due while the one before was still on its way: those readers got newer ones."""
@@ -86,11 +86,11 @@ class StatusWatch:
                     watcher.wake = loop.create_future()
                     await watcher.wake
                     watcher.wake = None
-                watcher.pace.given(self._tick, self._version)
+                watcher.pace.sent(self._tick, self._version)
 
     @contextmanager
     def _watching(self, min_interval_ms: int) -> Iterator[_Watcher]:
-        watcher = _Watcher(Pace(min_interval_ms, self._tick, self._version))
+        watcher = _Watcher(WatchPacing(min_interval_ms, self._tick, self._version))
         self._watchers.add(watcher)
         self._somebody.set()
         try:
@@ -101,9 +101,9 @@ class StatusWatch:
     def _look(self) -> None:
         self._snapshot = self._take()
         self._ready.clear()
-        seen = essence(self._snapshot)
-        if seen != self._essence:
-            self._essence = seen
+        seen = change_key(self._snapshot)
+        if seen != self._change_key:
+            self._change_key = seen
             self._version += 1
 
     def _look_unless_newer_than(self, seconds: float) -> None:

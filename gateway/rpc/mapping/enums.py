@@ -1,4 +1,4 @@
-"""Every enum of the domain and its value in the contract. The tables are total; a test walks them."""
+"""Every enum of the domain and its value in the contract. A test checks that the tables are total."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -6,10 +6,10 @@ from typing import Final
 from common.errors import InvalidRequestError
 from gateway.status.event import ControlResult
 from gateway.status.events import GapReason
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile
-from gateway.status.sources import SourceState
+from gateway.status.source_view import SourceState
 from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2
 
 PREVIEW_STATES: Final[Mapping[PreviewState, states_pb2.PreviewState.ValueType]] = {
@@ -58,18 +58,16 @@ GAP_REASONS: Final[Mapping[GapReason, event_pb2.EventGapReason.ValueType]] = {
     GapReason.NEW_RUN: event_pb2.EVENT_GAP_REASON_NEW_RUN,
 }
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
-
-
 _SEVERITY_OF: Final[Mapping[int, Severity]] = {number: severity for severity, number in SEVERITIES.items()}
 
 
 def least_severity_from(number: int) -> Severity:
-    """The least severity a client wants to hear of; the schema's rules let no unknown number through."""
+    """Returns the minimum severity that a client requests; the schema's rules reject unknown numbers."""
     return _SEVERITY_OF.get(number, Severity.INFO)
 
 
 def profile_from(number: int) -> Profile | None:
-    """The profile a client asks for; None for "keep the current one".
+    """Returns the profile that a client requests; None to keep the current one.
 
     Raises:
         InvalidRequestError: the contract has no such profile.

@@ -1,25 +1,26 @@
-"""The robot's computer and batteries as the contract tells them."""
+"""The robot's computer and batteries as messages of the contract."""
 
 from typing import Final
 
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
+from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Battery, Compute, Network
 from omniseer.gateway.v1 import platform_pb2 as pb
 
-# How operators know the two batteries; no address of any kind.
+# The batteries under the names that operators use; never a topic or a device.
 _TRACTION: Final = "robot"
 _ONBOARD: Final = "computer"
 
 
 def platform_status(snapshot: Snapshot) -> pb.PlatformStatus:
-    """All of it, each part with its own freshness."""
+    """Returns all parts, each with its own freshness."""
     return pb.PlatformStatus(
-        compute=_compute(snapshot.compute),
-        network=_network(snapshot.network),
+        compute=_compute(snapshot[COMPUTE]),
+        network=_network(snapshot[NETWORK]),
         power=pb.PowerStatus(
-            lipo_battery=_battery(snapshot.battery, _TRACTION),
-            onboard_battery=_battery(snapshot.onboard_battery, _ONBOARD),
+            lipo_battery=_battery(snapshot[BATTERY], _TRACTION),
+            onboard_battery=_battery(snapshot[ONBOARD_BATTERY], _ONBOARD),
         ),
     )
 

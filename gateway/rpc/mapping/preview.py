@@ -1,4 +1,4 @@
-"""The live preview as the contract tells it."""
+"""The live preview as messages of the contract."""
 
 from typing import Final
 
@@ -21,7 +21,7 @@ _NO_STREAM: Final = Stream(
 
 
 def preview_status(preview: PreviewView, measured: Sample[Measurement], caller: Caller) -> pb.PreviewStatus:
-    """The preview as `caller` may see it."""
+    """Returns the preview; the passphrase only if the caller may watch."""
     stream = preview.stream or _NO_STREAM
     encoder = preview.encoder
     return pb.PreviewStatus(

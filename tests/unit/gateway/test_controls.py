@@ -8,7 +8,7 @@ import pytest
 from common.errors import NotNowError
 from gateway.rpc.controls import Controls
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     SetPreviewModeRequest,

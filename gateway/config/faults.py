@@ -1,4 +1,4 @@
-"""What counts as a fault: the part of the settings that the robot's owner tunes."""
+"""`faults`: the thresholds that the robot's owner tunes."""
 
 from typing import Self
 
@@ -9,11 +9,11 @@ from gateway.status.faults.limits import Limit, PlatformLimits
 
 
 class UpperLimit(Section):
-    """Large values are wrong."""
+    """A limit for values that must not become large."""
 
     raise_at: float
     clear_at: float
-    """Below `raise_at`, so that a value at the edge is not news again and again."""
+    """Below `raise_at` (hysteresis), so that noise at the limit raises no series of faults."""
 
     @model_validator(mode="after")
     def _leave_a_gap(self) -> Self:
@@ -23,7 +23,7 @@ class UpperLimit(Section):
 
 
 class LowerLimit(Section):
-    """Small values are wrong."""
+    """A limit for values that must not become small."""
 
     raise_at: float
     clear_at: float
@@ -37,25 +37,25 @@ class LowerLimit(Section):
 
 
 class FaultSettings(Section):
-    """When something is a fault, and how long it is remembered."""
+    """When a fault is raised and cleared, and how long it is kept."""
 
     startup_grace_ms: int = Field(default=5000, ge=0, le=600_000)
-    """How long after the start nothing is missed: a robot's programs take their time."""
+    """How long after the start a source may be missing: the robot's programs take their time to start."""
     clear_after_ms: int = Field(default=2000, ge=0, le=600_000)
-    """How long a trouble must stay away before its fault is over."""
+    """How long a condition must be absent before its fault is cleared."""
     keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
-    """How long a fault that is over stays in the status."""
+    """How long a cleared fault stays in the status."""
     temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
     memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)
     disk_percent: UpperLimit = UpperLimit(raise_at=95, clear_at=93)
     battery_percent: LowerLimit = LowerLimit(raise_at=20, clear_at=25)
-    """Of the robot's battery and of the computer's."""
+    """Charge of the robot's battery and of the computer's."""
     wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
     expiry_days: float = Field(default=14, ge=0, le=3650)
-    """How long before its end a certificate is a fault."""
+    """How long before its end of validity a certificate is a fault."""
 
     def platform_limits(self) -> PlatformLimits:
-        """The limits as the rules take them."""
+        """Returns the limits in the form that the fault rules take."""
         return PlatformLimits(
             temperature_c=_limit(self.temperature_c),
             memory_percent=_limit(self.memory_percent),
