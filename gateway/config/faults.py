@@ -8,12 +8,18 @@ from common.config import Section
 from gateway.status.faults.limits import Limit, PlatformLimits
 
 
-class UpperLimit(Section):
-    """A limit for values that must not become large."""
-
+class _LimitSettings(Section):
     raise_at: float
     clear_at: float
-    """Below `raise_at` (hysteresis), so that noise at the limit raises no series of faults."""
+    """On the good side of `raise_at` (hysteresis), so that noise at the limit raises no series of faults."""
+
+    def limit(self) -> Limit:
+        """Returns the limit in the form that the fault rules take."""
+        return Limit(self.raise_at, self.clear_at)
+
+
+class UpperLimit(_LimitSettings):
+    """A limit for values that must not become large."""
 
     @model_validator(mode="after")
     def _leave_a_gap(self) -> Self:
@@ -22,12 +28,8 @@ class UpperLimit(Section):
         return self
 
 
-class LowerLimit(Section):
+class LowerLimit(_LimitSettings):
     """A limit for values that must not become small."""
-
-    raise_at: float
-    clear_at: float
-    """Above `raise_at`, for the same reason."""
 
     @model_validator(mode="after")
     def _leave_a_gap(self) -> Self:
@@ -57,13 +59,9 @@ class FaultSettings(Section):
     def platform_limits(self) -> PlatformLimits:
         """Returns the limits in the form that the fault rules take."""
         return PlatformLimits(
-            temperature_c=_limit(self.temperature_c),
-            memory_percent=_limit(self.memory_percent),
-            disk_percent=_limit(self.disk_percent),
-            battery_percent=_limit(self.battery_percent),
-            wifi_signal_dbm=_limit(self.wifi_signal_dbm),
+            temperature_c=self.temperature_c.limit(),
+            memory_percent=self.memory_percent.limit(),
+            disk_percent=self.disk_percent.limit(),
+            battery_percent=self.battery_percent.limit(),
+            wifi_signal_dbm=self.wifi_signal_dbm.limit(),
         )
-
-
-def _limit(settings: UpperLimit | LowerLimit) -> Limit:
-    return Limit(settings.raise_at, settings.clear_at)

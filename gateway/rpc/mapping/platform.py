@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
@@ -30,9 +31,7 @@ def _compute(sample: Sample[Compute]) -> pb.ComputeStatus:
     if value is None:
         return pb.ComputeStatus()
     return pb.ComputeStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         cpu_percent=value.cpu_percent,
         cpu_temperature_available=value.cpu_temperature_c is not None,
         cpu_temperature_c=value.cpu_temperature_c or 0.0,
@@ -51,9 +50,7 @@ def _network(sample: Sample[Network]) -> pb.NetworkStatus:
     if value is None:
         return pb.NetworkStatus()
     return pb.NetworkStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         connected=value.connected,
         interface_name=value.interface_name,
         wifi_signal_available=value.wifi_signal_dbm is not None,
@@ -68,9 +65,7 @@ def _battery(sample: Sample[Battery], source: str) -> pb.BatteryStatus:
     if value is None:
         return pb.BatteryStatus(source=source)
     return pb.BatteryStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         source=source,
         present=value.present,
         voltage_available=value.voltage_v is not None,

@@ -5,6 +5,7 @@ from typing import Final
 from common.bind import bracketed
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
 from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
@@ -71,15 +72,12 @@ def _video(stream: Stream) -> pb.VideoFormat:
 
 
 def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
-    freshness = sample.freshness
     return pb.StreamMeasurement(
-        available=freshness.available,
-        stale=freshness.stale,
-        age_ms=freshness.age_ms,
+        **freshness_fields(sample.freshness),
         fps=measurement.fps,
         bitrate_kbps=measurement.bitrate_kbps,
         viewer_count=measurement.viewer_count,
-        last_frame_age_ms=measurement.last_frame_age_ms + freshness.age_ms,
+        last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
     )

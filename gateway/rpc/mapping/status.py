@@ -6,6 +6,7 @@ from typing import Final
 from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
 from gateway.rpc.mapping.faults import fault_message
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
@@ -68,14 +69,12 @@ def _vision(sample: Sample[Vision]) -> system_status_pb2.VisionStatus:
     if value is None:
         return system_status_pb2.VisionStatus()
     return system_status_pb2.VisionStatus(
-        available=True,
-        stale=sample.freshness.stale,
+        **freshness_fields(sample.freshness),
         producer_fps=value.producer_fps,
         consumer_fps=value.consumer_fps,
         last_infer_ms=value.last_infer_ms,
         infer_error_count=value.infer_error_count,
         capture_fatal_error_count=value.capture_fatal_error_count,
-        age_ms=sample.freshness.age_ms,
     )
 
 
@@ -103,9 +102,7 @@ def _command(sample: Sample[Command]) -> system_status_pb2.EffectiveCommand:
     if command is None:
         return system_status_pb2.EffectiveCommand()
     return system_status_pb2.EffectiveCommand(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         vx_mps=command.velocity.vx_mps,
         vy_mps=command.velocity.vy_mps,
         wz_rad_s=command.velocity.wz_rad_s,
@@ -117,9 +114,7 @@ def _mission(sample: Sample[Mode]) -> system_status_pb2.MissionStatus:
     if sample.value is None:
         return system_status_pb2.MissionStatus()
     return system_status_pb2.MissionStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         mode=sample.value.name,
     )
 
@@ -129,9 +124,7 @@ def _detections(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatu
     if value is None:
         return overlay_pb2.DetectionOverlayStatus()
     return overlay_pb2.DetectionOverlayStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         source_width_px=value.source_width_px,
         source_height_px=value.source_height_px,
         detection_count=value.count,
@@ -156,9 +149,7 @@ def _source(source: SourceView) -> source_pb2.SourceStatus:
     return source_pb2.SourceStatus(
         name=source.name,
         state=SOURCE_STATES[source.state],
-        available=source.freshness.available,
-        stale=source.freshness.stale,
-        age_ms=source.freshness.age_ms,
+        **freshness_fields(source.freshness),
         required=source.required,
         detail=source.detail,
     )
