@@ -25,7 +25,7 @@ from gateway.config import GatewaySettings, load_settings
 from gateway.links.link import LinkLostError
 from gateway.links.preview.wire import from_wire
 from gateway.metrics.endpoint import respond
-from gateway.ros.cutting import cut
+from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.methods import CONTRACT, method_at
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
@@ -124,10 +124,10 @@ def known_robots(data: bytes) -> None:
 
 
 def long_list(data: bytes) -> None:
-    """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
-    shorter, left_out = cut(data, longest=100)
+    """A list that is truncated before decoding: the message keeps its length, nothing is added."""
+    shorter, truncated = truncate_list(data, max_items=100)
     assert len(shorter) == len(data)
-    assert left_out >= 0
+    assert truncated >= 0
 
 
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(

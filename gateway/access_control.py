@@ -68,8 +68,8 @@ class AccessControl:
 
     def view(self) -> AccessView:
         """Returns the state of credentials, certificates and audit log, for the fault rules."""
-        trouble = self._log.trouble
-        return self._watch.view(trouble) if self._watch else AccessView(audit_trouble=trouble)
+        error = self._log.error
+        return self._watch.view(error) if self._watch else AccessView(audit_error=error)
 
     @contextmanager
     def recording(self) -> Iterator[None]:

@@ -17,7 +17,7 @@ from gateway.access.ca import KeyPair, certificate_info, key_matches
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store
-from gateway.status.access import AccessView, CertificateEnd
+from gateway.status.access import AccessView, CertificateExpiry
 
 POLL_INTERVAL_S: Final = 0.5
 """Bounds how long a revoked credential remains usable."""
@@ -148,13 +148,13 @@ class CredentialReloader:
         # Shielded: a caller that leaves must not cancel the poll of the others.
         await asyncio.shield(self._next_poll)
 
-    def view(self, audit_trouble: str = "") -> AccessView:
+    def view(self, audit_error: str = "") -> AccessView:
         """Returns the state of access control that operators see."""
         now_s = self._clock()
         return AccessView(
-            tuple(_certificate_end(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
+            tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
             self._error,
-            audit_trouble,
+            audit_error,
         )
 
     async def _poll_when_due(self) -> None:
@@ -198,11 +198,11 @@ def _signature(path: Path) -> tuple[int, ...]:
     return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
 
 
-def _certificate_end(which: str, ends_s: int, now_s: float) -> CertificateEnd:
-    words, argument = _CERTIFICATES[which]
-    return CertificateEnd(
+def _certificate_expiry(which: str, ends_s: int, now_s: float) -> CertificateExpiry:
+    name, argument = _CERTIFICATES[which]
+    return CertificateExpiry(
         key=which,
-        words=words,
+        name=name,
         ends_on=datetime.fromtimestamp(ends_s, UTC).date().isoformat(),
         left_s=ends_s - now_s,
         remedy=f"On the robot: {credentials_command(f'rotate {argument}')}",

@@ -14,6 +14,7 @@ from typing import Final, Self
 from gateway.config import PlatformSettings
 from gateway.platform import battery, compute, network
 from gateway.status.board import Board
+from gateway.status.sources import COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Received
 
 _log = logging.getLogger(__name__)
@@ -24,7 +25,7 @@ _FIRST_AFTER_S: Final = 0.1
 
 
 class PlatformSampler:
-    """Writes `compute`, `network` and `onboard_battery` of the board while its context is entered.
+    """Writes the platform sources onto the board, from `__enter__` to `__exit__`.
 
     Args:
         settings: sampling interval, disk and network interface.
@@ -54,12 +55,12 @@ class PlatformSampler:
             _log.warning("the platform sampler is blocked in a system call; exiting without it")
 
     def sample(self) -> None:
-        """Samples all values once."""
-        self._board.compute = Received(compute.read(self._settings.disk_path), self._clock())
-        self._board.network = Received(network.read(self._settings.interface), self._clock())
+        """Takes every value once."""
+        self._board[COMPUTE] = Received(compute.read(self._settings.disk_path), self._clock())
+        self._board[NETWORK] = Received(network.read(self._settings.interface), self._clock())
         onboard = battery.read()
         if onboard:
-            self._board.onboard_battery = Received(onboard, self._clock())
+            self._board[ONBOARD_BATTERY] = Received(onboard, self._clock())
 
     def _run(self) -> None:
         interval_s = self._settings.interval_ms / 1000

@@ -13,7 +13,7 @@ from gateway.rpc.event_stream import EventStream
 from gateway.rpc.mapping.events import position_from
 from gateway.status.event import ModeChanged, News
 from gateway.status.events import EventLog
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 
 

@@ -12,7 +12,7 @@ from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
 from gateway.rpc.ports import AuditTrail, EventSink
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 _COMPONENT: Final = "gateway"
 _MAX_TEXT: Final = 200

@@ -15,7 +15,7 @@ from gateway.rpc.call import CallContext
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
 from tests.support.calls import serve

@@ -1,4 +1,4 @@
-"""What counts as a fault: the part of the settings that the robot's owner tunes."""
+"""`faults`: the thresholds that the robot's owner tunes."""
 
 from typing import Self
 
@@ -8,12 +8,18 @@ from common.config import Section
 from gateway.status.faults.limits import Limit, PlatformLimits
 
 
-class UpperLimit(Section):
-    """Large values are wrong."""
-
+class _LimitSettings(Section):
     raise_at: float
     clear_at: float
-    """Below `raise_at`, so that a value at the edge is not news again and again."""
+    """On the good side of `raise_at` (hysteresis), so that noise at the limit raises no series of faults."""
+
+    def limit(self) -> Limit:
+        """Returns the limit in the form that the fault rules take."""
+        return Limit(self.raise_at, self.clear_at)
+
+
+class UpperLimit(_LimitSettings):
+    """A limit for values that must not become large."""
 
     @model_validator(mode="after")
     def _leave_a_gap(self) -> Self:
@@ -22,12 +28,8 @@ class UpperLimit(Section):
         return self
 
 
-class LowerLimit(Section):
-    """Small values are wrong."""
-
-    raise_at: float
-    clear_at: float
-    """Above `raise_at`, for the same reason."""
+class LowerLimit(_LimitSettings):
+    """A limit for values that must not become small."""
 
     @model_validator(mode="after")
     def _leave_a_gap(self) -> Self:
@@ -37,33 +39,29 @@ class LowerLimit(Section):
 
 
 class FaultSettings(Section):
-    """When something is a fault, and how long it is remembered."""
+    """When a fault is raised and cleared, and how long it is kept."""
 
     startup_grace_ms: int = Field(default=5000, ge=0, le=600_000)
-    """How long after the start nothing is missed: a robot's programs take their time."""
+    """How long after the start a source may be missing: the robot's programs take their time to start."""
     clear_after_ms: int = Field(default=2000, ge=0, le=600_000)
-    """How long a trouble must stay away before its fault is over."""
+    """How long a condition must be absent before its fault is cleared."""
     keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
-    """How long a fault that is over stays in the status."""
+    """How long a cleared fault stays in the status."""
     temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
     memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)
     disk_percent: UpperLimit = UpperLimit(raise_at=95, clear_at=93)
     battery_percent: LowerLimit = LowerLimit(raise_at=20, clear_at=25)
-    """Of the robot's battery and of the computer's."""
+    """Charge of the robot's battery and of the computer's."""
     wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
     expiry_days: float = Field(default=14, ge=0, le=3650)
-    """How long before its end a certificate is a fault."""
+    """How long before its end of validity a certificate is a fault."""
 
     def platform_limits(self) -> PlatformLimits:
-        """The limits as the rules take them."""
+        """Returns the limits in the form that the fault rules take."""
         return PlatformLimits(
-            temperature_c=_limit(self.temperature_c),
-            memory_percent=_limit(self.memory_percent),
-            disk_percent=_limit(self.disk_percent),
-            battery_percent=_limit(self.battery_percent),
-            wifi_signal_dbm=_limit(self.wifi_signal_dbm),
+            temperature_c=self.temperature_c.limit(),
+            memory_percent=self.memory_percent.limit(),
+            disk_percent=self.disk_percent.limit(),
+            battery_percent=self.battery_percent.limit(),
+            wifi_signal_dbm=self.wifi_signal_dbm.limit(),
         )
-
-
-def _limit(settings: UpperLimit | LowerLimit) -> Limit:
-    return Limit(settings.raise_at, settings.clear_at)

@@ -1,23 +1,23 @@
-"""The book of faults: raised when a condition is seen, cleared when it stays away, remembered for a while."""
+"""The fault tracker: raises a fault when a condition appears, clears it when the condition stays absent."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.fault import Condition, Fault, Severity
 
 MOST_ACTIVE: Final = 32
-"""More active faults than that are counted, not listed: a robot that is all wrong must not flood its link."""
+"""Further active faults are counted, not listed: a robot full of faults must not flood its link."""
 MOST_CLEARED: Final = 8
-"""How many faults that are over are remembered."""
+"""Cleared faults that are kept."""
 CAPPED: Final = "faults.capped"
 _MOST_COUNTED: Final = 1024
-"""Fault ids whose number of times is remembered; the ids of diagnostics are the robot's own."""
+"""Fault ids whose count is kept; bounded, because the robot's components choose the ids of diagnostics."""
 
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What one look at the conditions changed."""
+    """The difference that one update made."""
 
     raised: tuple[Fault, ...]
     worsened: tuple[Fault, ...]
@@ -25,13 +25,13 @@ class Changes:
     cleared: tuple[Fault, ...]
 
 
-class FaultBook:
+class FaultTracker:
     """Belongs to one event loop; `faults` may be read at any time.
 
     Args:
-        clear_after_s: a condition must stay away for this long before its fault is over. What comes and goes
-            faster is one fault, not a stream of them.
-        keep_cleared_s: how long a fault that is over is remembered.
+        clear_after_s: how long a condition must be absent before its fault is cleared. What comes and goes
+            faster is one fault, not a series.
+        keep_cleared_s: how long a cleared fault is kept.
     """
 
     def __init__(self, clear_after_s: float, keep_cleared_s: float) -> None:
@@ -41,15 +41,15 @@ class FaultBook:
         self._cleared: dict[str, Fault] = {}
         self._times: dict[str, int] = {}
         self.faults: tuple[Fault, ...] = ()
-        """Active ones first, the worst, then the oldest; after them those that are over, the newest first."""
+        """Active faults by severity, then age; after them the cleared ones, the newest first."""
 
     @property
     def active_ids(self) -> frozenset[str]:
-        """What is active now: rules with hysteresis judge by it."""
+        """Ids of the active faults, which rules with hysteresis need."""
         return frozenset(self._active)
 
     def update(self, conditions: Iterable[Condition], now_s: float) -> Changes:
-        """Takes in everything that is wrong at `now_s`."""
+        """Tracks the conditions that are present at `now_s`; returns the difference."""
         present = {condition.fault_id: condition for condition in conditions}
         candidates = {**self._lingering(now_s), **present}
         listed = self._listed(candidates)
@@ -63,15 +63,15 @@ class FaultBook:
             if condition.severity.rank > before.condition.severity.rank:
                 worsened.append(fault)
         gone = [self._active.pop(fault_id) for fault_id in self._active.keys() - listed.keys()]
-        # What only had to give way to worse is not over.
-        over = [fault for fault in gone if fault.condition.fault_id not in candidates]
-        cleared = [self._clear(fault, now_s) for fault in over]
+        # A fault that lost its place in the list to a more severe one is still present.
+        absent = [fault for fault in gone if fault.condition.fault_id not in candidates]
+        cleared = [self._clear(fault, now_s) for fault in absent]
         self._forget(now_s)
         self.faults = (*_by_weight(self._active.values()), *reversed(self._cleared.values()))
         return Changes(_by_weight(raised), _by_weight(worsened), _by_weight(cleared))
 
     def _lingering(self, now_s: float) -> dict[str, Condition]:
-        """What is active and was seen a moment ago, whether or not it is there now."""
+        """Returns the conditions that were present less than `clear_after_s` ago."""
         return {
             fault_id: fault.condition
             for fault_id, fault in self._active.items()
@@ -79,7 +79,7 @@ class FaultBook:
         }
 
     def _listed(self, conditions: dict[str, Condition]) -> dict[str, Condition]:
-        """The worst MOST_ACTIVE; among equals, those that are listed already stay."""
+        """Returns the MOST_ACTIVE most severe ones; among equals, those that are listed already stay."""
         if len(conditions) <= MOST_ACTIVE:
             return conditions
         ordered = sorted(
@@ -127,5 +127,5 @@ def _capped(left_out: int) -> Condition:
         Severity.WARNING,
         "gateway",
         f"{left_out} more faults are not listed",
-        f"Mend the listed ones first; at most {MOST_ACTIVE} are told at once",
+        f"Repair the listed ones first; at most {MOST_ACTIVE} are listed at once",
     )

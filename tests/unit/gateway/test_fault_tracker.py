@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.status.faults.book import CAPPED, MOST_ACTIVE, MOST_CLEARED, FaultBook
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.faults.tracker import CAPPED, MOST_ACTIVE, MOST_CLEARED, FaultTracker
 
 CLEAR_AFTER_S, KEEP_CLEARED_S = 2.0, 60.0
 
@@ -15,22 +15,22 @@ def condition(fault_id: str, severity: Severity = Severity.WARNING, message: str
 
 
 @pytest.fixture
-def book() -> FaultBook:
-    return FaultBook(CLEAR_AFTER_S, KEEP_CLEARED_S)
+def book() -> FaultTracker:
+    return FaultTracker(CLEAR_AFTER_S, KEEP_CLEARED_S)
 
 
 def ids(faults: tuple[Fault, ...]) -> list[str]:
     return [fault.condition.fault_id for fault in faults]
 
 
-def test_a_condition_that_stays_is_one_fault_with_one_onset(book: FaultBook) -> None:
+def test_a_condition_that_stays_is_one_fault_with_one_onset(book: FaultTracker) -> None:
     assert ids(book.update([condition("a")], 10.0).raised) == ["a"]
     assert book.update([condition("a")], 11.0).raised == ()
     (fault,) = book.faults
     assert (fault.onset_s, fault.seen_s, fault.active, fault.times_raised) == (10.0, 11.0, True, 1)
 
 
-def test_a_fault_is_over_when_its_condition_stayed_away_long_enough(book: FaultBook) -> None:
+def test_a_fault_is_over_when_its_condition_stayed_away_long_enough(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     assert book.update([], 11.9).cleared == ()
     assert book.faults[0].active
@@ -39,14 +39,14 @@ def test_a_fault_is_over_when_its_condition_stayed_away_long_enough(book: FaultB
     assert (fault.active, fault.cleared_s) == (False, 12.0)
 
 
-def test_what_comes_and_goes_quickly_is_one_fault(book: FaultBook) -> None:
+def test_what_comes_and_goes_quickly_is_one_fault(book: FaultTracker) -> None:
     for step in range(40):
         changes = book.update([condition("a")] if step % 2 else [], step * 0.9)
         assert len(changes.raised) == (step == 1)
         assert changes.cleared == ()
 
 
-def test_a_fault_that_returns_counts_and_begins_anew(book: FaultBook) -> None:
+def test_a_fault_that_returns_counts_and_begins_anew(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     book.update([], 13.0)
     book.update([condition("a")], 20.0)
@@ -54,7 +54,7 @@ def test_a_fault_that_returns_counts_and_begins_anew(book: FaultBook) -> None:
     assert (fault.onset_s, fault.times_raised, fault.active) == (20.0, 2, True)
 
 
-def test_what_is_over_is_forgotten_in_time(book: FaultBook) -> None:
+def test_what_is_over_is_forgotten_in_time(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     book.update([], 13.0)
     book.update([], 13.0 + KEEP_CLEARED_S)
@@ -63,14 +63,14 @@ def test_what_is_over_is_forgotten_in_time(book: FaultBook) -> None:
     assert book.faults == ()
 
 
-def test_only_the_newest_that_are_over_are_remembered(book: FaultBook) -> None:
+def test_only_the_newest_that_are_over_are_remembered(book: FaultTracker) -> None:
     for number in range(MOST_CLEARED + 3):
         book.update([condition(f"f{number}")], 10.0 + number * 0.1)
     book.update([], 20.0)
     assert len(book.faults) == MOST_CLEARED
 
 
-def test_getting_worse_is_told_and_keeps_the_onset(book: FaultBook) -> None:
+def test_getting_worse_is_told_and_keeps_the_onset(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     changes = book.update([condition("a", Severity.ERROR, "it burns")], 11.0)
     assert ids(changes.worsened) == ["a"]
@@ -78,13 +78,13 @@ def test_getting_worse_is_told_and_keeps_the_onset(book: FaultBook) -> None:
     assert book.update([condition("a")], 12.0).worsened == ()
 
 
-def test_the_worst_comes_first_then_the_oldest(book: FaultBook) -> None:
+def test_the_worst_comes_first_then_the_oldest(book: FaultTracker) -> None:
     book.update([condition("old")], 1.0)
     book.update([condition("old"), condition("new"), condition("bad", Severity.ERROR)], 2.0)
     assert ids(book.faults) == ["bad", "old", "new"]
 
 
-def test_too_many_are_capped_and_it_says_so(book: FaultBook) -> None:
+def test_too_many_are_capped_and_it_says_so(book: FaultTracker) -> None:
     many = [condition(f"f{number:03}") for number in range(MOST_ACTIVE + 10)]
     book.update(many, 1.0)
     assert len(book.faults) == MOST_ACTIVE
@@ -92,7 +92,7 @@ def test_too_many_are_capped_and_it_says_so(book: FaultBook) -> None:
     assert capped.condition.message == "11 more faults are not listed"
 
 
-def test_worse_takes_the_place_and_what_gave_way_is_not_called_over(book: FaultBook) -> None:
+def test_worse_takes_the_place_and_what_gave_way_is_not_called_over(book: FaultTracker) -> None:
     many = [condition(f"f{number:03}") for number in range(MOST_ACTIVE)]
     book.update(many, 1.0)
     changes = book.update([*many, condition("worst", Severity.ERROR)], 2.0)
@@ -118,7 +118,7 @@ STEPS = st.lists(
 def test_whatever_happens_the_book_is_bounded_and_every_raised_fault_ends_once(
     steps: list[tuple[frozenset[int], int, Severity]],
 ) -> None:
-    book, now_s = FaultBook(CLEAR_AFTER_S, KEEP_CLEARED_S), 0.0
+    book, now_s = FaultTracker(CLEAR_AFTER_S, KEEP_CLEARED_S), 0.0
     seen: dict[str, float] = {}
     for present, pause_ms, severity in steps:
         now_s += pause_ms / 1000

@@ -1,27 +1,20 @@
-"""A configured source becomes a subscription: its message class, its quality of service."""
+"""The subscription of a configured source: its message class and its QoS profile."""
 
 from importlib import import_module
-from typing import Any, Final
+from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gateway.config import SourceSettings
-from gateway.status.board import SourceKind
-
-# Only the newest message is ever wanted: DDS drops older ones before Python sees them, so a topic that gets
-# faster costs next to nothing, and one read per pass empties the queue.
-_DEPTH: Final = 1
-# Diagnostics are the exception: many programs publish on that one topic, each of its own components.
-_DIAGNOSTICS_DEPTH: Final = 64
 
 
 class TypeMissingError(Exception):
-    """A message type that is not installed here; the text says what to install."""
+    """A message type is not installed; the text names the package to install."""
 
 
 def message_class(type_name: str) -> Any:
-    """The Python class of "package/msg/Name".
+    """Returns the Python class of "package/msg/Name".
 
     Raises:
         TypeMissingError: the package is not installed, or has no such message.
@@ -38,10 +31,10 @@ def message_class(type_name: str) -> Any:
 
 
 def subscribe(node: Any, source: SourceSettings) -> Any:
-    """A subscription that hands out raw bytes. Nobody spins it: it is emptied by hand.
+    """Returns a subscription for serialised messages. No executor spins it: `Source` takes the messages.
 
     Raises:
-        TypeMissingError: see `message_class`; also when the type's middleware support can't be loaded.
+        TypeMissingError: see `message_class`; also if the type support of the middleware can't be loaded.
     """
     message_type = message_class(source.type)
     try:
@@ -58,19 +51,14 @@ def subscribe(node: Any, source: SourceSettings) -> Any:
 
 
 def qos_of(source: SourceSettings) -> Any:
-    """The quality of service that the settings ask for."""
+    """Returns the QoS profile of the settings; when the history is full, the oldest message is dropped."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=depth_of(source),
+        depth=source.spec.queue_depth,
         reliability=ReliabilityPolicy[source.reliability.upper()],
         durability=DurabilityPolicy[source.durability.upper()],
     )
 
 
-def depth_of(source: SourceSettings) -> int:
-    """How many messages may wait for the next look; when there are more, the oldest are dropped."""
-    return _DIAGNOSTICS_DEPTH if source.kind is SourceKind.DIAGNOSTICS else _DEPTH
-
-
 def _never_called(message: Any) -> None:
-    raise AssertionError("nobody spins these subscriptions")
+    raise AssertionError("no executor spins these subscriptions")

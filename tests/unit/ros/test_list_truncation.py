@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.ros.cutting import cut
+from gateway.ros.list_truncation import truncate_list
 
 LITTLE, BIG = b"\x00\x01\x00\x00", b"\x00\x00\x00\x00"
 
@@ -21,30 +21,30 @@ def message(encoding: bytes, frame: bytes, count: int, items: bytes) -> bytes:
     encoding=st.sampled_from([LITTLE, BIG, b"\x00\x06\x00\x00", b"\x00\x07\x00\x00"]),
     frame=st.binary(max_size=40),
     count=st.integers(0, 2**32 - 1),
-    longest=st.integers(0, 1000),
+    max_items=st.integers(0, 1000),
     items=st.binary(max_size=40),
 )
 def test_only_the_length_of_the_list_changes(
-    encoding: bytes, frame: bytes, count: int, longest: int, items: bytes
+    encoding: bytes, frame: bytes, count: int, max_items: int, items: bytes
 ) -> None:
-    raw, left_out = cut(message(encoding, frame, count, items), longest)
-    assert raw == message(encoding, frame, min(count, longest), items)
-    assert left_out == max(0, count - longest)
+    raw, truncated = truncate_list(message(encoding, frame, count, items), max_items)
+    assert raw == message(encoding, frame, min(count, max_items), items)
+    assert truncated == max(0, count - max_items)
 
 
-@given(raw=st.binary(max_size=60), longest=st.integers(0, 10))
-def test_whatever_the_bytes_are_nothing_is_raised(raw: bytes, longest: int) -> None:
-    shorter, _ = cut(raw, longest)
+@given(raw=st.binary(max_size=60), max_items=st.integers(0, 10))
+def test_whatever_the_bytes_are_nothing_is_raised(raw: bytes, max_items: int) -> None:
+    shorter, _ = truncate_list(raw, max_items)
     assert len(shorter) == len(raw)
 
 
 @pytest.mark.parametrize("end", range(28))
 def test_a_message_that_breaks_off_before_its_list_comes_back_as_it_is(end: int) -> None:
     raw = message(LITTLE, b"camera", 9, b"")[:end]
-    assert cut(raw, 2) == (raw, 0)
+    assert truncate_list(raw, 2) == (raw, 0)
 
 
 def test_another_encoding_is_left_alone() -> None:
     """Parameter lists, for example: where the list begins is not known there."""
     raw = message(b"\x00\x03\x00\x00", b"camera", 9, b"")
-    assert cut(raw, 2) == (raw, 0)
+    assert truncate_list(raw, 2) == (raw, 0)

@@ -11,7 +11,8 @@ from sensor_msgs.msg import BatteryState
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.intake import intake
 from gateway.ros.readers import registry
-from gateway.status.board import Board, Presence
+from gateway.status import sources as specs
+from gateway.status.board import Board, Publishers
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
 
@@ -21,7 +22,7 @@ RELIABLE = BATTERY.model_copy(update={"reliability": "reliable"})
 LATCHED = RELIABLE.model_copy(update={"durability": "transient_local"})
 UNRELIABLY = {"reliability": ReliabilityPolicy.BEST_EFFORT}
 
-WaitFor = Callable[[Presence], None]
+WaitFor = Callable[[Publishers], None]
 
 
 @contextmanager
@@ -32,34 +33,34 @@ def watching(source: SourceSettings) -> Iterator[tuple[Board, WaitFor]]:
         yield (
             board,
             lambda wanted: wait_until(
-                lambda: board.presence.get(source.name) == wanted, f"{wanted}, last {board.presence}"
+                lambda: board.publishers.get(source.spec) == wanted, f"{wanted}, last {board.publishers}"
             ),
         )
 
 
 def test_publishers_come_and_go(talker: Talker) -> None:
     with watching(BATTERY) as (board, wait_for), talking("second") as second:
-        wait_for(Presence(0))
+        wait_for(Publishers(0))
         talker.publisher(BATTERY.topic, BatteryState)
-        wait_for(Presence(1))
+        wait_for(Publishers(1))
         second.publisher(BATTERY.topic, BatteryState)
-        wait_for(Presence(2))
+        wait_for(Publishers(2))
         talker.fall_silent(BATTERY.topic, BatteryState)
         second.fall_silent(BATTERY.topic, BatteryState)
-        wait_for(Presence(0))
-        assert board.battery is None
+        wait_for(Publishers(0))
+        assert board[specs.BATTERY] is None
 
 
 @pytest.mark.parametrize(
     ("source", "offered", "words"),
     [
-        (RELIABLE, UNRELIABLY, "reliable is asked for, best effort is offered"),
-        (LATCHED, {}, "transient local is asked for, volatile is offered"),
+        (RELIABLE, UNRELIABLY, "reliable is requested, best effort is offered"),
+        (LATCHED, {}, "transient local is requested, volatile is offered"),
         (
             LATCHED,
             UNRELIABLY,
-            "reliable is asked for, best effort is offered; "
-            "transient local is asked for, volatile is offered",
+            "reliable is requested, best effort is offered; "
+            "transient local is requested, volatile is offered",
         ),
     ],
 )
@@ -68,43 +69,43 @@ def test_guarantees_that_exclude_each_other_are_named(
 ) -> None:
     with watching(source) as (board, wait_for):
         publisher = talker.publisher(source.topic, BatteryState, **offered)
-        wait_for(Presence(1, qos_mismatch=words))
+        wait_for(Publishers(1, qos_mismatch=words))
         publisher.publish(BatteryState(present=True))
         talker.fall_silent(source.topic, BatteryState)
-        wait_for(Presence(0))
-        assert board.battery is None, "the middleware connects only what fits"
+        wait_for(Publishers(0))
+        assert board[specs.BATTERY] is None, "the middleware connects only what fits"
         fitting = {
             "reliability": ReliabilityPolicy.RELIABLE,
             "durability": DurabilityPolicy.TRANSIENT_LOCAL,
         }
         talker.publisher(source.topic, BatteryState, **fitting).publish(BatteryState(present=True))
-        wait_for(Presence(1))
+        wait_for(Publishers(1))
         if source is RELIABLE:  # what was sent before both had met is only repeated where it is latched
             talker.publisher(source.topic, BatteryState).publish(BatteryState(present=True))
-        wait_until(lambda: board.battery, "the value")
+        wait_until(lambda: board[specs.BATTERY], "the value")
 
 
 def test_one_publisher_that_fits_is_enough(talker: Talker) -> None:
     with watching(RELIABLE) as (_, wait_for), talking("second") as second:
         talker.publisher(RELIABLE.topic, BatteryState, **UNRELIABLY)
-        wait_for(Presence(1, qos_mismatch="reliable is asked for, best effort is offered"))
+        wait_for(Publishers(1, qos_mismatch="reliable is requested, best effort is offered"))
         second.publisher(RELIABLE.topic, BatteryState)
-        wait_for(Presence(2))
+        wait_for(Publishers(2))
 
 
 def test_another_type_is_told_apart(talker: Talker) -> None:
     with watching(BATTERY) as (board, wait_for), talking("second") as second:
         talker.publisher(BATTERY.topic, Odometry)
-        wait_for(Presence(1, wrong_type=True))
+        wait_for(Publishers(1, wrong_type=True))
         second.publisher(BATTERY.topic, BatteryState)
-        wait_for(Presence(2))
+        wait_for(Publishers(2))
         second.publisher(BATTERY.topic, BatteryState).publish(BatteryState(present=True))
-        wait_until(lambda: board.battery, "the value of the one that fits")
+        wait_until(lambda: board[specs.BATTERY], "the value of the one that fits")
 
 
 def test_what_cannot_be_read_is_not_looked_for(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     missing = "no_such_msgs/msg/Thing"
-    monkeypatch.setitem(registry._readers, (missing, BATTERY.kind), lambda message, source: None)
+    monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda message, source: None)
     with watching(BATTERY.model_copy(update={"type": missing})) as (board, _):
-        assert "no_such_msgs" in board.unusable["battery"]
-        assert not board.presence
+        assert "no_such_msgs" in board.unusable[specs.BATTERY]
+        assert not board.publishers
