@@ -74,10 +74,8 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         kind = type(values).__name__
         raise _error(f"{path} holds a {kind} at the top level", "Write keys and values, 'grpc:' for example")
-    for key in values:
-        if not isinstance(key, str):
-            raise _error(f"{path}: unknown key {key!r}", "Keys are words, 'grpc:' for example")
-    return values
+    # YAML keys may be numbers or dates; as text, they are reported as unknown keys like any other.
+    return {str(key): value for key, value in values.items()}
 
 
 def _error(problem: str, remedy: str = "") -> UserError:

@@ -1,4 +1,4 @@
-"""Who has proved who they are gets the stream's passphrase, from wherever they call; nobody else does."""
+"""Authenticated callers get the stream's passphrase, from any address; others do not."""
 
 import ipaddress
 from pathlib import Path
@@ -93,9 +93,9 @@ async def test_who_is_let_in_no_more_knows_a_passphrase_that_is_worth_nothing(tm
             async def wishes() -> list[Any]:
                 return list(double.wishes)
 
-            (before,) = await eventually(wishes, len, "the wish has arrived")
+            (before,) = await eventually(wishes, len, "the request has arrived")
             robot.admin.revoke(ben.credential_id)
-            known = await eventually(wishes, lambda seen: len(seen) > 1, "another wish")
+            known = await eventually(wishes, lambda seen: len(seen) > 1, "another request")
             assert [each.enabled for each in known] == [True, True]
             assert known[1].passphrase not in {"", before.passphrase}
             assert (await status()).preview.endpoint.passphrase == known[1].passphrase

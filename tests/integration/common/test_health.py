@@ -65,7 +65,7 @@ async def test_watchers_learn_every_change_and_unknown_names_once_they_are_known
         assert (await watch.read()).status == NOT_SERVING
         health.set_serving("preview", serving=False)
         health.set_serving("preview", serving=True)
-        assert (await watch.read()).status == SERVING, "the same again is no news"
+        assert (await watch.read()).status == SERVING, "the same status again is not sent"
         watch.cancel()
 
 
