@@ -55,10 +55,9 @@ def load(settings_type: type[SettingsT], path: Path | None) -> SettingsT:
         return settings_type(**values)
     except ValidationError as error:
         prefix = settings_type.model_config.get("env_prefix", "")
-        raise UserError(
-            f"configuration {path or 'from the environment'}: {_first_problem(error)}",
+        raise _error(
+            f"{path or 'from the environment'}: {_first_problem(error)}",
             f"Correct it in the file or in the {prefix}* environment variable",
-            exit_code=ExitCode.USAGE,
         ) from error
 
 
@@ -66,30 +65,21 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(
-            f"configuration {path} can't be read: {error}",
-            "Name a readable file with --config",
-            exit_code=ExitCode.USAGE,
-        ) from error
+        raise _error(f"{path} can't be read: {error}", "Name a readable file with --config") from error
     # PyYAML raises ValueError for a date that does not exist and RecursionError for deep nesting.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UserError(f"configuration {path} is not YAML: {error}", exit_code=ExitCode.USAGE) from error
+        raise _error(f"{path} is not YAML: {error}") from error
     if values is None:
         return {}
     if not isinstance(values, dict):
-        raise UserError(
-            f"configuration {path} holds a {type(values).__name__} at the top level",
-            "Write keys and values, 'grpc:' for example",
-            exit_code=ExitCode.USAGE,
-        )
-    for key in values:
-        if not isinstance(key, str):
-            raise UserError(
-                f"configuration {path}: unknown key {key!r}",
-                "Keys are words, 'grpc:' for example",
-                exit_code=ExitCode.USAGE,
-            )
-    return values
+        kind = type(values).__name__
+        raise _error(f"{path} holds a {kind} at the top level", "Write keys and values, 'grpc:' for example")
+    # YAML keys may be numbers or dates; as text, they are reported as unknown keys like any other.
+    return {str(key): value for key, value in values.items()}
+
+
+def _error(problem: str, remedy: str = "") -> UserError:
+    return UserError(f"configuration {problem}", remedy, exit_code=ExitCode.USAGE)
 
 
 def _first_problem(error: ValidationError) -> str:

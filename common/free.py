@@ -10,6 +10,7 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 from common.errors import UserError
@@ -50,19 +51,9 @@ def port_is_free(kind: socket.SocketKind, port: int) -> bool:
     return _can_bind(kind, _LOOPBACK, port)
 
 
-def free_tcp_port() -> int:
-    """Returns a free TCP port; see `free_port`."""
-    return free_port(socket.SOCK_STREAM)
-
-
-def free_udp_port() -> int:
-    """Returns a free UDP port; see `free_port`."""
-    return free_port(socket.SOCK_DGRAM)
-
-
-def udp_port_is_free(port: int) -> bool:
-    """Returns whether this UDP port of 127.0.0.1 can be bound now."""
-    return port_is_free(socket.SOCK_DGRAM, port)
+free_tcp_port = partial(free_port, socket.SOCK_STREAM)
+free_udp_port = partial(free_port, socket.SOCK_DGRAM)
+udp_port_is_free = partial(port_is_free, socket.SOCK_DGRAM)
 
 
 @contextmanager

@@ -6,13 +6,13 @@ SERVICE to the server as a whole.
 
 import os
 import sys
-from typing import Final
+from typing import Any, Final
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
-_METHOD: Final = "/grpc.health.v1.Health/Check"
-_ANSWER_WITHIN_S: Final = 3.0
+_TIMEOUT_S: Final = 3.0
 
 
 def state_of(target: str, service: str = "") -> str:
@@ -23,14 +23,12 @@ def state_of(target: str, service: str = "") -> str:
         service: full name of a service, or another name that the server reports a status for.
     """
     with grpc.insecure_channel(target) as channel:
-        check = channel.unary_unary(
-            _METHOD, HealthCheckRequest.SerializeToString, HealthCheckResponse.FromString
-        )
+        stub: Any = HealthStub(channel)
         try:
-            answer = check(HealthCheckRequest(service=service), timeout=_ANSWER_WITHIN_S)
+            response = stub.Check(HealthCheckRequest(service=service), timeout=_TIMEOUT_S)
         except grpc.RpcError as error:
             return f"{error.code().name}: {error.details()}"
-    return HealthCheckResponse.ServingStatus.Name(answer.status)
+    return HealthCheckResponse.ServingStatus.Name(response.status)
 
 
 def main() -> None:

@@ -26,23 +26,16 @@ app = typer.Typer(help="Manage who may call this robot.", no_args_is_help=True)
 _MS_PER_S: Final = 1000
 
 Config: TypeAlias = Annotated[
-    Path | None,
-    typer.Option(envvar=CONFIG_VARIABLE, help="Configuration of the gateway, with security.credentials."),
+    Path | None, typer.Option(envvar=CONFIG_VARIABLE, help="Configuration with security.credentials.")
 ]
 Directory: TypeAlias = Annotated[
     Path | None, typer.Option(help="Directory of the credentials, instead of security.credentials.")
 ]
-Hosts: TypeAlias = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--host",
-        help="A name or address by which laptops reach this robot; may be repeated.",
-        metavar="HOST",
-    ),
-]
+_DAYS_HELP: Final = "Validity; by default unlimited for tokens, a year for certificates."
+_HOST_HELP: Final = "A name or address by which laptops reach this robot; may be repeated."
+Hosts: TypeAlias = Annotated[list[str] | None, typer.Option("--host", metavar="HOST", help=_HOST_HELP)]
 Out: TypeAlias = Annotated[
-    Path | None,
-    typer.Option(help="Write the login to this file (0600) instead of printing it."),
+    Path | None, typer.Option(help="Write the login to this file (0600) instead of printing it.")
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="For programs (docs/security.md).")]
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from common.errors import UserError
@@ -157,11 +156,6 @@ def mode(robot: Robot, now_s: float) -> Any:
     return String(data=robot.behaviour.mode) if robot.mode_changed() else None
 
 
-def command_of(commander: Commander, robot: Robot, now_s: float) -> Any:
-    """Builds geometry_msgs/TwistStamped of one input of the mux, while the mux selects it."""
-    return _command(robot) if robot.behaviour.commander is commander else None
-
-
 def effective_command(robot: Robot, now_s: float) -> Any:
     """Builds geometry_msgs/TwistStamped of the mux's output."""
     return None if robot.behaviour.commander is Commander.NOBODY else _command(robot)
@@ -186,6 +180,15 @@ class Publication:
     latched: bool = False
 
 
+def _mux_input(topic: str, commander: Commander) -> Publication:
+    """Returns a publication of geometry_msgs/TwistStamped on one input, silent unless the mux selects it."""
+
+    def build(robot: Robot, now_s: float) -> Any:
+        return _command(robot) if robot.behaviour.commander is commander else None
+
+    return Publication(topic, TwistStamped, build)
+
+
 PUBLICATIONS: dict[Topic, Publication] = {
     Topic.ODOMETRY: Publication("/odometry/filtered", Odometry, odometry),
     Topic.VISION: Publication("/vision/perf", VisionPerfSummary, vision),
@@ -193,15 +196,9 @@ PUBLICATIONS: dict[Topic, Publication] = {
     Topic.BATTERY: Publication("/battery", BatteryState, battery),
     Topic.DIAGNOSTICS: Publication("/diagnostics", DiagnosticArray, diagnostics),
     Topic.MODE: Publication("/mission/mode", String, mode, latched=True),
-    Topic.KEYBOARD_COMMANDS: Publication(
-        "/cmd_vel_keyboard", TwistStamped, partial(command_of, Commander.KEYBOARD)
-    ),
-    Topic.AUTONOMY_COMMANDS: Publication(
-        "/cmd_vel_autonomy", TwistStamped, partial(command_of, Commander.AUTONOMY)
-    ),
-    Topic.NAVIGATION_COMMANDS: Publication(
-        "/cmd_vel_nav", TwistStamped, partial(command_of, Commander.NAVIGATION)
-    ),
+    Topic.KEYBOARD_COMMANDS: _mux_input("/cmd_vel_keyboard", Commander.KEYBOARD),
+    Topic.AUTONOMY_COMMANDS: _mux_input("/cmd_vel_autonomy", Commander.AUTONOMY),
+    Topic.NAVIGATION_COMMANDS: _mux_input("/cmd_vel_nav", Commander.NAVIGATION),
     Topic.EFFECTIVE_COMMAND: Publication(
         "/mecanum_drive_controller/reference", TwistStamped, effective_command
     ),

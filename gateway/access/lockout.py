@@ -9,9 +9,10 @@ affects no holder of a credential.
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
+from common.backoff import Backoff
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.access.address_prefix import address_prefix
@@ -29,9 +30,10 @@ evades the lockout, but still has to guess 256 bits."""
 
 @dataclass(slots=True)
 class _Entry:
-    failures: int
     last_s: float
     locked_until_s: float
+    failures: int = 0
+    wait: Backoff = field(default_factory=lambda: Backoff(FIRST_WAIT_S, LONGEST_WAIT_S))
 
 
 class Lockout:
@@ -77,17 +79,16 @@ class Lockout:
         key, now_s = (address_prefix(host), credential_id), self._clock()
         entry = self._entries.pop(key, None)
         if entry is None or now_s - entry.last_s > FORGET_AFTER_S:
-            entry = _Entry(0, now_s, now_s)
+            entry = _Entry(now_s, now_s)
         entry.failures += 1
         entry.last_s = now_s
-        excess = entry.failures - FREE_FAILURES
-        if excess > 0:
-            # The exponent is bounded because a float overflows at 2**1024.
-            entry.locked_until_s = now_s + min(LONGEST_WAIT_S, FIRST_WAIT_S * 2.0 ** min(excess - 1, 16))
+        locked = entry.failures > FREE_FAILURES
+        if locked:
+            entry.locked_until_s = now_s + entry.wait.next_s()
         self._entries[key] = entry
         if len(self._entries) > MAX_ENTRIES:
             del self._entries[next(iter(self._entries))]
-        return excess > 0
+        return locked
 
     def succeeded(self, host: str, credential_id: str) -> None:
         """Resets the pair after a successful attempt."""

@@ -111,7 +111,7 @@ async def test_each_token_gives_its_role_and_nothing_else_gives_any(tmp_path: Pa
         )
     for login in (wrong, foreign, Login(""), Login("x" * 5000), Login("rgt-000000000000." + "A" * 43)):
         for path in PATHS:
-            # A fresh gateway every few calls has not locked anybody out yet.
+            # A fresh gateway every few calls has no lockouts yet.
             async with guarded_gateway(robot) as robot:
                 assert await answered(robot.channel(), path, login) == (
                     UNAUTHENTICATED,

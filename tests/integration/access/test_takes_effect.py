@@ -131,7 +131,7 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
         )
         calls = stub(robot)
 
-        async def told(detail: str) -> bool:
+        async def reported(detail: str) -> bool:
             events = calls.SubscribeEvents(SubscribeEventsRequest(), metadata=admin.metadata(), timeout=5)
             found = False
             async for answer in events:
@@ -141,9 +141,9 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
             events.cancel()
             return found
 
-        await until(lambda: told("client_joined"), True)
+        await until(lambda: reported("client_joined"), True)
         robot.admin.revoke(credential.credential_id)
-        await until(lambda: told("client_left"), True)
+        await until(lambda: reported("client_left"), True)
         unread.cancel()
 
 
@@ -284,13 +284,13 @@ async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path:
                     )
         expected = ["ben", *["a stranger"] * BURST, "ben"]
 
-        told = []
+        seen = []
         async with asyncio.timeout(20):
-            while len(told) < len(expected):
+            while len(seen) < len(expected):
                 answer = await events.read()
                 if answer.event.HasField("control_action"):
-                    told.append(answer.event.control_action.who or "a stranger")
-        assert told == expected
+                    seen.append(answer.event.control_action.who or "a stranger")
+        assert seen == expected
         events.cancel()
     records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
     assert [each["who"] or "a stranger" for each in records] == expected

@@ -1,4 +1,4 @@
-"""Who has proved who they are gets the stream's passphrase, from wherever they call; nobody else does."""
+"""Authenticated callers get the stream's passphrase, from any address; others do not."""
 
 import ipaddress
 from pathlib import Path
