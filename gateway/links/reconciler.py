@@ -64,7 +64,7 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
 
     Args:
         first_revision: larger than any that an earlier gateway of this boot assigned.
-        model: what is particular to this service.
+        model: the rules of this service.
 
     Attributes:
         desired: newest desired state.
