@@ -121,9 +121,13 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         self.changes.wake_all()
         return desired
 
-    async def settles(self, desired: Desired[SpecT], within_s: float) -> bool:
-        """Returns whether `desired` is reached, failed or replaced within that time."""
-        return await self.changes.wait_until(lambda: self._reconciler.settled(desired), within_s)
+    def settled(self, desired: Desired[SpecT]) -> bool:
+        """Whether `desired` was reached, failed or replaced."""
+        return self._reconciler.settled(desired)
+
+    async def wait_until_settled(self, desired: Desired[SpecT], timeout_s: float) -> bool:
+        """Returns whether `desired` has settled before the timeout."""
+        return await self.changes.wait_until(lambda: self.settled(desired), timeout_s)
 
     async def run(self) -> NoReturn:
         """Connects, and reconnects whenever the connection breaks, until cancelled."""
