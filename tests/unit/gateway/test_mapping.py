@@ -10,7 +10,6 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
-from gateway.links.preview import wire
 from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
@@ -69,7 +68,6 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
-from omniseer.preview.v1 import preview_service_pb2
 
 NOW_S = 1000.0
 CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
@@ -95,15 +93,6 @@ def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table:
     assert set(domain) <= set(table) <= {None, *domain}
     assert len(set(table.values())) == len(table)
     assert {0, *table.values()} == set(wire_enum.values())
-
-
-def test_the_preview_service_and_the_domain_cover_each_other() -> None:
-    assert set(wire.STATES.values()) == set(PreviewState)
-    assert {0, *wire.STATES} == set(preview_service_pb2.LifecycleState.values())
-    assert set(wire.PROFILES) == set(Profile)
-    assert {0, *wire.PROFILES.values()} == set(preview_service_pb2.Profile.values())
-    assert set(wire.CODECS.values()) == set(Codec)
-    assert {0, *wire.CODECS} == set(preview_service_pb2.Codec.values())
 
 
 def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
