@@ -102,7 +102,7 @@ def test_a_login_that_is_over_is_told_without_hammering_and_a_new_one_taken_over
         carla.link_is("not allowed")
         banner = carla.window.banner
         assert banner.isVisible()
-        assert "was revoked. Ask whoever keeps this robot" in banner.text.text()
+        assert "was revoked. Ask this robot's administrator" in banner.text.text()
         assert "robotctl login" in banner.text.text()
         assert not carla.window.preview.switch.isEnabled()
         let_pass(WATCHED_S)

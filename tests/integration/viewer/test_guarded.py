@@ -85,7 +85,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         card = banner(window.robot.session.playback())
         assert card
         assert (
-            "was revoked. Ask whoever keeps this robot for access, then type: robotctl login" in card.detail
+            "was revoked. Ask this robot's administrator for access, then type: robotctl login" in card.detail
         )
         robot.log_in("dora", Role.OPERATOR)
         until(
