@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
 from console.window.monitor_program import monitor
@@ -26,7 +26,7 @@ SMALL_LAPTOP = (1366, 768)
 
 
 def troubled() -> GatewayDouble:
-    """Something of every tone."""
+    """Something of every style."""
     made = GatewayDouble()
     made.status.vision.stale, made.status.vision.age_ms = True, 3400
     made.status.faults.add(
@@ -88,17 +88,17 @@ def test_a_desktop_that_turns_dark_takes_the_window_along(window: MonitorWindow)
     until(lambda: brightness(line.palette().color(QPalette.ColorRole.Window)) < bright / 4, "a dark line")
 
 
-def drawn(tone: Tone) -> QImage:
+def drawn(style: SeverityStyle) -> QImage:
     image = QImage(32, 32, QImage.Format.Format_RGB32)
     image.fill(LIGHT)
     painter = QPainter(image)
-    draw_shape(painter, QRectF(2, 2, 28, 28), tone, QApplication.palette())
+    draw_shape(painter, QRectF(2, 2, 28, 28), style, QApplication.palette())
     painter.end()
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
-@pytest.mark.parametrize(("one", "other"), list(combinations(Tone, 2)))
-def test_shapes_differ_without_any_colour(desk: None, one: Tone, other: Tone) -> None:
+@pytest.mark.parametrize(("one", "other"), list(combinations(SeverityStyle, 2)))
+def test_shapes_differ_without_any_colour(desk: None, one: SeverityStyle, other: SeverityStyle) -> None:
     first, second = drawn(one), drawn(other)
     differing = sum(
         abs(QColor(first.pixel(x, y)).red() - QColor(second.pixel(x, y)).red()) > 60
