@@ -71,7 +71,7 @@ def view(
     _require_gstreamer()
     if not headless:
         with _requiring_qt("--headless works without"):
-            from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
+            from console.window.programs import run_view  # noqa: PLC0415 - Qt is needed here only
     # A login that can't be used is reported before a file is made.
     session.credentials()
     recording = Recording(record) if record else None
@@ -93,7 +93,7 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
     """
     with _requiring_qt():
-        from console.window.monitor_program import run_monitor  # noqa: PLC0415 - Qt is needed here only
+        from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
     session = session_of(context, target, False, robot)
     run_monitor(session.target, session.credentials)
 

@@ -6,13 +6,13 @@ from typing import Final
 
 from console.client import CaughtUp, Event, EventGap, FaultSeverity, Outage
 from console.client.results import EventKind, GapReason
-from console.tone import Tone
-from console.words import plural
+from console.presentation.formatting import plural
+from console.presentation.severity_style import SeverityStyle
 
 CAPACITY: Final = 200
 """Lines that are kept; older ones are dropped."""
 _MS_PER_S: Final = 1000
-_TONES: Final = {FaultSeverity.WARNING: Tone.WARNING, FaultSeverity.ERROR: Tone.BAD}
+_STYLES: Final = {FaultSeverity.WARNING: SeverityStyle.WARNING, FaultSeverity.ERROR: SeverityStyle.BAD}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +24,13 @@ class EventLine:
         the
             robot gives no time.
         text: what happened.
-        tone: its severity.
+        style: its severity.
         own: whether the monitor reports it, not the robot.
     """
 
     at_s: float
     text: str
-    tone: Tone = Tone.QUIET
+    style: SeverityStyle = SeverityStyle.QUIET
     own: bool = False
 
 
@@ -66,10 +66,10 @@ def line_of(item: Event | EventGap | CaughtUp | Outage, now_s: float) -> EventLi
     """
     match item:
         case Event():
-            tone = _TONES.get(item.severity, Tone.QUIET)
-            return EventLine(item.wall_clock_unix_ms / _MS_PER_S, _text(item), tone)
+            style = _STYLES.get(item.severity, SeverityStyle.QUIET)
+            return EventLine(item.wall_clock_unix_ms / _MS_PER_S, _text(item), style)
         case EventGap():
-            return EventLine(now_s, _gap_text(item), Tone.WARNING, own=True)
+            return EventLine(now_s, _gap_text(item), SeverityStyle.WARNING, own=True)
         case CaughtUp() | Outage():
             # The window's header shows the state of the connection.
             return None
@@ -80,7 +80,7 @@ def _text(event: Event) -> str:
         who = event.control.who or event.control.address
         return f"{who} asked for {event.control.method}: {event.control.result.value}, {event.control.answer}"
     cleared = event.kind is EventKind.FAULT_CLEARED
-    severity = "cleared" if cleared else event.severity.value if event.severity in _TONES else ""
+    severity = "cleared" if cleared else event.severity.value if event.severity in _STYLES else ""
     # The message may contain its own prefix.
     prefix = [word for word in (severity, event.component) if word and word not in event.message]
     return ": ".join([*prefix, event.message])

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
-from console.tone import Tone
-from console.words import age
+from console.presentation.formatting import age
+from console.presentation.severity_style import SeverityStyle
 
 _MS_PER_S = 1000
 
@@ -48,14 +48,14 @@ class LinkText:
 
     Args:
         mark: one or two words.
-        tone: colour and shape of the mark.
+        style: colour and shape of the mark.
         detail: the figure that goes with it.
         banner: the error and its remedy; empty without an error.
         retry: how long the error has lasted, and the next attempt; empty without an error.
     """
 
     mark: str
-    tone: Tone
+    style: SeverityStyle
     detail: str
     banner: str = ""
     retry: str = ""
@@ -67,16 +67,16 @@ def link_text(link: Link, target: str, now_s: float) -> LinkText:
     match link.state:
         case LinkState.CONNECTED:
             answers = "" if link.answer_ms is None else f"answers in {link.answer_ms:.0f} ms"
-            return LinkText("connected", Tone.GOOD, answers)
+            return LinkText("connected", SeverityStyle.GOOD, answers)
         case LinkState.CONNECTING:
-            return LinkText("connecting", Tone.QUIET, f"for {duration}")
+            return LinkText("connecting", SeverityStyle.QUIET, f"for {duration}")
         case LinkState.LOST:
             error = str(link.error or f"{target} does not answer")
             rejected = isinstance(link.error, NotAllowed | NotTrusted)
             lack = "No access" if rejected else "No answer"
             retry = f"{lack} for {duration}. Attempt {link.attempts + 1} {_when(link, rejected, now_s)}."
             banner = error[:1].upper() + error[1:]
-            return LinkText(_mark(link.error), Tone.BAD, f"for {duration}", banner, retry)
+            return LinkText(_mark(link.error), SeverityStyle.BAD, f"for {duration}", banner, retry)
 
 
 def _mark(error: GatewayError | None) -> str:

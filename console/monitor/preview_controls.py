@@ -7,20 +7,12 @@ from typing import Final
 from console.client import GatewayError, PreviewProfile, PreviewState, PreviewStatus
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
-from console.tone import Tone
-from console.words import joined
+from console.presentation.formatting import joined
+from console.presentation.severity_style import PREVIEW_STYLES, SeverityStyle
 
 PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 """In the order of the keys 1 to 3."""
 _SUCCESS_SHOWN_S = 5.0
-_TONES = {
-    PreviewState.RUNNING: Tone.GOOD,
-    PreviewState.STARTING: Tone.WARNING,
-    PreviewState.STOPPING: Tone.WARNING,
-    PreviewState.FAULTED: Tone.BAD,
-    PreviewState.DISABLED: Tone.QUIET,
-    PreviewState.UNKNOWN: Tone.QUIET,
-}
 _ON = (PreviewState.RUNNING, PreviewState.STARTING, PreviewState.FAULTED)
 
 
@@ -29,7 +21,7 @@ class Note:
     """A sentence beside the controls."""
 
     text: str
-    tone: Tone
+    style: SeverityStyle
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +33,7 @@ class Controls:
         on: whether the preview runs, starts or is faulted: the switch then turns it off.
         profile: the one in force, or the one that the switch would request.
         mark: the preview's state in a word.
-        tone: colour and shape of the mark.
+        style: colour and shape of the mark.
         summary: size, rate and encoder.
         notes: the outcome of the operator's request, then the robot's own messages.
     """
@@ -50,7 +42,7 @@ class Controls:
     on: bool
     profile: PreviewProfile
     mark: str
-    tone: Tone
+    style: SeverityStyle
     summary: str
     notes: tuple[Note, ...]
 
@@ -80,7 +72,7 @@ def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float)
         on=on,
         profile=_profile(preview, None if on else selected),
         mark=current.value.upper(),
-        tone=_TONES[current],
+        style=PREVIEW_STYLES[current],
         summary=_summary(preview) if preview and current is not PreviewState.UNKNOWN else "",
         notes=(*_request_notes(state.request, now_s), *(_robot_notes(preview) if preview else ())),
     )
@@ -108,22 +100,27 @@ def _request_notes(request: PreviewRequest | None, now_s: float) -> Iterator[Not
         return
     outcome = request.outcome
     if outcome is None:
-        yield Note("Waiting for the robot ...", Tone.QUIET)
+        yield Note("Waiting for the robot ...", SeverityStyle.QUIET)
     elif isinstance(outcome, GatewayError):
-        yield Note(f"Request failed: {outcome}", Tone.BAD)
+        yield Note(f"Request failed: {outcome}", SeverityStyle.BAD)
     elif not outcome.accepted:
-        yield Note(f"The robot refused: {outcome.message}", Tone.BAD)
+        yield Note(f"The robot refused: {outcome.message}", SeverityStyle.BAD)
     elif outcome.preview.state is not PreviewState.FAULTED and now_s - request.ended_s < _SUCCESS_SHOWN_S:
         # The reason of a fault is the robot's own note.
-        yield Note(outcome.message, Tone.QUIET)
+        yield Note(outcome.message, SeverityStyle.QUIET)
 
 
 def _robot_notes(preview: PreviewStatus) -> Iterator[Note]:
     if preview.last_error:
-        yield Note(preview.last_error, Tone.BAD if preview.state is PreviewState.FAULTED else Tone.WARNING)
+        yield Note(
+            preview.last_error,
+            SeverityStyle.BAD if preview.state is PreviewState.FAULTED else SeverityStyle.WARNING,
+        )
     elif not preview.service_reachable:
-        yield Note("The preview service on the robot does not answer the gateway", Tone.WARNING)
+        yield Note("The preview service on the robot does not answer the gateway", SeverityStyle.WARNING)
     if preview.encoder and preview.encoder.fallback_reason:
-        yield Note(f"Wanted {preview.encoder.wanted}: {preview.encoder.fallback_reason}", Tone.WARNING)
+        yield Note(
+            f"Wanted {preview.encoder.wanted}: {preview.encoder.fallback_reason}", SeverityStyle.WARNING
+        )
     if preview.bitrate_reason:
-        yield Note(f"Bit rate: {preview.bitrate_reason}", Tone.WARNING)
+        yield Note(f"Bit rate: {preview.bitrate_reason}", SeverityStyle.WARNING)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from console.client import OverlaySnapshot
 from console.client.results import OperatorEvent
 from console.monitor.event_log import EventLine
-from console.words import plural
+from console.presentation.formatting import plural
 
 _MS_PER_S = 1000
 

@@ -3,21 +3,21 @@
 from dataclasses import dataclass
 from typing import Final
 
+from console.presentation.formatting import joined, plural
+from console.presentation.severity_style import SeverityStyle
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
-from console.tone import Tone
 from console.viewer.playback import Playback, PlaybackState
-from console.words import joined, plural
 
 _MIB: Final = 1 << 20
 _TITLES: Final = {
-    PlaybackState.CONNECTING: ("Connecting", Tone.QUIET),
-    PlaybackState.FROZEN: ("Frozen", Tone.BAD),
-    PlaybackState.OFF: ("Preview is off", Tone.QUIET),
-    PlaybackState.FAULTED: ("Preview faulted", Tone.BAD),
-    PlaybackState.UNREACHABLE: ("Robot unreachable", Tone.BAD),
-    PlaybackState.NO_ACCESS: ("No access to the robot", Tone.BAD),
-    PlaybackState.BLOCKED: ("This computer can't show the stream", Tone.BAD),
+    PlaybackState.CONNECTING: ("Connecting", SeverityStyle.QUIET),
+    PlaybackState.FROZEN: ("Frozen", SeverityStyle.BAD),
+    PlaybackState.OFF: ("Preview is off", SeverityStyle.QUIET),
+    PlaybackState.FAULTED: ("Preview faulted", SeverityStyle.BAD),
+    PlaybackState.UNREACHABLE: ("Robot unreachable", SeverityStyle.BAD),
+    PlaybackState.NO_ACCESS: ("No access to the robot", SeverityStyle.BAD),
+    PlaybackState.BLOCKED: ("This computer can't show the stream", SeverityStyle.BAD),
 }
 
 
@@ -28,19 +28,19 @@ class Banner:
     Args:
         title: the state, with its duration.
         detail: the reason and the remedy; may be empty.
-        tone: its severity.
+        style: its severity.
     """
 
     title: str
     detail: str
-    tone: Tone
+    style: SeverityStyle
 
 
 def banner(playback: Playback) -> Banner | None:
     """Returns the banner of a playback state; None over live video."""
     if playback.state is PlaybackState.LIVE:
         return None
-    title, tone = _TITLES[playback.state]
+    title, style = _TITLES[playback.state]
     if playback.frame_age_s is not None:
         duration = f"for {_duration(playback.frame_age_s)}"
         frozen = playback.state is PlaybackState.FROZEN
@@ -49,7 +49,7 @@ def banner(playback: Playback) -> Banner | None:
     if playback.redials and playback.state in (PlaybackState.CONNECTING, PlaybackState.FROZEN):
         redials = f"reconnected {playback.redials} times" if playback.redials > 1 else "reconnected once"
         detail = f"{detail} ({redials})" if detail else redials.capitalize()
-    return Banner(title, detail, tone)
+    return Banner(title, detail, style)
 
 
 def figures_line(latest: Frame | None, fps: float, redials: int) -> str:

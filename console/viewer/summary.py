@@ -5,10 +5,10 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from console.presentation.formatting import joined, plural
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.formatting import mebibytes
-from console.words import joined, plural
 
 _MS_PER_S = 1000
 

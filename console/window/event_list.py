@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from console.monitor.event_log import CAPACITY, EventLine, EventLog
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 
 _LINES_SHOWN: Final = 8
 
@@ -44,6 +44,6 @@ def _item(event: EventLine) -> QListWidgetItem:
     item = QListWidgetItem(f"{at}  {event.text}")
     font = item.font()
     font.setItalic(event.own)
-    font.setBold(event.tone in (Tone.WARNING, Tone.BAD))
+    font.setBold(event.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
     item.setFont(font)
     return item

@@ -3,16 +3,13 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from console.client.results import HealthState
 from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
-from console.tone import Tone
+from console.presentation.formatting import UNKNOWN, joined
+from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
 from console.window.labels import ElidedLabel, WrappedLabel, plain_label, scale_font, set_bold, set_text
 from console.window.lines import TintedLine
 from console.window.theme import DimLabel, Marker
-from console.words import UNKNOWN, joined
-
-_HEALTH = {HealthState.OK: Tone.GOOD, HealthState.DEGRADED: Tone.WARNING, HealthState.UNKNOWN: Tone.QUIET}
 
 
 class Header(QWidget):
@@ -39,18 +36,18 @@ class Header(QWidget):
 
     def show_state(self, state: MonitorState, link: LinkText, now_s: float) -> None:
         """Shows the latest state."""
-        self.link.show_word(link.tone, link.mark, link.detail)
+        self.link.show_word(link.style, link.mark, link.detail)
         if state.snapshot is None:
-            self.health.show_word(Tone.QUIET, "not known", "")
+            self.health.show_word(SeverityStyle.QUIET, "not known", "")
             return
         status, health = state.snapshot.status, state.snapshot.status.health
         set_text(self.name, status.gateway_name or "robot")
         self.target.setToolTip(f"Gateway {status.gateway_version or UNKNOWN}")
         if state.outdated(now_s):
             last = joined(f"last known: {health.state.value.upper()}", health.summary)
-            self.health.show_word(Tone.QUIET, "not known", last)
+            self.health.show_word(SeverityStyle.QUIET, "not known", last)
         else:
-            self.health.show_word(_HEALTH[health.state], health.state.value.upper(), health.summary)
+            self.health.show_word(HEALTH_STYLES[health.state], health.state.value.upper(), health.summary)
 
 
 class MarkedWord(QWidget):
@@ -70,9 +67,9 @@ class MarkedWord(QWidget):
         layout.addWidget(self.word)
         layout.addWidget(self.detail, 1)
 
-    def show_word(self, tone: Tone, word: str, detail: str) -> None:
+    def show_word(self, style: SeverityStyle, word: str, detail: str) -> None:
         """Changes all three."""
-        self.marker.show_tone(tone)
+        self.marker.show_style(style)
         set_text(self.word, word)
         set_text(self.detail, detail)
         self.setAccessibleName(joined(word, detail))
@@ -101,6 +98,6 @@ class ConnectionBanner(TintedLine):
         """Shows the latest text."""
         self.setVisible(bool(link.banner))
         if link.banner:
-            self.show_tone(link.tone)
+            self.show_style(link.style)
             set_text(self.text, link.banner)
             set_text(self.next_try, link.retry)

@@ -8,21 +8,21 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
 
-from console.monitor.components import Component
-from console.monitor.faults import FaultLine
 from console.monitor.preview_controls import Note
-from console.tone import Tone
+from console.monitor.status_rows import FaultLine
+from console.presentation.severity_style import SeverityStyle
+from console.presentation.status_table import Row
 from console.window.labels import RIGHT, TOP, WrappedLabel, plain_label, set_bold, set_text, width_of
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 
-_LONGEST_NAME = "Its battery"
+_LONGEST_LABEL = "Computer battery"
 _LONGEST_MARK = "no data"
 _LONGEST_AGE = "59 min 00 s"
 _LONGEST_SEVERITY = "warning"
 
 
 class TintedLine(QFrame):
-    """A line whose ground takes the colour of its tone, behind a marker of the tone's shape."""
+    """A line whose ground takes the colour of its style, behind a marker of the style's shape."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -34,9 +34,9 @@ class TintedLine(QFrame):
         self.grid.setVerticalSpacing(1)
         self.grid.addWidget(self.marker, 0, 0, TOP)
 
-    def show_tone(self, tone: Tone) -> None:
+    def show_style(self, style: SeverityStyle) -> None:
         """Changes shape and ground."""
-        self.marker.show_tone(tone)
+        self.marker.show_style(style)
         self._colour_ground()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
@@ -47,7 +47,7 @@ class TintedLine(QFrame):
 
     def _colour_ground(self) -> None:
         parent = self.parentWidget()
-        ground = tinted_ground((parent or self).palette(), self.marker.tone)
+        ground = tinted_ground((parent or self).palette(), self.marker.severity)
         palette = self.palette()
         if palette.color(QPalette.ColorRole.Window) != ground:
             palette.setColor(QPalette.ColorRole.Window, ground)
@@ -105,7 +105,7 @@ class ComponentLine(ItemLine):
         super().__init__()
         self.name, self.mark = plain_label(), plain_label()
         self.values, self.age = WrappedLabel(), DimLabel()
-        self.name.setFixedWidth(width_of(_LONGEST_NAME))
+        self.name.setFixedWidth(width_of(_LONGEST_LABEL))
         self.mark.setFixedWidth(width_of(_LONGEST_MARK, bold=True))
         self.age.setFixedWidth(width_of(_LONGEST_AGE))
         self.age.setAlignment(RIGHT)
@@ -115,15 +115,15 @@ class ComponentLine(ItemLine):
         self.grid.addWidget(self.age, 0, 4, TOP)
         self.grid.setColumnStretch(3, 1)
 
-    def show_item(self, item: Component) -> None:
+    def show_item(self, item: Row) -> None:
         """Shows one component."""
-        self.show_tone(item.tone)
-        set_text(self.name, item.name)
+        self.show_style(item.style)
+        set_text(self.name, item.label)
         set_text(self.mark, item.mark)
-        set_bold(self.mark, item.tone in (Tone.WARNING, Tone.BAD))
-        set_text(self.values, item.values)
+        set_bold(self.mark, item.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
+        set_text(self.values, item.text)
         set_text(self.age, item.age)
-        self.setAccessibleName(f"{item.name}: {item.mark}. {item.values}. {item.age}")
+        self.setAccessibleName(f"{item.label}: {item.mark}. {item.text}. {item.age}")
 
 
 class FaultWidget(ItemLine):
@@ -145,7 +145,7 @@ class FaultWidget(ItemLine):
 
     def show_item(self, item: FaultLine) -> None:
         """Shows one fault."""
-        self.show_tone(item.tone)
+        self.show_style(item.style)
         set_text(self.mark, item.mark)
         set_text(self.message, item.message)
         set_text(self.remedy, item.remedy)
@@ -165,7 +165,7 @@ class NoteLine(ItemLine):
 
     def show_item(self, item: Note) -> None:
         """Shows one note."""
-        self.show_tone(item.tone)
+        self.show_style(item.style)
         self.marker.show_blank(not item.text)
         set_text(self.text, item.text)
         self.text.setToolTip(item.text)

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QVBoxLayou
 
 from console.client import PreviewProfile
 from console.monitor.preview_controls import PROFILES, Controls, Note
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from console.window.header import MarkedWord
 from console.window.labels import plain_label
 from console.window.lines import LineList, NoteLine
@@ -16,7 +16,7 @@ _TITLES = {
     PreviewProfile.HIGH_QUALITY: ("&High quality", "Key 3"),
 }
 # An empty line: the video above must not jump with every answer.
-_NO_NOTE = (Note("", Tone.QUIET),)
+_NO_NOTE = (Note("", SeverityStyle.QUIET),)
 
 
 class PreviewPanel(QWidget):
@@ -40,7 +40,7 @@ class PreviewPanel(QWidget):
 
     def show_controls(self, now: Controls) -> None:
         """Shows the latest controls."""
-        self.state.show_word(now.tone, now.mark, now.summary)
+        self.state.show_word(now.style, now.mark, now.summary)
         _set_button_text(self.switch, "&Stop preview" if now.on else "&Start preview")
         for profile, button in self.profiles.items():
             _check(button, profile, profile is now.profile)

@@ -3,18 +3,17 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from console.monitor.components import components
-from console.monitor.faults import FaultLine, fault_lines
 from console.monitor.monitor_state import MonitorState
-from console.tone import Tone
+from console.monitor.status_rows import FaultLine, component_rows, fault_lines
+from console.presentation.formatting import age
+from console.presentation.severity_style import SeverityStyle
 from console.window.event_list import EventList
 from console.window.labels import set_bold, set_text
 from console.window.lines import ComponentLine, FaultWidget, LineList
-from console.words import age
 
 _MIN_WIDTH_CHARS = 34
-_NO_FAULT = FaultLine("none", Tone.GOOD, "The robot reports no fault", "", "")
-_NO_STATUS = FaultLine("", Tone.QUIET, "No status received yet", "", "")
+_NO_FAULT = FaultLine("none", SeverityStyle.GOOD, "The robot reports no fault", "", "")
+_NO_STATUS = FaultLine("", SeverityStyle.QUIET, "No status received yet", "", "")
 
 
 class SidePanel(QWidget):
@@ -35,7 +34,7 @@ class SidePanel(QWidget):
         """Shows the latest state."""
         none = _NO_STATUS if state.snapshot is None else _NO_FAULT
         self.faults.show_items(fault_lines(state, now_s) or [none])
-        self.components.show_items(components(state, now_s))
+        self.components.show_items(component_rows(state, now_s))
         received = ""
         if state.snapshot and state.outdated(now_s):
             received = f", as of {age(state.snapshot_age_ms(now_s))} ago"

@@ -7,12 +7,12 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 
-COLOURS: Final[Mapping[Tone, QColor]] = {
-    Tone.GOOD: QColor("#009E73"),
-    Tone.WARNING: QColor("#E69F00"),
-    Tone.BAD: QColor("#D55E00"),
+COLOURS: Final[Mapping[SeverityStyle, QColor]] = {
+    SeverityStyle.GOOD: QColor("#009E73"),
+    SeverityStyle.WARNING: QColor("#E69F00"),
+    SeverityStyle.BAD: QColor("#D55E00"),
 }
 """Bluish green, orange, vermillion. QUIET has no colour of its own."""
 CURVE_ON_LIGHT: Final = QColor("#0072B2")
@@ -39,11 +39,11 @@ def mixed(one: QColor, other: QColor, share: float) -> QColor:
     return QColor.fromRgbF(*mix)
 
 
-def tinted_ground(palette: QPalette, tone: Tone) -> QColor:
-    """Returns the ground behind a line of this tone."""
+def tinted_ground(palette: QPalette, style: SeverityStyle) -> QColor:
+    """Returns the ground behind a line of this style."""
     ground = palette.color(QPalette.ColorRole.Window)
-    colour = COLOURS.get(tone)
-    return mixed(ground, colour, _TINT) if colour and tone is not Tone.GOOD else ground
+    colour = COLOURS.get(style)
+    return mixed(ground, colour, _TINT) if colour and style is not SeverityStyle.GOOD else ground
 
 
 def dim_text(palette: QPalette) -> QColor:
@@ -77,26 +77,26 @@ class Marker(QWidget):
     """A small shape: a disc with a tick, a triangle with "!", a square with a cross, an empty ring.
 
     Args:
-        tone: selects the shape.
+        style: selects the shape.
     """
 
-    def __init__(self, tone: Tone = Tone.QUIET) -> None:
+    def __init__(self, style: SeverityStyle = SeverityStyle.QUIET) -> None:
         super().__init__()
-        self._tone = tone
+        self._severity = style
         self._blank = False
         side = self.fontMetrics().height()
         self.setFixedSize(side, side)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
     @property
-    def tone(self) -> Tone:
-        """The tone shown."""
-        return self._tone
+    def severity(self) -> SeverityStyle:
+        """The style shown."""
+        return self._severity
 
-    def show_tone(self, tone: Tone) -> None:
+    def show_style(self, style: SeverityStyle) -> None:
         """Changes the shape."""
-        if tone is not self._tone:
-            self._tone = tone
+        if style is not self._severity:
+            self._severity = style
             self.update()
 
     def show_blank(self, blank: bool) -> None:
@@ -111,34 +111,36 @@ class Marker(QWidget):
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        draw_shape(painter, QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), self._tone, self.palette())
+        draw_shape(
+            painter, QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), self._severity, self.palette()
+        )
 
 
-def draw_shape(painter: QPainter, box: QRectF, tone: Tone, palette: QPalette) -> None:
-    """Draws the shape of a tone, as large as the box."""
+def draw_shape(painter: QPainter, box: QRectF, style: SeverityStyle, palette: QPalette) -> None:
+    """Draws the shape of a style, as large as the box."""
     outline = palette.color(QPalette.ColorRole.WindowText)
     painter.setPen(QPen(outline, 1))
-    painter.setBrush(COLOURS.get(tone, QColor(Qt.GlobalColor.transparent)))
+    painter.setBrush(COLOURS.get(style, QColor(Qt.GlobalColor.transparent)))
     ink = QPen(_INK, max(1.5, box.width() / 7), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
 
     def at(x: float, y: float) -> QPointF:
         return QPointF(box.left() + x * box.width(), box.top() + y * box.height())
 
-    match tone:
-        case Tone.GOOD:
+    match style:
+        case SeverityStyle.GOOD:
             painter.drawEllipse(box)
             painter.setPen(ink)
             painter.drawPolyline(QPolygonF([at(0.28, 0.52), at(0.45, 0.70), at(0.74, 0.32)]))
-        case Tone.WARNING:
+        case SeverityStyle.WARNING:
             painter.drawPolygon(QPolygonF([at(0.5, 0.0), at(1.0, 0.95), at(0.0, 0.95)]))
             painter.setPen(ink)
             painter.drawLine(at(0.5, 0.36), at(0.5, 0.62))
             painter.drawPoint(at(0.5, 0.81))
-        case Tone.BAD:
+        case SeverityStyle.BAD:
             painter.drawRect(box)
             painter.setPen(ink)
             painter.drawLine(at(0.28, 0.28), at(0.72, 0.72))
             painter.drawLine(at(0.72, 0.28), at(0.28, 0.72))
-        case Tone.QUIET:
+        case SeverityStyle.QUIET:
             painter.setPen(QPen(dim_text(palette), 1.5))
             painter.drawEllipse(box.adjusted(1.5, 1.5, -1.5, -1.5))

@@ -57,7 +57,7 @@ def draw_banner(painter: QPainter, whole: QRectF, text: Banner, *, over_frame: b
     height = title.height() + (detail.height() + _GAP if text.detail else 0) + 2 * _MARGIN
     top = whole.bottom() - _MARGIN - height if over_frame else whole.center().y() - height / 2
     card = QRectF(whole.center().x() - width / 2, max(whole.top(), top), width, height)
-    _draw_card(painter, card, COLOURS.get(text.tone, _QUIET))
+    _draw_card(painter, card, COLOURS.get(text.style, _QUIET))
     room.moveTo(card.left() + _STRIPE + _MARGIN, card.top() + _MARGIN)
     _write(painter, title_font, _INK, room, text.title)
     room.translate(0, title.height() + _GAP)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from console.client import CaughtUp, DeadlineExceeded, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import ControlAction, ControlResult, EventKind, GapReason
 from console.monitor.event_log import CAPACITY, EventLine, EventLog, line_of
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 
 HERE = EventPosition("run", 7)
 
@@ -24,12 +24,12 @@ def happened(kind: EventKind, severity: FaultSeverity, component: str, message: 
 
 def test_a_fault_says_how_bad_it_is_and_who_has_it() -> None:
     raised = happened(EventKind.FAULT_RAISED, FaultSeverity.ERROR, "lidar", "stopped turning")
-    assert line_of(raised, 0) == EventLine(5000.5, "error: lidar: stopped turning", Tone.BAD)
+    assert line_of(raised, 0) == EventLine(5000.5, "error: lidar: stopped turning", SeverityStyle.BAD)
 
 
 def test_a_component_is_not_named_twice() -> None:
     running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, BALANCED")
-    assert line_of(running, 0) == EventLine(5000.5, "preview running, BALANCED", Tone.QUIET)
+    assert line_of(running, 0) == EventLine(5000.5, "preview running, BALANCED", SeverityStyle.QUIET)
 
 
 def test_a_cleared_fault_says_so() -> None:
@@ -63,11 +63,11 @@ def test_who_asked_for_what_and_what_came_of_it() -> None:
     assert line.text == "anna asked for SetPreviewMode: refused, not now"
 
 
-def test_what_is_missing_is_told() -> None:
+def test_missed_events_are_reported() -> None:
     gap = EventGap(reason=GapReason.NO_LONGER_KEPT, missed_count=3, position=HERE)
     line = line_of(gap, 99.0)
     assert line == EventLine(
-        99.0, "3 events missed: more came than the gateway keeps", Tone.WARNING, own=True
+        99.0, "3 events missed: more came than the gateway keeps", SeverityStyle.WARNING, own=True
     )
     anew = line_of(EventGap(reason=GapReason.NEW_RUN, missed_count=0, position=HERE), 99.0)
     assert anew

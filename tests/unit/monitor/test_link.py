@@ -4,7 +4,7 @@ import pytest
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, Unreachable
 from console.monitor.link import Link, LinkState, link_text
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 
 TARGET = "lab-1:50051"
 
@@ -15,15 +15,15 @@ def lost(error: GatewayError, next_try_s: float | None) -> Link:
 
 def test_connected() -> None:
     text = link_text(Link(state=LinkState.CONNECTED, since_s=0, answer_ms=3.4), TARGET, 100)
-    assert (text.mark, text.tone, text.detail) == ("connected", Tone.GOOD, "answers in 3 ms")
+    assert (text.mark, text.style, text.detail) == ("connected", SeverityStyle.GOOD, "answers in 3 ms")
     assert not text.banner
 
 
 def test_connecting_is_no_alarm() -> None:
     text = link_text(Link(state=LinkState.CONNECTING, since_s=98.5), TARGET, 100)
-    assert (text.mark, text.tone, text.detail, text.banner) == (
+    assert (text.mark, text.style, text.detail, text.banner) == (
         "connecting",
-        Tone.QUIET,
+        SeverityStyle.QUIET,
         "for 1.5 s",
         "",
     )
@@ -31,7 +31,7 @@ def test_connecting_is_no_alarm() -> None:
 
 def test_unreachable_says_what_happened_what_to_do_and_what_comes_next() -> None:
     text = link_text(lost(Unreachable("nothing listens there", "Start it"), 113.2), TARGET, 112)
-    assert (text.mark, text.tone, text.detail) == ("unreachable", Tone.BAD, "for 12.0 s")
+    assert (text.mark, text.style, text.detail) == ("unreachable", SeverityStyle.BAD, "for 12.0 s")
     assert text.banner == "Nothing listens there. Start it"
     assert text.retry == "No answer for 12.0 s. Attempt 4 in 2 s."
 
@@ -52,7 +52,7 @@ def test_a_robot_that_refuses_is_not_called_unreachable(error: GatewayError, mar
     assert link_text(lost(error, 113), TARGET, 112).mark == mark
 
 
-def test_who_is_refused_learns_what_would_help_and_that_nobody_was_silent() -> None:
+def test_who_is_refused_learns_what_would_help_and_that_the_robot_was_not_silent() -> None:
     text = link_text(lost(NotAllowed("the token of anna was revoked"), 117), TARGET, 112)
     assert text.banner.startswith("The token of anna was revoked. Ask this robot's administrator")
     assert text.retry == "No access for 12.0 s. Attempt 4 in 5 s, or as soon as another login is stored."

@@ -8,7 +8,7 @@ from console.client import DeadlineExceeded, OverlaySnapshot, PreviewChange, Pre
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
 from console.monitor.preview_controls import Controls, Note, controls
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.snapshots import NOW_S, heard, snapshot
@@ -62,14 +62,14 @@ def test_on_the_robots_profile_counts_not_the_selected_one() -> None:
     assert of(RUNNING, selected=LOW).profile is HIGH
 
 
-def test_a_profile_nobody_ever_chose_is_balanced() -> None:
+def test_an_unknown_profile_is_shown_as_balanced() -> None:
     assert of(snapshot()).profile is BALANCED
 
 
 def test_while_a_request_runs_nothing_may_be_touched() -> None:
     now = of(DISABLED, PreviewRequest(DesiredPreview(True)))
     assert not now.enabled
-    assert now.notes[0] == Note("Waiting for the robot ...", Tone.QUIET)
+    assert now.notes[0] == Note("Waiting for the robot ...", SeverityStyle.QUIET)
 
 
 @pytest.mark.parametrize(
@@ -82,33 +82,35 @@ def test_while_a_request_runs_nothing_may_be_touched() -> None:
 def test_without_a_connection_nothing_may_be_touched_and_nothing_is_claimed(state: MonitorState) -> None:
     now = controls(state, None, NOW_S)
     assert not now.enabled
-    assert (now.mark, now.tone) == ("UNKNOWN", Tone.QUIET)
+    assert (now.mark, now.style) == ("UNKNOWN", SeverityStyle.QUIET)
 
 
 def test_a_refusal_stays_until_the_next_request() -> None:
     now = controls(heard(DISABLED, request=answer(DISABLED, accepted=False, ended_s=0)), None, NOW_S)
-    assert now.notes == (Note("The robot refused: the robot's words", Tone.BAD),)
+    assert now.notes == (Note("The robot refused: the robot's words", SeverityStyle.BAD),)
     assert now.enabled
 
 
 def test_an_error_says_what_to_do() -> None:
     request = PreviewRequest(DesiredPreview(True), DeadlineExceeded("no answer within 8 s", "Try again"), 0.0)
-    assert of(DISABLED, request).notes == (Note("Request failed: no answer within 8 s. Try again", Tone.BAD),)
+    assert of(DISABLED, request).notes == (
+        Note("Request failed: no answer within 8 s. Try again", SeverityStyle.BAD),
+    )
 
 
 def test_good_news_goes_away_by_itself() -> None:
-    assert of(RUNNING, answer(RUNNING)).notes == (Note("the robot's words", Tone.QUIET),)
+    assert of(RUNNING, answer(RUNNING)).notes == (Note("the robot's words", SeverityStyle.QUIET),)
     assert of(RUNNING, answer(RUNNING, ended_s=NOW_S - 60)).notes == ()
 
 
-def test_a_fault_is_told_once_in_the_robots_words() -> None:
+def test_a_fault_is_reported_once_in_the_robots_words() -> None:
     faulted = with_preview(states.PREVIEW_FAULTED, "no encoder works. Type: robot-preview encoders")
-    expected = (Note("no encoder works. Type: robot-preview encoders", Tone.BAD),)
+    expected = (Note("no encoder works. Type: robot-preview encoders", SeverityStyle.BAD),)
     assert of(faulted).notes == expected
     assert of(faulted, answer(faulted)).notes == expected
-    assert of(faulted).tone is Tone.BAD
+    assert of(faulted).style is SeverityStyle.BAD
 
 
-def test_a_service_that_does_not_answer_is_told_before_anybody_wants_video() -> None:
+def test_an_unreachable_service_is_reported_while_the_preview_is_off() -> None:
     (note,) = of(with_preview(states.PREVIEW_DISABLED, reachable=False)).notes
     assert "does not answer" in note.text
