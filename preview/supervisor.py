@@ -298,15 +298,12 @@ class Supervisor:
             self._retry_now = False
             self._move(Event.RETRY)
         else:
-            self._schedule_retry()
+            if self._retry_timer is None:
+                delay_s = self._lifecycle.retry_delay_s
+                _log.info("next attempt in %g s", delay_s)
+                self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
             return False
         return True
-
-    def _schedule_retry(self) -> None:
-        if self._retry_timer is None:
-            delay_s = self._lifecycle.retry_delay_s
-            _log.info("next attempt in %g s", delay_s)
-            self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
 
     async def _finish_stopping(self) -> None:
         if self._pipeline:
@@ -384,7 +381,7 @@ class Supervisor:
             self._move(Event.ENABLE)
         elif state is State.FAULTED:
             self._retry_now = self._retry_now or new_request
-        elif self._pipeline and self._pipeline.plan.listener.passphrase != self._desired.passphrase:
+        elif self._pipeline and self._pipeline.plan.passphrase != self._desired.passphrase:
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         self._wake.set()

@@ -496,7 +496,7 @@ async def test_another_passphrase_rebuilds_the_pipeline(tmp_path: Path) -> None:
         await preview.reaches(State.RUNNING)
         old, new = preview.pipelines.built
         assert old.stopped
-        assert new.plan.listener.passphrase == "battery staple"
+        assert new.plan.passphrase == "battery staple"
 
 
 @pytest.mark.parametrize("order", [("mpp-h265", "va-h265"), ("mpp-h265",)])
