@@ -2,8 +2,8 @@
 
     python -m tests.support.preview_double SOCKET [BEHAVIOUR]
 
-It takes a wish in and reaches it at once, unless its behaviour says otherwise. Every run is another process
-of the service to the gateway: it makes an instance id of its own and counts from 0.
+It accepts a desired state and reaches it at once, unless its behaviour says otherwise. To the gateway every
+run is another process of the service: it has an instance id of its own and counts from 0.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ SIGN_OF_LIFE_S = 0.5
 
 
 class Behaviour(StrEnum):
-    """What becomes of an enabled wish."""
+    """What follows when the preview is enabled."""
 
     WORKS = "works"
     FAULTS = "faults"
@@ -47,7 +47,7 @@ _REACHES = {
 
 
 class PreviewDouble(PreviewServiceServicer):
-    """Remembers every wish it was given in `wishes`."""
+    """Keeps every desired state it got in `wishes`."""
 
     def __init__(self, behaviour: Behaviour = Behaviour.WORKS) -> None:
         self.behaviour = behaviour
@@ -93,7 +93,7 @@ class PreviewDouble(PreviewServiceServicer):
                 async with asyncio.timeout(SIGN_OF_LIFE_S):
                     await self._changed.wait()
             except TimeoutError:
-                pass  # time for a sign of life
+                pass  # time for a heartbeat
 
     async def ListEncoders(self, request: Any, context: Any) -> Any:  # noqa: N802  # grpc's name
         return pb.ListEncodersResponse()
