@@ -1,8 +1,8 @@
 """Reconciles the preview with its desired state. The only owner of the lifecycle and of the pipeline.
 
-Whatever happens (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on
-the loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway
-never waits for a pipeline, and no two state changes of a pipeline overlap.
+Every event (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on the
+loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway never
+waits for a pipeline, and no two state changes of a pipeline overlap.
 
 What can fail, how it is noticed, and what follows:
 
