@@ -31,7 +31,7 @@ from gateway.config import (
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
 from gateway.status.board import Board
-from gateway.status.event import ModeChanged, News
+from gateway.status.event import Event, ModeChanged
 from gateway.status.fault import Severity
 from gateway.status.preview import (
     Codec,
@@ -156,8 +156,8 @@ def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
     )
 
 
-def _event(words: str) -> News:
-    return News(Severity.INFO, "mission", words, ModeChanged(words), words)
+def _event(words: str) -> Event:
+    return Event(Severity.INFO, "mission", words, ModeChanged(words), words)
 
 
 async def _empty(_request: bytes, _context: RpcContext) -> bytes:

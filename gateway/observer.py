@@ -5,10 +5,10 @@ from typing import Final
 
 from gateway.status.event import (
     EncoderFallback,
+    Event,
     FaultCleared,
     FaultRaised,
     ModeChanged,
-    News,
     PreviewChanged,
 )
 from gateway.status.fault import Fault, Severity
@@ -41,7 +41,7 @@ class Observer:
         self._encoder: Encoder | None = None
         self._mode = ""
 
-    def observe(self, snapshot: Snapshot) -> list[News]:
+    def observe(self, snapshot: Snapshot) -> list[Event]:
         """Returns the events that this snapshot brings, in order."""
         first = self._started_s is None
         if self._started_s is None:
@@ -52,7 +52,7 @@ class Observer:
         others = [*self._preview_events(snapshot.preview), *self._mode_events(snapshot)]
         return faults if first else [*faults, *others]
 
-    def _preview_events(self, preview: PreviewView) -> Iterator[News]:
+    def _preview_events(self, preview: PreviewView) -> Iterator[Event]:
         encoder = preview.encoder
         if encoder is not None and encoder != self._encoder:
             self._encoder = encoder
@@ -66,31 +66,31 @@ class Observer:
             self._preview = settled
             yield _preview_changed(preview)
 
-    def _mode_events(self, snapshot: Snapshot) -> Iterator[News]:
+    def _mode_events(self, snapshot: Snapshot) -> Iterator[Event]:
         value = snapshot[MODE].value
         mode = value.name if value else ""
         if mode != self._mode:
             self._mode = mode
             sentence = f"robot mode: {mode}"
-            yield News(Severity.INFO, "mission", sentence, ModeChanged(mode), sentence)
+            yield Event(Severity.INFO, "mission", sentence, ModeChanged(mode), sentence)
 
 
-def _fault_events(changes: Changes) -> Iterator[News]:
+def _fault_events(changes: Changes) -> Iterator[Event]:
     for fault in changes.raised:
         yield _raised(fault, f"{fault.condition.severity.value}: {fault.condition.message}")
     for fault in changes.worsened:
         yield _raised(fault, f"{fault.condition.severity.value} now: {fault.condition.message}")
     for fault in changes.cleared:
         sentence = f"cleared: {fault.condition.message}"
-        yield News(Severity.INFO, fault.condition.component, sentence, FaultCleared(fault), sentence)
+        yield Event(Severity.INFO, fault.condition.component, sentence, FaultCleared(fault), sentence)
 
 
-def _raised(fault: Fault, sentence: str) -> News:
+def _raised(fault: Fault, sentence: str) -> Event:
     condition = fault.condition
-    return News(condition.severity, condition.component, condition.message, FaultRaised(fault), sentence)
+    return Event(condition.severity, condition.component, condition.message, FaultRaised(fault), sentence)
 
 
-def _preview_changed(preview: PreviewView) -> News:
+def _preview_changed(preview: PreviewView) -> Event:
     detail = PreviewChanged(preview.state, preview.profile, "")
     match preview.state:
         case PreviewState.RUNNING:
@@ -98,14 +98,14 @@ def _preview_changed(preview: PreviewView) -> News:
         case PreviewState.FAULTED:
             # Without a sentence: the overlay already has the one of the fault.
             faulted = PreviewChanged(preview.state, preview.profile, preview.last_error)
-            return News(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
+            return Event(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
         case _:
             sentence = "preview off"
-    return News(Severity.INFO, _PREVIEW, sentence, detail, sentence)
+    return Event(Severity.INFO, _PREVIEW, sentence, detail, sentence)
 
 
-def _fallback(encoder: Encoder) -> News:
+def _fallback(encoder: Encoder) -> Event:
     """Without a sentence: the overlay already has the one of the fault."""
     message = f"{encoder.name} encodes instead of {encoder.wanted}: {encoder.fallback_reason}"
     detail = EncoderFallback(encoder.name, encoder.wanted, encoder.fallback_reason)
-    return News(Severity.WARNING, _PREVIEW, message, detail)
+    return Event(Severity.WARNING, _PREVIEW, message, detail)

@@ -12,8 +12,8 @@ from gateway.observer import Observer
 from gateway.platform.files import boot_id
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
-from gateway.status.event import News
-from gateway.status.events import EventLog
+from gateway.status.event import Event
+from gateway.status.event_log import EventLog
 from gateway.status.faults.rules import FaultRules
 from gateway.status.faults.tracker import FaultTracker
 from gateway.status.preview import PreviewView
@@ -108,14 +108,14 @@ class State:
         """
         self.access = access
         now = self.snapshot()
-        for news in self._observer.observe(now):
-            self.note(news)
+        for event in self._observer.observe(now):
+            self.note(event)
         return now
 
-    def note(self, news: News) -> None:
+    def note(self, event: Event) -> None:
         """Adds an event of this instant."""
-        _log.info("event: %s", news.sentence or news.message)
-        self.events.add(news, time.monotonic())
+        _log.info("event: %s", event.sentence or event.message)
+        self.events.add(event, time.monotonic())
         self.event_added.notify_all()
 
     def _runtime(self, now_s: float) -> Runtime:

@@ -7,8 +7,8 @@ from typing import Final
 
 from common.broadcast import Broadcast
 from gateway.rpc.mapping.events import event_message, gap_message, position_message
-from gateway.status.event import Event
-from gateway.status.events import EventLog, Gap, Position
+from gateway.status.event import LoggedEvent
+from gateway.status.event_log import EventLog, Gap, Position
 from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 
@@ -55,9 +55,9 @@ class EventStream:
             if reading.gap:
                 self.gaps += 1
                 yield _gap(reading.gap)
-            for event in reading.events:
-                if event.news.severity.rank >= least.rank:
-                    yield self._event(event)
+            for logged in reading.events:
+                if logged.event.severity.rank >= least.rank:
+                    yield self._event(logged)
             if reading.events:
                 continue
             if loop.time() - position_sent_s >= HEARTBEAT_S:
@@ -71,12 +71,12 @@ class EventStream:
     def _has_events_after(self, here: Position) -> bool:
         return self._log.sequence > here.sequence
 
-    def _event(self, event: Event) -> bytes:
-        serialised = self._serialised.get(event.sequence)
+    def _event(self, logged: LoggedEvent) -> bytes:
+        serialised = self._serialised.get(logged.sequence)
         if serialised is None:
-            message = event_message(event, self._log.run_id)
+            message = event_message(logged, self._log.run_id)
             serialised = SubscribeEventsResponse(event=message).SerializeToString()
-            self._serialised[event.sequence] = serialised
+            self._serialised[logged.sequence] = serialised
             if len(self._serialised) > _MAX_CACHED:
                 del self._serialised[next(iter(self._serialised))]
         return serialised

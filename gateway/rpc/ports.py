@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from gateway.status.event import ControlAction, News
+from gateway.status.event import ControlAction, Event
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Snapshot
 
@@ -25,7 +25,7 @@ class State(SnapshotSource, Protocol):
 class EventSink(Protocol):
     """Where events go."""
 
-    def note(self, news: News) -> None:
+    def note(self, event: Event) -> None:
         """Takes an event of this instant."""
 
 

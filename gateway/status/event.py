@@ -1,4 +1,4 @@
-"""What can happen that an operator may want to know: one value per kind of event."""
+"""Events: what happened on the robot that an operator may want to know, one detail type per kind."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -19,21 +19,21 @@ class ControlResult(Enum):
 
 @dataclass(frozen=True, slots=True)
 class FaultRaised:
-    """A fault began, or grew worse."""
+    """A fault began or became more severe."""
 
     fault: Fault
 
 
 @dataclass(frozen=True, slots=True)
 class FaultCleared:
-    """A fault is over."""
+    """A fault ended."""
 
     fault: Fault
 
 
 @dataclass(frozen=True, slots=True)
 class PreviewChanged:
-    """The preview came to rest in another state, or another profile is in force."""
+    """The preview settled in another state, or with another profile."""
 
     state: PreviewState
     profile: Profile | None
@@ -42,7 +42,7 @@ class PreviewChanged:
 
 @dataclass(frozen=True, slots=True)
 class EncoderFallback:
-    """Another encoder than the first choice took over."""
+    """Another encoder than the preferred one took over."""
 
     running: str
     wanted: str
@@ -51,14 +51,14 @@ class EncoderFallback:
 
 @dataclass(frozen=True, slots=True)
 class ClientJoined:
-    """Somebody watches; `address` says from where."""
+    """A client has had a stream open for a while."""
 
     address: str
 
 
 @dataclass(frozen=True, slots=True)
 class ClientLeft:
-    """Somebody who was told of watches no more."""
+    """A client that had joined closed its last stream."""
 
     address: str
 
@@ -91,7 +91,7 @@ class ControlAction:
 
 @dataclass(frozen=True, slots=True)
 class ModeChanged:
-    """The robot is about something else; empty when it tells no mode any more."""
+    """The robot reports another mode; empty when it no longer reports one."""
 
     mode: str
 
@@ -109,14 +109,14 @@ Detail: TypeAlias = (
 
 
 @dataclass(frozen=True, slots=True)
-class News:
+class Event:
     """Something that has just happened.
 
     Attributes:
-        component: the part of the robot that it happened to, as operators call it.
-        message: what happened, for a person.
-        detail: the same for programs.
-        sentence: how the short list of the overlay tells it; None leaves it out there.
+        component: the affected part of the robot, by the operators' name for it.
+        message: for people.
+        detail: for programs.
+        sentence: its text in the overlay's short list; None leaves it out there.
     """
 
     severity: Severity
@@ -127,16 +127,16 @@ class News:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """News in their order.
+class LoggedEvent:
+    """Numbered, timestamped event.
 
     Attributes:
         sequence: counts from 1 in this run of the gateway.
-        at_s: on the gateway's monotonic clock.
-        unix_ms: what the calendar clock showed.
+        at_s: seconds, on the gateway's monotonic clock.
+        unix_ms: calendar clock, ms since 1970 (UTC).
     """
 
     sequence: int
     at_s: float
     unix_ms: int
-    news: News
+    event: Event

@@ -7,7 +7,7 @@ from typing import Any, Final
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
 from gateway.status.command import Command, effective_command
-from gateway.status.events import OperatorEvent
+from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
 from gateway.status.health import Health, assess

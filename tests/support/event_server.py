@@ -11,8 +11,8 @@ from common.rpc import new_server
 from console.client import EventPosition
 from gateway.rpc.event_stream import EventStream
 from gateway.rpc.mapping.events import position_from
-from gateway.status.event import ModeChanged, News
-from gateway.status.events import EventLog
+from gateway.status.event import Event, ModeChanged
+from gateway.status.event_log import EventLog
 from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 
@@ -40,7 +40,7 @@ class EventServer:
         """So many things happen at once."""
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
-            self._log.add(News(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
+            self._log.add(Event(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
         self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
 

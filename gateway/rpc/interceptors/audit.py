@@ -11,7 +11,7 @@ from common.interceptors import Interceptor
 from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
 from gateway.rpc.ports import AuditTrail, EventSink
-from gateway.status.event import ControlAction, ControlResult, News
+from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 
 _COMPONENT: Final = "gateway"
@@ -78,13 +78,13 @@ class Audit(Interceptor[CallContext]):
         self._events.note(control_event(action))
 
 
-def control_event(action: ControlAction) -> News:
+def control_event(action: ControlAction) -> Event:
     """Returns the event that shows an action to operators."""
     request = f" ({action.request})" if action.request else ""
     who = action.who or action.address
     message = f"{who} called {action.method}{request}, {action.result.value}: {action.answer}"
     severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING
-    return News(severity, _COMPONENT, message, action)
+    return Event(severity, _COMPONENT, message, action)
 
 
 def _as_text(request: Message) -> str:

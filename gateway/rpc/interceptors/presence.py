@@ -8,7 +8,7 @@ from typing import Final
 from common.interceptors import Interceptor
 from gateway.rpc.call import CallContext
 from gateway.rpc.ports import EventSink
-from gateway.status.event import ClientJoined, ClientLeft, News
+from gateway.status.event import ClientJoined, ClientLeft, Event
 from gateway.status.fault import Severity
 
 JOINED_AFTER_S: Final = 2.0
@@ -54,7 +54,7 @@ class Presence(Interceptor[CallContext]):
         if client.streams == 0:
             del self._clients[address]
             if client.joined:
-                self._events.note(News(Severity.INFO, _COMPONENT, f"{address} left", ClientLeft(address)))
+                self._note(f"{address} left", ClientLeft(address))
 
     def report_joined(self) -> None:
         """Reports clients that have been here long enough; to be called a few times a second."""
@@ -62,4 +62,7 @@ class Presence(Interceptor[CallContext]):
         for address, client in self._clients.items():
             if not client.joined and client.since_s <= before_s:
                 client.joined = True
-                self._events.note(News(Severity.INFO, _COMPONENT, f"{address} joined", ClientJoined(address)))
+                self._note(f"{address} joined", ClientJoined(address))
+
+    def _note(self, message: str, detail: ClientJoined | ClientLeft) -> None:
+        self._events.note(Event(Severity.INFO, _COMPONENT, message, detail))

@@ -6,7 +6,7 @@ from typing import Any, Final, TypeVar
 
 from common.errors import InvalidRequestError
 from gateway.status.event import ControlResult
-from gateway.status.events import GapReason
+from gateway.status.event_log import GapReason
 from gateway.status.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile

@@ -10,32 +10,32 @@ from gateway.status.event import (
     ClientLeft,
     ControlAction,
     EncoderFallback,
-    Event,
     FaultCleared,
     FaultRaised,
+    LoggedEvent,
     ModeChanged,
     PreviewChanged,
 )
-from gateway.status.events import Gap, Position
+from gateway.status.event_log import Gap, Position
 from omniseer.gateway.v1 import event_pb2 as pb
 
 _NS_PER_S: Final = 1_000_000_000
 
 
-def event_message(event: Event, run_id: str) -> pb.Event:
+def event_message(logged: LoggedEvent, run_id: str) -> pb.Event:
     """Returns one event of this run."""
-    news = event.news
-    field, payload = _PAYLOADS[type(news.detail)]
+    event = logged.event
+    field, payload = _PAYLOADS[type(event.detail)]
     message = pb.Event(
         run_id=run_id,
-        sequence=event.sequence,
-        monotonic_ns=int(event.at_s * _NS_PER_S),
-        wall_clock_unix_ms=event.unix_ms,
-        severity=SEVERITIES[news.severity],
-        component=news.component,
-        message=news.message,
+        sequence=logged.sequence,
+        monotonic_ns=int(logged.at_s * _NS_PER_S),
+        wall_clock_unix_ms=logged.unix_ms,
+        severity=SEVERITIES[event.severity],
+        component=event.component,
+        message=event.message,
     )
-    getattr(message, field).CopyFrom(payload(news.detail, event.at_s))
+    getattr(message, field).CopyFrom(payload(event.detail, logged.at_s))
     return message
 
 

@@ -11,7 +11,7 @@ from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.recipient import Recipient
 from gateway.status.command import Command
-from gateway.status.events import OperatorEvent
+from gateway.status.event_log import OperatorEvent
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
 from gateway.status.source_view import SourceView

@@ -43,12 +43,12 @@ async def test_a_damaged_file_changes_nothing_and_is_reported_after_three_polls(
     problems = []
     for _ in range(3):
         await reloader.reload_for_unknown()
-        problems.append(reloader.view().trouble)
+        problems.append(reloader.view().credentials_error)
     assert problems[:2] == ["", ""]
     assert "is damaged" in problems[2]
     directory.store_file.write_text(text)
     await reloader.reload_for_unknown()
-    assert reloader.view().trouble == ""
+    assert reloader.view().credentials_error == ""
     assert (reloader.loaded, changes) == (before, [])
 
 

@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 from gateway.status.board import Board
-from gateway.status.event import EncoderFallback, FaultRaised, News, PreviewChanged
+from gateway.status.event import EncoderFallback, Event, FaultRaised, PreviewChanged
 from gateway.status.fault import Severity
 from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Snapshot, SourceRule
@@ -18,7 +18,7 @@ def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> 
     return status.snapshot_of(board, SOURCES, now_s=now_s, preview=preview)
 
 
-def sentences(news: list[News]) -> list[str]:
+def sentences(news: list[Event]) -> list[str]:
     """What the overlay's short list tells."""
     return [each.sentence for each in news if each.sentence is not None]
 

@@ -5,13 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InvalidRequestError
-from gateway.status.event import ModeChanged, News
-from gateway.status.events import ON_OVERLAY, EventLog, Gap, GapReason, Position
+from gateway.status.event import Event, ModeChanged
+from gateway.status.event_log import ON_OVERLAY, EventLog, Gap, GapReason, Position
 from gateway.status.fault import Severity
 
 
-def news(words: str, sentence: str | None = None) -> News:
-    return News(Severity.INFO, "mission", words, ModeChanged(words), sentence)
+def news(words: str, sentence: str | None = None) -> Event:
+    return Event(Severity.INFO, "mission", words, ModeChanged(words), sentence)
 
 
 def filled(count: int, kept: int = 4, run_id: str = "run") -> EventLog:

@@ -14,7 +14,7 @@ from gateway.access.role import Role
 from gateway.rpc.call import CallContext
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.validation import Validation
-from gateway.status.event import ControlAction, ControlResult, News
+from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
@@ -28,11 +28,11 @@ class Records:
     """Both places where actions go."""
 
     def __init__(self) -> None:
-        self.events: list[News] = []
+        self.events: list[Event] = []
         self.trail: list[ControlAction] = []
 
-    def note(self, news: News) -> None:
-        self.events.append(news)
+    def note(self, event: Event) -> None:
+        self.events.append(event)
 
     def record(self, action: ControlAction) -> None:
         self.trail.append(action)

@@ -1,7 +1,7 @@
 """A client that stays is reported once when it joins and once when it leaves; one that only looks is not."""
 
 from gateway.rpc.interceptors.presence import JOINED_AFTER_S, Presence
-from gateway.status.event import ClientJoined, ClientLeft, News
+from gateway.status.event import ClientJoined, ClientLeft, Event
 from tests.support.calls import call_of
 
 ADDRESS = "10.0.0.5:41234"
@@ -12,11 +12,11 @@ class World:
 
     def __init__(self) -> None:
         self.now_s = 100.0
-        self.events: list[News] = []
+        self.events: list[Event] = []
         self.presence = Presence(self, lambda: self.now_s)
 
-    def note(self, news: News) -> None:
-        self.events.append(news)
+    def note(self, event: Event) -> None:
+        self.events.append(event)
 
     def reported(self) -> list[object]:
         self.presence.report_joined()

@@ -15,11 +15,11 @@ from gateway.status.event import (
     Event,
     FaultCleared,
     FaultRaised,
+    LoggedEvent,
     ModeChanged,
-    News,
     PreviewChanged,
 )
-from gateway.status.events import Gap, GapReason, Position
+from gateway.status.event_log import Gap, GapReason, Position
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import PreviewState, Profile
 from omniseer.gateway.v1.event_pb2 import Event as EventMessage
@@ -43,7 +43,7 @@ def test_every_kind_of_event_is_tried() -> None:
 
 @pytest.mark.parametrize("detail", DETAILS, ids=lambda detail: type(detail).__name__)
 def test_an_event_sets_every_field_of_its_payload(detail: Detail) -> None:
-    event = Event(7, 5.5, 1_700_000_000_000, News(Severity.ERROR, "odometry", "it happened", detail))
+    event = LoggedEvent(7, 5.5, 1_700_000_000_000, Event(Severity.ERROR, "odometry", "it happened", detail))
     message = event_message(event, "run")
     assert (message.run_id, message.sequence, message.monotonic_ns) == ("run", 7, 5_500_000_000)
     assert message.wall_clock_unix_ms == 1_700_000_000_000
@@ -57,7 +57,9 @@ def test_an_event_sets_every_field_of_its_payload(detail: Detail) -> None:
 
 def test_every_payload_of_the_schema_comes_from_somewhere() -> None:
     sent = {
-        event_message(Event(1, 1.0, 1, News(Severity.INFO, "c", "m", each)), "run").WhichOneof("payload")
+        event_message(LoggedEvent(1, 1.0, 1, Event(Severity.INFO, "c", "m", each)), "run").WhichOneof(
+            "payload"
+        )
         for each in DETAILS
     }
     assert sent == {field.name for field in EventMessage.DESCRIPTOR.oneofs_by_name["payload"].fields}

@@ -18,7 +18,7 @@ from gateway.rpc.methods import method_at
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board
-from gateway.status.events import OperatorEvent
+from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import (
