@@ -25,7 +25,7 @@ _FIRST_AFTER_S: Final = 0.1
 
 
 class PlatformSampler:
-    """Writes the platform sources onto the board, from `__enter__` to `__exit__`.
+    """Writes the platform sources to the board while its context is entered.
 
     Args:
         settings: sampling interval, disk and network interface.
@@ -55,7 +55,7 @@ class PlatformSampler:
             _log.warning("the platform sampler is blocked in a system call; exiting without it")
 
     def sample(self) -> None:
-        """Takes every value once."""
+        """Samples all values once."""
         self._board[COMPUTE] = Received(compute.read(self._settings.disk_path), self._clock())
         self._board[NETWORK] = Received(network.read(self._settings.interface), self._clock())
         onboard = battery.read()

@@ -5,13 +5,11 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from rclpy.utilities import get_rmw_implementation_identifier
-
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.config import SourceSettings
-from gateway.ros.discovery import publishers_of
-from gateway.ros.lifetime import ros_node
+from gateway.ros.lifetime import middleware_name, ros_node
+from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
 from gateway.ros.subscription import TypeMissingError, message_class
 
@@ -31,7 +29,7 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
             readable.append(source)
     try:
         with ros_node("robot_gateway_doctor") as node:
-            yield good("ros", f"ROS 2 starts, with {get_rmw_implementation_identifier()}")
+            yield good("ros", f"ROS 2 starts, with {middleware_name()}")
             found = _discover(node, readable)
     except UserError as error:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.config import SourceSettings
-from gateway.ros.discovery import PublisherMonitor
 from gateway.ros.lifetime import ros_node
+from gateway.ros.publishers import PublisherMonitor
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source

@@ -12,15 +12,23 @@ from typing import Any
 from common.errors import UserError
 from common.ros_environment import check_domain
 
+# intake.py and doctor.py import this module before the others that need rclpy, so that its absence ends in
+# this error.
 try:
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.parameter import Parameter
+    from rclpy.utilities import get_rmw_implementation_identifier
 except ImportError as error:
     raise UserError(
         f"ROS 2 can't be used from Python ({error})",
         "Type: scripts/setup, or source the setup.bash of a ROS 2 installation first",
     ) from error
+
+
+def middleware_name() -> str:
+    """Returns the name of the middleware in use: "rmw_fastrtps_cpp" for example."""
+    return str(get_rmw_implementation_identifier())
 
 
 @contextmanager

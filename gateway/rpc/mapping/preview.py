@@ -24,7 +24,7 @@ _NO_STREAM: Final = Stream(
 def preview_status(
     preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
 ) -> pb.PreviewStatus:
-    """Returns the preview as `recipient` may see it."""
+    """Returns the preview; the passphrase only if the recipient may see it."""
     stream = preview.stream or _NO_STREAM
     encoder = preview.encoder
     return pb.PreviewStatus(

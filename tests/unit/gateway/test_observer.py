@@ -3,34 +3,19 @@ from dataclasses import replace
 from gateway.status.board import Board
 from gateway.status.event import EncoderFallback, Event, FaultRaised, PreviewChanged
 from gateway.status.fault import Severity
-from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView, Profile
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
+from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.values import Mode, Odometry, Received
+from tests.support import status
 from tests.support.fault_rules import new_observer
 
-OFF = PreviewView(
-    state=PreviewState.DISABLED,
-    profile=Profile.BALANCED,
-    last_error="",
-    service_reachable=True,
-    listener=None,
-    stream=None,
-    encoder=None,
-    measured=None,
-    counters=Counters(),
-)
+OFF = replace(status.OFF, profile=Profile.BALANCED)
+SOURCES = {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(0, required=False)}
 
 
 def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> Snapshot:
-    return take(
-        identity=Identity("t", "0", insecure=False),
-        rules=Rules({ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(0, required=False)}, 3000),
-        board=board,
-        preview=preview,
-        events=(),
-        now_s=now_s,
-    )
+    return status.snapshot_of(board, SOURCES, now_s=now_s, preview=preview)
 
 
 def sentences(news: list[Event]) -> list[str]:

@@ -13,8 +13,8 @@ from gateway.status.fault import Condition, Severity
 from gateway.status.faults.limits import Limit
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
-from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.preview import Encoder, PreviewState, PreviewView
+from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState, detail
 from gateway.status.sources import (
     BATTERY,
@@ -39,10 +39,10 @@ from gateway.status.values import (
     Received,
 )
 from tests.support.fault_rules import LIMITS
+from tests.support.status import OFF, snapshot_of
 
 NOW_S = 500.0
 RULES = FaultRules(LIMITS, startup_grace_s=5.0)
-OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
 COOL = Compute(10.0, 50.0, False, 1, 4, 50.0)
 STRONG = Network("wlan0", True, -50, 90)
 BY_NAME = {spec.name: spec for spec in SOURCES}
@@ -67,14 +67,8 @@ def board(
 
 
 def snapshot(of: Board, preview: PreviewView = OFF, **required: bool) -> Snapshot:
-    return take(
-        identity=Identity("t", "0", insecure=False),
-        rules=Rules({BY_NAME[name]: SourceRule(1000, must) for name, must in required.items()}, 3000),
-        board=of,
-        preview=preview,
-        events=(),
-        now_s=NOW_S,
-    )
+    rules = {BY_NAME[name]: SourceRule(1000, must) for name, must in required.items()}
+    return snapshot_of(of, rules, now_s=NOW_S, preview=preview)
 
 
 def found(of: Snapshot, active: frozenset[str] = frozenset(), up_s: float = 100.0) -> dict[str, Condition]:

@@ -8,30 +8,25 @@ import pytest
 from gateway.status.board import Board
 from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
 from gateway.status.fault import Condition, Fault, Severity
-from gateway.status.preview import Counters, Measurement, PreviewState, PreviewView
+from gateway.status.preview import Measurement, PreviewState
 from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.values import Mode, Odometry, Received
+from tests.support.status import OFF, snapshot_of
 
-OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
 FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
 
 
 def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
     values: dict[str, Any] = {
-        "identity": Identity("t", "0", insecure=False),
-        "rules": Rules(
-            {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(60_000, required=False)}, 3000
-        ),
         "board": Board({ODOMETRY: Received(Odometry(0.5, 0, 0), 99.9), MODE: Received(Mode("idle"), 99.0)}),
+        "sources": {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(60_000, required=False)},
         "preview": replace(OFF, measured=Received(Measurement(30, 2500, 1, 10, None, None), 99.9)),
-        "events": (),
         "faults": (FAULT,),
         "gateway": Runtime("r", "b", 1000, 1, 1, 0),
-        "now_s": now_s,
     }
-    return take(**(values | changed))
+    return snapshot_of(now_s=now_s, **(values | changed))
 
 
 BEFORE = change_key(snapshot())

@@ -18,8 +18,7 @@ from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
 from gateway.rpc.recipient import Recipient
 from gateway.status.board import Board
 from gateway.status.change import change_key
-from gateway.status.preview import Counters, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
     DETECTIONS,
@@ -32,11 +31,11 @@ from gateway.status.sources import (
 )
 from gateway.status.values import Received
 from tests.support.filled_values import filled_value
+from tests.support.status import snapshot_of
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[4] / "docs"
 NOW_S = 100.0
-CALLER = Recipient("10.0.0.1", sees_passphrase=False)
-OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
+RECIPIENT = Recipient("10.0.0.1", sees_passphrase=False)
 NO_CHANGE = {DETECTIONS, DIAGNOSTICS, *MUX_INPUTS.values()}
 """Sources whose values alone change nothing that the status shows."""
 
@@ -45,14 +44,7 @@ by_name = pytest.mark.parametrize("spec", SOURCES, ids=lambda spec: spec.name)
 
 def snapshot(board: Board, *more: SourceSpec[Any]) -> Snapshot:
     rules = dict.fromkeys((*ROS_SOURCES, *more), SourceRule(1000, required=False))
-    return take(
-        identity=Identity("t", "0", insecure=False),
-        rules=Rules(rules, 1000),
-        board=board,
-        preview=OFF,
-        events=(),
-        now_s=NOW_S,
-    )
+    return snapshot_of(board, rules, now_s=NOW_S)
 
 
 def with_value(spec: SourceSpec[Any], number: int = 1) -> Snapshot:
@@ -94,7 +86,10 @@ def test_losing_the_value_is_a_change(spec: SourceSpec[Any]) -> None:
 
 @by_name
 def test_a_value_has_a_field_in_the_contract_unless_the_source_is_named(spec: SourceSpec[Any]) -> None:
-    without, given = overlay_snapshot(snapshot(Board()), CALLER), overlay_snapshot(with_value(spec), CALLER)
+    without, given = (
+        overlay_snapshot(snapshot(Board()), RECIPIENT),
+        overlay_snapshot(with_value(spec), RECIPIENT),
+    )
     if spec.name == "effective_command":
         assert given.status.effective_command.available, "mapped as the attributed command"
     for message in (without, given):
@@ -166,6 +161,6 @@ def test_a_made_up_kind_needs_its_entry_and_a_reader() -> None:
         SourceState.RECEIVING,
     ]
     assert change_key(waiting) != change_key(received)
-    assert overlay_snapshot(received, CALLER).status.sources[-1].name == "gas"
+    assert overlay_snapshot(received, RECIPIENT).status.sources[-1].name == "gas"
     board[GAS] = Received(Gas(13.0), NOW_S)
     assert change_key(snapshot(board, GAS)) != change_key(received)

@@ -6,24 +6,13 @@ from hypothesis import strategies as st
 from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
 from gateway.status.health import Health, HealthState, assess
-from gateway.status.preview import Counters, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, SourceRule, take
+from gateway.status.snapshot import SourceRule
 from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Odometry, Received, Vision
+from tests.support.status import snapshot_of
 
 SECONDS = st.floats(min_value=0, max_value=1e7, allow_nan=False)
 LIMITS = st.integers(min_value=1, max_value=100_000)
-NO_PREVIEW = PreviewView(
-    state=PreviewState.DISABLED,
-    profile=None,
-    last_error="",
-    service_reachable=False,
-    listener=None,
-    stream=None,
-    encoder=None,
-    measured=None,
-    counters=Counters(),
-)
 
 
 def test_nothing_received_is_not_available_and_has_no_age() -> None:
@@ -80,17 +69,11 @@ def test_health_follows_the_contract_line_by_line(
 ) -> None:
     """None for "required" is a robot that is configured without the source."""
     now_s = 1000.0
-    rules = Rules(
-        sources={
-            spec: SourceRule(limit, required)
-            for spec, limit, required in [
-                (ODOMETRY, 1000, odometry_required),
-                (VISION, 2000, vision_required),
-            ]
-            if required is not None
-        },
-        platform_stale_after_ms=3000,
-    )
+    sources = {
+        spec: SourceRule(limit, required)
+        for spec, limit, required in [(ODOMETRY, 1000, odometry_required), (VISION, 2000, vision_required)]
+        if required is not None
+    }
     # Half a millisecond off, so that no age sits on a rounding edge.
     board = Board()
     if odometry_age_ms is not None:
@@ -98,14 +81,7 @@ def test_health_follows_the_contract_line_by_line(
     if vision_age_ms is not None:
         board[VISION] = Received(Vision(0, 0, 0, 0, 0), now_s - (vision_age_ms + 0.5) / 1000)
 
-    health = take(
-        identity=Identity("t", "0", insecure=False),
-        rules=rules,
-        board=board,
-        preview=NO_PREVIEW,
-        events=(),
-        now_s=now_s,
-    ).health
+    health = snapshot_of(board, sources, now_s=now_s).health
 
     expected = model((odometry_required is True, odometry_age_ms), (vision_required is True, vision_age_ms))
     assert health.summary == expected

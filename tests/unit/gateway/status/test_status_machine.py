@@ -14,18 +14,17 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.faults.tracker import FaultTracker
-from gateway.status.preview import Counters, PreviewState, PreviewView
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import BATTERY, ODOMETRY, VISION, SourceSpec
 from gateway.status.values import Battery, Odometry, Received, Vision
 from tests.support.fault_rules import new_observer
+from tests.support.status import snapshot_of
 
 GRACE_S, CLEAR_AFTER_S, PASS_S = 5.0, 2.0, 0.05
 LIMITS_MS = {ODOMETRY: 1000, VISION: 2000, BATTERY: 5000}
-REQUIRED = {ODOMETRY, VISION}
+RULES = {spec: SourceRule(limit, spec is not BATTERY) for spec, limit in LIMITS_MS.items()}
 WORDS = {ODOMETRY: "odometry", VISION: "vision telemetry"}
-OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
 SPECS = st.sampled_from(sorted(LIMITS_MS, key=lambda spec: spec.name))
 
 
@@ -113,17 +112,7 @@ class Life(RuleBasedStateMachine):
         return now
 
     def snapshot(self) -> Snapshot:
-        return take(
-            identity=Identity("t", "0", insecure=False),
-            rules=Rules(
-                {spec: SourceRule(limit, spec in REQUIRED) for spec, limit in LIMITS_MS.items()}, 3000
-            ),
-            board=self.board,
-            preview=OFF,
-            events=(),
-            faults=self.tracker.faults,
-            now_s=self.now_s,
-        )
+        return snapshot_of(self.board, RULES, now_s=self.now_s, faults=self.tracker.faults)
 
     @invariant()
     def every_value_is_the_newest_and_its_age_is_true(self) -> None:
