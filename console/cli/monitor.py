@@ -12,6 +12,6 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
     """
     with needing_qt():
-        from console.window.monitor_program import run_monitor  # noqa: PLC0415 - Qt is needed here only
+        from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
     session = session_of(context, target, False, robot)
     run_monitor(session.target, session.credentials)

@@ -101,5 +101,5 @@ def _need_gstreamer() -> None:
 
 def _window() -> Callable[[str, Recording | None, LoadCredentials], ViewSummary]:
     with needing_qt("--headless works without"):
-        from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
+        from console.window.programs import run_view  # noqa: PLC0415 - Qt is needed here only
     return run_view

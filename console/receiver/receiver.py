@@ -22,7 +22,12 @@ class OpenConnection(Protocol):
 Connect: TypeAlias = Callable[[StreamAddress, FrameQueue, ReceiverOptions], OpenConnection]
 
 
-def _connect(address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> OpenConnection:
+def open_connection(address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> OpenConnection:
+    """Opens a connection over SRT.
+
+    Raises:
+        UserError: GStreamer or one of its elements is not installed.
+    """
     # Imported here so that a program without GStreamer fails only when it receives video.
     from console.receiver.connection import Connection  # noqa: PLC0415
 
@@ -55,7 +60,7 @@ class Receiver:
         *,
         queue_size: int = 2,
         options: ReceiverOptions | None = None,
-        connect: Connect = _connect,
+        connect: Connect = open_connection,
     ) -> None:
         self._address = address
         self._queue = FrameQueue(queue_size)

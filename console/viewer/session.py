@@ -12,7 +12,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.errors import NoFrameError, StreamError, UndecodableError
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.options import ReceiverOptions
-from console.receiver.receiver import Receiver
+from console.receiver.receiver import Connect, Receiver, open_connection
 from console.receiver.recording import Recording
 from console.viewer.decoders import Decoders
 from console.viewer.playback import Playback, PlaybackInputs, playback
@@ -21,12 +21,7 @@ from console.viewer.redial import BLOCKED_PAUSE_S, address_of, deadline_s, redia
 _POLL_S: Final = 0.1
 """Period, while no frame comes, of checking whether the connection is still needed."""
 
-Connect: TypeAlias = Callable[[StreamAddress, ReceiverOptions], Receiver]
 FrameListener: TypeAlias = Callable[[Frame], None]
-
-
-def _connect(address: StreamAddress, options: ReceiverOptions) -> Receiver:
-    return Receiver(address, queue_size=1, options=options)
 
 
 class VideoSession:
@@ -43,7 +38,7 @@ class VideoSession:
         pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; the caller closes it.
         decoders: choice of the decoders; by default hardware that has passed its trial, else software.
-        connect: makes receivers; tests pass a double.
+        connect: opens connections; tests pass a double.
     """
 
     def __init__(
@@ -52,7 +47,7 @@ class VideoSession:
         pixels: PixelFormat = PixelFormat.BGRX,
         recording: Recording | None = None,
         decoders: Decoders | None = None,
-        connect: Connect = _connect,
+        connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
         self._recording = recording
@@ -149,7 +144,7 @@ class VideoSession:
         """Takes the frames of one connection, and returns why it ended."""
         options = ReceiverOptions(self._pixels, self._decoders.chosen(), self._recording)
         try:
-            with self._connect(address, options) as receiver:
+            with Receiver(address, queue_size=1, options=options, connect=self._connect) as receiver:
                 return self._take_frames(receiver, address)
         except UndecodableError as error:
             return self._decoders.after_undecodable(error)

@@ -1,4 +1,4 @@
-"""Readable in light and dark, told apart without colours, as large as a small laptop's screen allows."""
+"""Readable in light and dark, distinguishable without colours, as large as a small laptop's screen allows."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from console.presentation.severity_style import SeverityStyle
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor
 from console.window.theme import draw_shape
 from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
@@ -105,7 +105,7 @@ def test_shapes_differ_without_any_colour(desk: None, one: SeverityStyle, other:
         for x in range(32)
         for y in range(32)
     )
-    assert differing > 90, f"only {differing} of 1024 pixels tell {one} from {other}"
+    assert differing > 90, f"only {differing} of 1024 pixels differ between {one} and {other}"
 
 
 def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) -> None:
@@ -146,7 +146,7 @@ def test_it_opens_as_it_was_left(desk: None) -> None:
         b"",
     ],
 )
-def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, content: bytes) -> None:
+def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, content: bytes) -> None:
     file = Path(WindowSettings().file)
     assert file.is_relative_to(own_settings)
     file.parent.mkdir(parents=True)
@@ -156,7 +156,7 @@ def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, co
     assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
 
 
-def test_a_settings_file_that_can_not_be_written_is_no_trouble(own_settings: Path, desk: None) -> None:
+def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path, desk: None) -> None:
     file = Path(WindowSettings().file)
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

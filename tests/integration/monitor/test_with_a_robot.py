@@ -1,6 +1,6 @@
 """The window with a whole robot behind it: real messages, real gateway, real video; each of them fails.
 
-Pictures of every situation are kept in artifacts/monitor; docs/images has the good ones.
+Frames of every situation are kept in artifacts/monitor; docs/images has the good ones.
 """
 
 import statistics
@@ -16,8 +16,8 @@ from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
 from console.window.lines import ComponentLine, FaultWidget
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor
 from tests.support.qt import keep_picture, let_pass, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
@@ -64,8 +64,8 @@ class Watch:
     def preview_is(self, word: str) -> None:
         until(lambda: self.window.preview.state.word.text() == word, f"the preview is {word}")
 
-    def picture_moves(self) -> None:
-        """Pictures are painted, one after the other."""
+    def video_moves(self) -> None:
+        """Frames are painted, one after the other."""
         painted = 0
 
         def count() -> None:
@@ -73,7 +73,7 @@ class Watch:
             painted += 1
 
         connection = self.window.video.painted.connect(count)
-        until(lambda: painted >= 15, "15 pictures are painted")
+        until(lambda: painted >= 15, "15 frames are painted")
         self.window.video.painted.disconnect(connection)
 
     def key(self, key: Qt.Key) -> None:
@@ -107,7 +107,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
 
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
     boxes_are_drawn(watch)
     until(lambda: watch.window.plots.all[0].value_text.endswith(" fps"), "the video's rate is plotted")
     let_pass(8)  # what the plots show shall be worth a picture
@@ -131,7 +131,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     keep_picture(watch.window, "preview-faulted")
     watch.robot.preview.start_again()
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
 
     until(
         lambda: all(fault.mark.text() in ("cleared", "none") for fault in watch.faults()), "nothing is wrong"
@@ -142,7 +142,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     assert watch.window.banner.isVisible()
     assert not watch.window.preview.switch.isEnabled()
     watch.mark_is("Motion", "STALE")
-    watch.picture_moves()  # the stream does not need the gateway
+    watch.video_moves()  # the stream does not need the gateway
     let_pass(3)
     keep_picture(watch.window, "unreachable")
 
@@ -156,7 +156,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
         lambda: any("restarted" in line for line in watch.window.side.events.lines),
         "the restart is an event",
     )
-    watch.picture_moves()
+    watch.video_moves()
     let_pass(2)
     keep_picture(watch.window, "reconnected")
 
@@ -178,7 +178,7 @@ def boxes_are_drawn(watch: Watch) -> None:
 def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -> None:
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
     delay, painted = LoopDelay(), []
     watch.window.video.painted.connect(lambda: painted.append(time.monotonic()))
     delay.start()
@@ -186,7 +186,7 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     p99_ms = statistics.quantiles(delay.stop(), n=100)[98]
     assert len(painted) > 60, "real video"
     assert p99_ms < LOOP_DELAY_P99_MS
-    # Everything hangs, and nobody waits for it.
+    # Everything hangs, and closing does not wait for it.
     assert watch.robot.gateway
     watch.robot.gateway.kill()
     closed_s = time.monotonic()

@@ -15,7 +15,7 @@ from tests.support.video_ground import VideoGround, video_ground
 
 @pytest.fixture
 def ground(tmp_path: Path) -> Iterator[VideoGround]:
-    """Small pictures; the preview is off at first."""
+    """Small frames; the preview is off at first."""
     with video_ground(tmp_path) as ground:
         yield ground
         # A process that a test has stopped could not end in good order.

@@ -102,7 +102,7 @@ def test_one_that_fails_with_the_real_stream_is_replaced_by_software(
     assert document["redials"] >= 1
 
 
-def test_a_decoder_that_hangs_in_its_trial_does_not_keep_the_picture_waiting(running: VideoGround) -> None:
+def test_a_decoder_that_hangs_in_its_trial_does_not_delay_the_video(running: VideoGround) -> None:
     document = seen(running, vah264dec="stuck")
     assert document["decoder"] == "avdec_h264"
     assert document["first_picture_ms"] < 6000

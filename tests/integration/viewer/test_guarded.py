@@ -18,12 +18,12 @@ from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 
-from console.window.view_program import viewing
+from console.window.programs import viewing
 
 pytestmark = [pytest.mark.gst, pytest.mark.timed, pytest.mark.usefixtures("application")]
 __all__ = ["application"]
 
-TOLD_WITHIN_S = 10.0
+SHOWN_WITHIN_S = 10.0
 """Revoking counts within a second on the robot, a new login within half a second here; machines are busy."""
 
 
@@ -52,11 +52,11 @@ def test_a_viewer_by_the_robots_name_sees_an_encrypted_stream(robot: Guarded) ->
     assert document["recording"] is None
 
 
-def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded) -> None:
+def test_without_a_valid_login_there_is_no_video(robot: Guarded) -> None:
     robot.switch_on()
     robot.log_in("carl", Role.VIEWER)
     robot.keeper.revoke("carl")
-    wait_until(lambda: view(robot)[0] == 1, "carl is refused", TOLD_WITHIN_S)
+    wait_until(lambda: view(robot)[0] == 1, "carl is refused", SHOWN_WITHIN_S)
     code, said, complaints = view(robot)
     assert (code, said) == (1, "")
     assert "was revoked" in only_line(complaints)
@@ -66,7 +66,7 @@ def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded)
     assert "robotctl login" in only_line(stranger.stderr)
 
 
-def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: Guarded) -> None:
+def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Guarded) -> None:
     robot.switch_off()
     robot.log_in("dora", Role.VIEWER)
     with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
@@ -80,7 +80,7 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         until(
             lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
             "no access",
-            TOLD_WITHIN_S,
+            SHOWN_WITHIN_S,
         )
         card = banner(window.robot.session.playback())
         assert card
@@ -91,20 +91,20 @@ def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: 
         until(
             lambda: window.robot.session.playback().state is PlaybackState.OFF,
             "the new login counts",
-            TOLD_WITHIN_S,
+            SHOWN_WITHIN_S,
         )
         press(window, Qt.Key.Key_P)
         until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
         robot.keeper.revoke("dora")
-        # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
+        # The video ends, too: the stream has another passphrase from then on, which she does not get.
         until(
             lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
             "no access",
-            TOLD_WITHIN_S,
+            SHOWN_WITHIN_S,
         )
 
 
-def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselves(robot: Guarded) -> None:
+def test_after_a_revocation_the_other_viewers_reconnect_by_themselves(robot: Guarded) -> None:
     robot.log_in("emil", Role.VIEWER)
     emils = robot.stored()
     robot.log_in("frida", Role.VIEWER)
@@ -122,10 +122,10 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
                     and endpoint.passphrase not in {"", known.passphrase}
                 ),
                 "another passphrase",
-                TOLD_WITHIN_S,
+                SHOWN_WITHIN_S,
             )
         until(
             lambda: (now := window.robot.session.playback()).state is PlaybackState.LIVE and now.redials > 0,
             "her video is back",
-            TOLD_WITHIN_S,
+            SHOWN_WITHIN_S,
         )

@@ -32,7 +32,7 @@ def is_live(session: VideoSession) -> bool:
 
 
 def becomes(session: VideoSession, state: PlaybackState) -> float:
-    """Waits for a phase and tells when it was seen."""
+    """Waits for a state and returns when it was seen."""
     wait_until(lambda: session.playback().state is state, f"{state}; it is {session.playback()}", 25)
     return time.monotonic()
 
@@ -41,11 +41,11 @@ def test_it_follows_the_preview_from_off_to_on_and_back(ground: VideoGround, ses
     becomes(session, PlaybackState.OFF)
     ground.switch_on()
     becomes(session, PlaybackState.LIVE)
-    picture = session.latest_frame()
-    assert picture is not None
-    assert (picture.width, picture.height, picture.codec) == (320, 240, "h264")
-    assert picture.pixel_format is PixelFormat.BGRX
-    assert picture.decoder == "avdec_h264"
+    frame = session.latest_frame()
+    assert frame is not None
+    assert (frame.width, frame.height, frame.codec) == (320, 240, "h264")
+    assert frame.pixel_format is PixelFormat.BGRX
+    assert frame.decoder == "avdec_h264"
     ground.switch_off()
     becomes(session, PlaybackState.OFF)
     assert session.latest_frame() is None
@@ -60,7 +60,7 @@ def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
     died_s = time.monotonic()
     wait_until(lambda: not is_live(session), "the freeze shows")
     assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
-    # The gateway says why a moment later; the picture that stands still stays marked as one.
+    # The gateway says why a moment later; the frame that stands still stays marked as one.
     becomes(session, PlaybackState.FAULTED)
     assert session.playback().frame_age_s is not None
     assert "unreachable" in session.playback().reason
@@ -89,7 +89,7 @@ def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
     assert becomes(session, PlaybackState.LIVE) - went_on_s < BACK_WITHIN_S
 
 
-def test_pictures_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
+def test_frames_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
     ground.switch_on()
     becomes(session, PlaybackState.LIVE)
     ground.kill_gateway()
@@ -110,7 +110,7 @@ def test_the_codec_may_change_with_the_stream(
     ground.kill_preview()
     monkeypatch.setenv("PREVIEW__ENCODERS__ORDER", '["x265"]')
     ground.preview.start_again()
-    wait_until(lambda: (picture := session.latest_frame()) and picture.codec == "h265", "H.265 is shown", 30)
+    wait_until(lambda: (frame := session.latest_frame()) and frame.codec == "h265", "H.265 is shown", 30)
     becomes(session, PlaybackState.LIVE)
 
 
@@ -136,12 +136,12 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
     recording = Recording(tmp_path / "drive.ts")
     with following(ground.target, recording=recording) as session:
         ground.switch_on()
-        wait_until(lambda: session.frames >= 30, "pictures")
+        wait_until(lambda: session.frames >= 30, "frames")
         ground.kill_preview()
         wait_until(lambda: session.redials >= 1, "called again")
         ground.preview.start_again()
         before = session.frames
-        wait_until(lambda: session.frames >= before + 30, "pictures again", 30)
+        wait_until(lambda: session.frames >= before + 30, "frames again", 30)
         kept_while_live = recording.size_bytes
         seen = session.frames
     recording.close()
@@ -149,7 +149,7 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
     assert recording.gaps == 0
     assert recording.size_bytes >= kept_while_live > 0
     assert recording.size_bytes % 188 == 0
-    # A picture that waits in the session is dropped for a newer one; the file has them all.
+    # A frame that waits in the session is dropped for a newer one; the file has them all.
     assert decoded_pictures(recording.file) >= seen >= 60
 
 
@@ -159,14 +159,14 @@ def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:
         ground.switch_on()
         wait_until(lambda: recording.error, "the disk is full")
         before = session.frames
-        wait_until(lambda: session.frames >= before + 30, "pictures go on")
+        wait_until(lambda: session.frames >= before + 30, "frames go on")
         assert session.redials == 0
     recording.close()
     assert "ended early: No space left" in str(recording.error)
 
 
-def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(ground: VideoGround) -> None:
-    """A terminal that nobody reads takes a few kB; then whoever writes to it waits for ever."""
+def test_a_disk_that_does_not_answer_delays_neither_the_video_nor_the_end(ground: VideoGround) -> None:
+    """A terminal without a reader takes a few kB; then writing blocks for ever."""
     master, slave = os.openpty()
     recording = Recording(Path(os.ttyname(slave)))
     try:
@@ -177,7 +177,7 @@ def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(gr
             wait_until(lambda: session.redials >= 1, "called again, with a disk that hangs")
             ground.preview.start_again()
             before = session.frames
-            wait_until(lambda: session.frames >= before + 30, "pictures go on", 30)
+            wait_until(lambda: session.frames >= before + 30, "frames go on", 30)
         recording.close(timeout_s=0.2)
         assert "the disk does not answer" in str(recording.error)
     finally:
@@ -186,11 +186,11 @@ def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(gr
 
 
 def test_closing_takes_no_time_whatever_it_does() -> None:
-    nobody = StreamAddress("127.0.0.1", free_udp_port(), 20)
+    absent = StreamAddress("127.0.0.1", free_udp_port(), 20)
     session = VideoSession()
     session.start()
-    session.follow(preview(PreviewState.RUNNING, port=nobody.port))
-    wait_until(lambda: session.redials >= 1, "nobody answers, it was called again")
+    session.follow(preview(PreviewState.RUNNING, port=absent.port))
+    wait_until(lambda: session.redials >= 1, "no answer, it has redialed")
     begun_s = time.monotonic()
     assert session.close()
     assert time.monotonic() - begun_s < 1.5

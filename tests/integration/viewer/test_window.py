@@ -24,7 +24,7 @@ from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 from PySide6.QtGui import QColor, QImage  # isort: skip
 from PySide6.QtWidgets import QWidget  # isort: skip
 
-from console.window.view_program import viewing
+from console.window.programs import viewing
 from console.window.view_window import ViewWindow
 
 pytestmark = [pytest.mark.gst, pytest.mark.usefixtures("application")]
@@ -59,25 +59,25 @@ def keep(widget: QWidget, name: str) -> None:
 
 
 def banner_is_on_screen(view: ViewWindow) -> bool:
-    """Whether the card of a banner is painted over the lower part of the picture."""
+    """Whether the card of a banner is painted over the lower part of the frame."""
     video = on_screen(view.video)
     colour = video.pixelColor(video.width() // 2, video.height() - 24)
     return max(colour.red(), colour.green(), colour.blue()) < 60
 
 
 @pytest.mark.timed
-def test_the_window_adds_less_than_one_and_a_half_pictures_to_the_latency(tmp_path: Path) -> None:
+def test_the_window_adds_less_than_one_and_a_half_frames_to_the_latency(tmp_path: Path) -> None:
     """In one round of three: what other programs take of the machine is not the window's doing."""
     with closing(extra_latency_ms(tmp_path, rounds=3)) as rounds:
         assert any(extra_ms < 1.5 * 1000 / FPS for extra_ms in rounds)
 
 
-def test_a_freeze_is_painted_at_once_and_gone_when_the_picture_is_back(
+def test_a_freeze_is_painted_at_once_and_gone_when_the_video_is_back(
     ground: VideoGround, view: ViewWindow
 ) -> None:
     ground.switch_on()
     shows(view, PlaybackState.LIVE)
-    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    until(lambda: not banner_is_on_screen(view), "the frame alone")
     ground.kill_preview()
     died_s = time.monotonic()
     until(lambda: banner_is_on_screen(view), "the banner")
@@ -90,7 +90,7 @@ def test_a_freeze_is_painted_at_once_and_gone_when_the_picture_is_back(
     ground.preview.start_again()
     ground.preview.running()
     returned_s = time.monotonic()
-    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    until(lambda: not banner_is_on_screen(view), "the frame alone")
     assert time.monotonic() - returned_s < BACK_WITHIN_S
 
 
@@ -118,7 +118,7 @@ def test_a_person_turns_full_screen_on_and_off_and_quits(view: ViewWindow) -> No
     assert not view.isVisible()
 
 
-def test_nobody_there_is_said(tmp_path: Path) -> None:
+def test_an_absent_robot_is_reported(tmp_path: Path) -> None:
     with viewing(f"127.0.0.1:{free_tcp_port()}", Recording(tmp_path / "a.ts"), FrameCounter()) as view:
         shows(view, PlaybackState.UNREACHABLE)
         let_pass(0.6)
@@ -126,19 +126,19 @@ def test_nobody_there_is_said(tmp_path: Path) -> None:
         assert view.notes.text().startswith("recording a.ts: 0.0 MiB")
 
 
-def test_a_window_that_was_busy_paints_the_newest_picture_only(ground: VideoGround, view: ViewWindow) -> None:
+def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround, view: ViewWindow) -> None:
     ground.switch_on()
     shows(view, PlaybackState.LIVE)
     before = view.robot.session.frames
     # The window's thread does nothing else meanwhile.
-    wait_until(lambda: view.robot.session.frames >= before + 30, "30 pictures")
+    wait_until(lambda: view.robot.session.frames >= before + 30, "30 frames")
     painted: list[float] = []
     view.video.painted.connect(lambda: painted.append(time.monotonic()))
     let_pass(0.2)
     assert 1 <= len(painted) < 15
 
 
-def test_a_refusal_is_told_in_the_robots_words() -> None:
+def test_a_refusal_is_shown_in_the_robots_words() -> None:
     double = GatewayDouble()
     double.accept = False
     with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
@@ -219,7 +219,7 @@ BLACK_4_3 = "videotestsrc is-live=true pattern=black ! video/x-raw,width=640,hei
 def test_boxes_are_painted_around_what_they_mean(
     tmp_path: Path, window: tuple[int, int], wanted: Box
 ) -> None:
-    """Boxes are in pixels of a 1280x960 camera; the picture is 320x240; the window is another size again."""
+    """Boxes are in pixels of a 1280x960 camera; the frame is 320x240; the window is another size again."""
     box = Box(400, 400, 320, 240)
     with seeing(tmp_path, BLACK_4_3, box, shape=(1280, 960)) as (view, _double):
         video = view.video
@@ -238,8 +238,8 @@ def test_boxes_are_painted_around_what_they_mean(
             yellow(on_screen(video))
 
 
-def test_boxes_fit_a_camera_of_another_shape_than_the_picture(tmp_path: Path) -> None:
-    """The robot puts a 16:9 camera into a 4:3 picture with bars; the whole camera image is marked."""
+def test_boxes_fit_a_camera_of_another_shape_than_the_frame(tmp_path: Path) -> None:
+    """The robot puts a 16:9 camera into a 4:3 frame with bars; the whole camera image is marked."""
     source = "videotestsrc is-live=true pattern=white ! video/x-raw,width=640,height=360,framerate=30/1"
     with seeing(tmp_path, source, Box(0, 0, 640, 360), shape=(640, 360)) as (view, _double):
         video = view.video

@@ -63,7 +63,7 @@ def test_who_asked_for_what_and_what_came_of_it() -> None:
     assert line.text == "anna asked for SetPreviewMode: refused, not now"
 
 
-def test_what_is_missing_is_told() -> None:
+def test_missed_events_are_reported() -> None:
     gap = EventGap(reason=GapReason.NO_LONGER_KEPT, missed_count=3, position=HERE)
     line = line_of(gap, 99.0)
     assert line == EventLine(

@@ -62,7 +62,7 @@ def test_on_the_robots_profile_counts_not_the_selected_one() -> None:
     assert of(RUNNING, selected=LOW).profile is HIGH
 
 
-def test_a_profile_nobody_ever_chose_is_balanced() -> None:
+def test_an_unknown_profile_is_shown_as_balanced() -> None:
     assert of(snapshot()).profile is BALANCED
 
 
@@ -103,7 +103,7 @@ def test_good_news_goes_away_by_itself() -> None:
     assert of(RUNNING, answer(RUNNING, ended_s=NOW_S - 60)).notes == ()
 
 
-def test_a_fault_is_told_once_in_the_robots_words() -> None:
+def test_a_fault_is_reported_once_in_the_robots_words() -> None:
     faulted = with_preview(states.PREVIEW_FAULTED, "no encoder works. Type: robot-preview encoders")
     expected = (Note("no encoder works. Type: robot-preview encoders", SeverityStyle.BAD),)
     assert of(faulted).notes == expected
@@ -111,6 +111,6 @@ def test_a_fault_is_told_once_in_the_robots_words() -> None:
     assert of(faulted).style is SeverityStyle.BAD
 
 
-def test_a_service_that_does_not_answer_is_told_before_anybody_wants_video() -> None:
+def test_an_unreachable_service_is_reported_while_the_preview_is_off() -> None:
     (note,) = of(with_preview(states.PREVIEW_DISABLED, reachable=False)).notes
     assert "does not answer" in note.text

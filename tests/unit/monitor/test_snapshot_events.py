@@ -19,7 +19,7 @@ def texts(log: SnapshotEvents, taken: OverlaySnapshot) -> list[str]:
     return [line.text for line in log.new_lines(taken)]
 
 
-def test_each_event_is_told_once_in_order() -> None:
+def test_each_event_is_logged_once_in_order() -> None:
     log = SnapshotEvents()
     assert texts(log, listing(event(5), event(6))) == ["event 5", "event 6"]
     assert texts(log, listing(event(5), event(6))) == []
@@ -59,7 +59,7 @@ def test_another_boot_is_another_gateway() -> None:
     assert texts(log, listing(event(1), boot="b", up_ms=70_000))[1:] == ["event 1"]
 
 
-def test_an_old_gateway_is_told_by_its_numbers() -> None:
+def test_an_old_gateway_is_recognized_by_its_numbers() -> None:
     log = SnapshotEvents()
     log.new_lines(listing(event(8)))
     assert texts(log, listing(event(1)))[1:] == ["event 1"]

@@ -40,7 +40,7 @@ AT_ONCE_S = 0.0
 
 
 class PlayedRobot:
-    """Answers as it is told; what it is asked, it notes."""
+    """Answers as the test sets it up, and records the calls."""
 
     def __init__(self) -> None:
         self.error: GatewayError | None = None
@@ -274,7 +274,7 @@ def test_never_started_is_closed_at_once(robot: PlayedRobot) -> None:
     assert Worker("robot", lambda: None, robot.connect).close()
 
 
-def test_an_address_that_is_none_is_told_at_once() -> None:
+def test_an_invalid_address_is_reported_at_once() -> None:
     with pytest.raises(UserError, match="not the address"):
         Worker("http://robot/", lambda: None)
 

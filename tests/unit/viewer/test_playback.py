@@ -11,7 +11,7 @@ from tests.unit.viewer.previews import preview
 
 NOW_S = 1000.0
 GONE = Unreachable("no robot gateway at robot:50051")
-OVER = NotAllowed("the token of anna was revoked")
+REVOKED = NotAllowed("the token of anna was revoked")
 SILENT = UserError("the stream from srt://robot:7100 fell silent")
 RUNNING = preview(PreviewState.RUNNING)
 FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it in")
@@ -21,8 +21,8 @@ FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it 
     ("facts", "state"),
     [
         pytest.param({}, PlaybackState.CONNECTING, id="nothing known yet"),
-        pytest.param({"preview": RUNNING}, PlaybackState.CONNECTING, id="called, no picture yet"),
-        pytest.param({"preview": RUNNING, "frame_s": NOW_S - 0.1}, PlaybackState.LIVE, id="a picture came"),
+        pytest.param({"preview": RUNNING}, PlaybackState.CONNECTING, id="called, no frame yet"),
+        pytest.param({"preview": RUNNING, "frame_s": NOW_S - 0.1}, PlaybackState.LIVE, id="a frame came"),
         pytest.param({"preview": RUNNING, "frame_s": NOW_S - 1.2}, PlaybackState.FROZEN, id="silence"),
         pytest.param({"preview": preview(PreviewState.DISABLED)}, PlaybackState.OFF, id="off"),
         pytest.param(
@@ -32,13 +32,13 @@ FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it 
         pytest.param(
             {"preview": FAULTED, "frame_s": NOW_S - 5}, PlaybackState.FAULTED, id="the robot says why"
         ),
-        pytest.param({"gateway_error": GONE}, PlaybackState.UNREACHABLE, id="nobody there"),
-        pytest.param({"gateway_error": OVER}, PlaybackState.NO_ACCESS, id="the login is over"),
+        pytest.param({"gateway_error": GONE}, PlaybackState.UNREACHABLE, id="no gateway"),
+        pytest.param({"gateway_error": REVOKED}, PlaybackState.NO_ACCESS, id="the login was revoked"),
         pytest.param({"gateway_error": NotTrusted("a stranger")}, PlaybackState.NO_ACCESS, id="a stranger"),
         pytest.param(
-            {"preview": RUNNING, "gateway_error": OVER, "frame_s": NOW_S - 0.1},
+            {"preview": RUNNING, "gateway_error": REVOKED, "frame_s": NOW_S - 0.1},
             PlaybackState.LIVE,
-            id="pictures although the login is over",
+            id="frames although the login was revoked",
         ),
         pytest.param(
             {"preview": RUNNING, "gateway_error": GONE, "frame_s": NOW_S - 2},
@@ -48,7 +48,7 @@ FAULTED = preview(PreviewState.FAULTED, last_error="the camera is gone. Plug it 
         pytest.param(
             {"preview": RUNNING, "gateway_error": GONE, "frame_s": NOW_S - 0.1},
             PlaybackState.LIVE,
-            id="pictures without a gateway",
+            id="frames without a gateway",
         ),
         pytest.param(
             {"preview": RUNNING, "stream_error": SILENT, "blocked": True}, PlaybackState.BLOCKED, id="blocked"

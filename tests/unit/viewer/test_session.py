@@ -13,7 +13,6 @@ from console.receiver.errors import UndecodableError, ended, from_srt
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
-from console.receiver.receiver import Receiver
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from tests.support.waiting import wait_until
@@ -23,30 +22,27 @@ from tests.unit.viewer.previews import preview
 
 @dataclass
 class Exchange:
-    """Every call that was made; a test puts pictures and ends into the inboxes."""
+    """Every connection that was made; a test puts frames and ends into the queues."""
 
     refuse: bool = False
     calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
 
-    def connect(self, address: StreamAddress, options: ReceiverOptions) -> Receiver:
-        return Receiver(address, queue_size=1, options=options, connect=self._dial)
-
-    def _dial(self, address: StreamAddress, inbox: FrameQueue, _options: ReceiverOptions) -> "Exchange":
-        self.calls.append((address, inbox))
+    def connect(self, address: StreamAddress, queue: FrameQueue, _options: ReceiverOptions) -> "Exchange":
+        self.calls.append((address, queue))
         self.open += 1
         if self.refuse:
-            inbox.end(from_srt(address, "Incorrect passphrase", had_data=False))
+            queue.end(from_srt(address, "Incorrect passphrase", had_data=False))
         return self
 
     def close(self) -> None:
         self.open -= 1
 
     def show(self) -> Frame:
-        """A picture arrives over the newest call."""
-        picture = replace(frame(), arrival_s=time.monotonic())
-        self.calls[-1][1].put(picture)
-        return picture
+        """A frame arrives over the latest connection."""
+        latest = replace(frame(), arrival_s=time.monotonic())
+        self.calls[-1][1].put(latest)
+        return latest
 
 
 @pytest.fixture
@@ -77,15 +73,15 @@ def test_nothing_is_called_until_the_gateway_names_a_stream(
     called(exchange, 1)
 
 
-def test_the_newest_picture_is_kept_and_told(session: VideoSession, exchange: Exchange) -> None:
-    told: list[Frame] = []
-    session.add_frame_listener(told.append)
+def test_the_latest_frame_is_kept_and_passed_to_listeners(session: VideoSession, exchange: Exchange) -> None:
+    received: list[Frame] = []
+    session.add_frame_listener(received.append)
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
     for number in (1, 2, 3):
-        picture = exchange.show()
-        wait_until(lambda picture=picture: session.latest_frame() is picture, "the picture is kept")  # type: ignore[misc]
-        assert session.frames == len(told) == number
+        latest = exchange.show()
+        wait_until(lambda latest=latest: session.latest_frame() is latest, "the frame is kept")  # type: ignore[misc]
+        assert session.frames == len(received) == number
     assert session.playback().state is PlaybackState.LIVE
 
 
@@ -93,8 +89,8 @@ def test_a_lost_call_is_made_again_and_counted(session: VideoSession, exchange: 
     session.follow(preview(PreviewState.RUNNING))
     for number in (1, 2, 3):
         called(exchange, number)
-        address, inbox = exchange.calls[-1]
-        inbox.end(ended(address, "lost"))
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
     called(exchange, 4)
     assert session.redials == session.playback().redials == 3
 
@@ -120,21 +116,21 @@ def test_another_address_is_called_at_once(session: VideoSession, exchange: Exch
     assert session.redials == 0
 
 
-def test_the_gateway_may_be_away_while_pictures_come(session: VideoSession, exchange: Exchange) -> None:
+def test_the_gateway_may_be_away_while_frames_come(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
-    session.gateway_lost(Unreachable("nobody there"))
+    session.gateway_lost(Unreachable("no gateway"))
     exchange.show()
-    wait_until(session.latest_frame, "a picture")
+    wait_until(session.latest_frame, "a frame")
     assert session.playback().state is PlaybackState.LIVE
     assert len(exchange.calls) == 1
 
 
-def test_an_old_picture_does_not_outlive_its_preview(session: VideoSession, exchange: Exchange) -> None:
+def test_an_old_frame_does_not_outlive_its_preview(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
     exchange.show()
-    wait_until(session.latest_frame, "a picture")
+    wait_until(session.latest_frame, "a frame")
     session.follow(preview(PreviewState.DISABLED))
     assert session.latest_frame() is None
     wait_until(lambda: exchange.open == 0, "hung up")

@@ -13,7 +13,7 @@ from tests.unit.receiver.frames import frame
 MIB = 1 << 20
 
 
-def picture(at_s: float, *, corrupt: bool = False) -> Frame:
+def frame_at(at_s: float, *, corrupt: bool = False) -> Frame:
     return replace(frame(), arrival_s=at_s, corrupt=corrupt, decoder="avdec_h264")
 
 
@@ -23,7 +23,7 @@ def kept(tmp_path: Path) -> Recording:
     return recording
 
 
-def test_without_a_picture_nothing_is_made_up() -> None:
+def test_without_a_frame_the_figures_are_empty() -> None:
     summary = FrameCounter().summary(0, None)
     assert summary.line() == "no frame"
     assert (summary.pictures, summary.width_px, summary.first_picture_ms, summary.fps) == (
@@ -34,11 +34,11 @@ def test_without_a_picture_nothing_is_made_up() -> None:
     )
 
 
-def test_pictures_are_counted_and_their_rate_is_that_between_first_and_last() -> None:
+def test_frames_are_counted_and_their_rate_is_that_between_first_and_last() -> None:
     counter = FrameCounter()
     begun_s = counter.last_s
     for number in range(31):
-        counter.count(picture(begun_s + 0.25 + number / 30, corrupt=number == 3))
+        counter.count(frame_at(begun_s + 0.25 + number / 30, corrupt=number == 3))
     summary = counter.summary(2, None)
     assert (summary.pictures, summary.corrupt_pictures, summary.redials) == (31, 1, 2)
     assert summary.fps == pytest.approx(30)
@@ -49,13 +49,13 @@ def test_pictures_are_counted_and_their_rate_is_that_between_first_and_last() ->
     assert counter.last_s == pytest.approx(begun_s + 1.25)
 
 
-def test_one_picture_has_no_rate() -> None:
+def test_one_frame_has_no_rate() -> None:
     counter = FrameCounter()
-    counter.count(picture(counter.last_s))
+    counter.count(frame_at(counter.last_s))
     assert counter.summary(0, None).fps is None
 
 
-def test_the_recording_is_told(tmp_path: Path) -> None:
+def test_the_recording_is_in_the_summary(tmp_path: Path) -> None:
     recording = kept(tmp_path)
     summary = FrameCounter().summary(0, recording)
     assert summary.recording == {"file": str(recording.file), "bytes": MIB, "gaps": 0}
@@ -64,7 +64,7 @@ def test_the_recording_is_told(tmp_path: Path) -> None:
     assert "with 1 gap: the disk was too slow" in FrameCounter().summary(0, recording).line()
 
 
-def test_the_line_below_the_picture() -> None:
+def test_the_line_below_the_video() -> None:
     assert figures_line(None, 0, 0) == ""
     assert figures_line(None, 0, 3) == "reconnected 3x"
     newest = replace(frame(), decoder="vah264dec")
