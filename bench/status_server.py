@@ -30,9 +30,9 @@ from gateway.config import (
 )
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.event import ModeChanged, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -42,6 +42,18 @@ from gateway.status.preview import (
     PreviewState,
     Profile,
     Stream,
+)
+from gateway.status.sources import (
+    BATTERY,
+    COMPUTE,
+    DIAGNOSTICS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    MUX_INPUTS,
+    NETWORK,
+    ODOMETRY,
+    ONBOARD_BATTERY,
+    VISION,
 )
 from gateway.status.values import (
     Battery,
@@ -64,9 +76,7 @@ RAISE_METHOD = "/bench.Reference/Raise"
 CONSTANT_EVERY_S = 0.1
 _UNLIMITED: Final = LimitSettings(requests_per_s=1e9, burst=1_000_000_000)
 """The same code runs; no caller is refused."""
-_MODE: Final = SourceSettings(
-    kind=SourceKind.MODE, topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000
-)
+_MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
 _FIVE_FAULTS: Final = Diagnostics(
     tuple(
         DiagnosticItem(f"lidar {number}", DiagnosticLevel.ERROR if number < 5 else DiagnosticLevel.OK, "")
@@ -165,20 +175,18 @@ async def _drive(board: Board) -> None:
     for number in itertools.count():
         now = time.monotonic()
         speed_mps = 0.5 + number % 100 / 1000
-        board.odometry = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
-        board.mode = Received(Mode("exploring"), now)
-        board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
-        board.mux_inputs = {CommandSource.KEYBOARD: board.effective_command}
-        board.diagnostics = Received(_FIVE_FAULTS, now)
-        board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
-        board.battery = Received(
-            Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now
-        )
-        board.compute = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
-        board.network = Received(
+        board[ODOMETRY] = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board[MODE] = Received(Mode("exploring"), now)
+        command = Received(Velocity(0.5, 0.0, 0.1), now)
+        board[EFFECTIVE_COMMAND] = board[MUX_INPUTS[CommandSource.KEYBOARD]] = command
+        board[DIAGNOSTICS] = Received(_FIVE_FAULTS, now)
+        board[VISION] = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
+        battery = Received(Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now)
+        board[BATTERY] = board[ONBOARD_BATTERY] = battery
+        board[COMPUTE] = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
+        board[NETWORK] = Received(
             Network("wlan0", connected=True, wifi_signal_dbm=-61, link_quality_percent=70), now
         )
-        board.onboard_battery = board.battery
         await asyncio.sleep(_UPDATE_EVERY_S)
 
 

@@ -1,4 +1,4 @@
-"""Counts durations by size. One addition costs well under a microsecond."""
+"""A histogram of durations. Adding a value costs well under a microsecond."""
 
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -6,10 +6,10 @@ from itertools import accumulate
 
 
 class Histogram:
-    """Belongs to one thread.
+    """Counts durations by bucket. Used by one thread alone.
 
     Args:
-        bounds_s: upper bounds of the buckets in seconds, growing; what is longer goes into a last one.
+        bounds_s: ascending upper bounds of the buckets in seconds; a last bucket takes longer durations.
     """
 
     def __init__(self, bounds_s: Sequence[float]) -> None:
@@ -18,11 +18,11 @@ class Histogram:
         self.sum_s = 0.0
 
     def add(self, seconds: float) -> None:
-        """One more."""
+        """Counts one duration."""
         self._counts[bisect_left(self._bounds_s, seconds)] += 1
         self.sum_s += seconds
 
     def cumulative(self) -> list[tuple[str, float]]:
-        """Upper bound as Prometheus spells it, and how many were not longer."""
+        """Returns the cumulative buckets of Prometheus: label "le", and the number of durations up to it."""
         names = [*(repr(bound) for bound in self._bounds_s), "+Inf"]
         return list(zip(names, map(float, accumulate(self._counts)), strict=True))

@@ -24,13 +24,13 @@ from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.link import LinkLostError
 from gateway.links.preview.wire import from_wire
-from gateway.metrics.endpoint import answer
-from gateway.ros.cutting import cut
+from gateway.metrics.endpoint import respond
+from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.methods import CONTRACT, method_at
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
-from preview.rpc.mapping import wish
+from preview.rpc.mapping import desired_state
 
 Target = Callable[[bytes], None]
 
@@ -51,7 +51,7 @@ def gateways_wish(data: bytes) -> None:
     request = preview_pb.ApplyDesiredStateRequest()
     if _parses(request, data):
         with suppress(InvalidRequestError):
-            wish(request.desired)
+            desired_state(request.desired)
 
 
 def previews_truth(data: bytes) -> None:
@@ -83,7 +83,7 @@ def configuration(data: bytes) -> None:
 
 def metrics_request(data: bytes) -> None:
     """An HTTP request to the metrics' port: always a whole answer."""
-    assert answer(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
+    assert respond(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
 
 
 def request_id(data: bytes) -> None:
@@ -124,10 +124,10 @@ def known_robots(data: bytes) -> None:
 
 
 def long_list(data: bytes) -> None:
-    """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
-    shorter, left_out = cut(data, longest=100)
+    """A list that is truncated before decoding: the message keeps its length, nothing is added."""
+    shorter, truncated = truncate_list(data, max_items=100)
     assert len(shorter) == len(data)
-    assert left_out >= 0
+    assert truncated >= 0
 
 
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(

@@ -8,12 +8,12 @@ from typing import Final
 
 import grpc
 
-from gateway.access.attempts import Attempts
 from gateway.access.audit import AuditLog
+from gateway.access.authenticator import Authenticator
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keyring import Keyring
 from gateway.access.lockout import Lockout
-from gateway.access.watch import AccessWatch, Loaded, TlsFiles
+from gateway.access.refusal_limiter import RefusalLimiter
+from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
 from gateway.config import SecuritySettings
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.auth import Auth
@@ -46,18 +46,18 @@ class AccessControl:
         directory = settings.credentials
         file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
         self._log = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
-        self.audit = Audit(events, self._log, Attempts())
+        self.audit = Audit(events, self._log, RefusalLimiter())
         self.auth: Auth | None = None
-        self._watch: AccessWatch | None = None
+        self._watch: CredentialReloader | None = None
         self._tls: ServerTls | None = None
         if directory is None:
             return
         files = CredentialDirectory(directory)
         tls_files = tls_files_of(settings, files)
-        self._watch = AccessWatch(files.read_store, files.store_file, tls_files, self._use)
-        self._keyring = Keyring(self._watch.loaded.store)
-        certificates = tls_files is not None and tls_files.client_authority is not None
-        self.auth = Auth(self._keyring, Lockout(), self._watch, stream_key, certificates=certificates)
+        self._watch = CredentialReloader(files, tls_files, self._use)
+        self._authenticator = Authenticator(self._watch.loaded.store)
+        certificates = tls_files is not None and tls_files.client_ca is not None
+        self.auth = Auth(self._authenticator, Lockout(), self._watch, stream_key, certificates=certificates)
         if self._watch.loaded.tls:
             self._tls = ServerTls(self._watch.loaded.tls)
 
@@ -68,8 +68,8 @@ class AccessControl:
 
     def view(self) -> AccessView:
         """Returns the state of credentials, certificates and audit log, for the fault rules."""
-        trouble = self._log.trouble
-        return self._watch.view(trouble) if self._watch else AccessView(audit_trouble=trouble)
+        error = self._log.error
+        return self._watch.view(error) if self._watch else AccessView(audit_error=error)
 
     @contextmanager
     def recording(self) -> Iterator[None]:
@@ -85,14 +85,14 @@ class AccessControl:
             tasks.create_task(self._watch.run(), name="credentials")
             tasks.create_task(self.auth.run(), name="revocation")
 
-    def _use(self, loaded: Loaded) -> None:
-        self._keyring.use(loaded.store)
+    def _use(self, loaded: LoadedAccess) -> None:
+        self._authenticator.use(loaded.store)
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         self._log.record(_reloaded(len(loaded.store.credentials)))
 
 
-def read_access(settings: SecuritySettings, directory: Path) -> Loaded:
+def read_access(settings: SecuritySettings, directory: Path) -> LoadedAccess:
     """Reads credentials and certificates as a gateway does that starts.
 
     Args:
@@ -103,7 +103,7 @@ def read_access(settings: SecuritySettings, directory: Path) -> Loaded:
         UserError: something can't be read.
     """
     files = CredentialDirectory(directory)
-    return AccessWatch(files.read_store, files.store_file, tls_files_of(settings, files)).loaded
+    return load_access(files, tls_files_of(settings, files))
 
 
 def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:
@@ -111,9 +111,8 @@ def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsF
     tls = settings.tls
     if not tls.enabled:
         return None
-    certificate, key = files.server_files
-    authority = (tls.client_ca or files.authority_files[0]) if tls.client_certificates else None
-    return TlsFiles(tls.certificate or certificate, tls.key or key, authority)
+    client_ca = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
+    return TlsFiles(tls.certificate or files.server.certificate, tls.key or files.server.key, client_ca)
 
 
 def _reloaded(count: int) -> ControlAction:

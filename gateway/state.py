@@ -8,17 +8,17 @@ from typing import Final, Protocol
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
-from gateway.platform.boot import boot_id
+from gateway.observer import Observer
+from gateway.platform.files import boot_id
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
 from gateway.status.event import News
 from gateway.status.events import EventLog
-from gateway.status.faults.book import FaultBook
 from gateway.status.faults.rules import FaultRules
-from gateway.status.observer import Observer
+from gateway.status.faults.tracker import FaultTracker
 from gateway.status.preview import PreviewView
 from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Snapshot, take
 
 _log = logging.getLogger(__name__)
 
@@ -66,14 +66,14 @@ class State:
         self._identity = Identity(
             settings.name, project_version(), settings.security.insecure and not settings.security.guarded
         )
-        self._rules = _rules(settings)
+        self._rules = settings.status_rules()
         self._preview = preview
         self._calls = calls
         self._revision, self._boot_id = project_revision(), boot_id()
         self._started_s = time.monotonic()
-        self._book = FaultBook(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
+        self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
         self._observer = Observer(
-            self._book,
+            self._tracker,
             FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000, faults.expiry_days),
         )
         self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
@@ -95,7 +95,7 @@ class State:
             board=self.board,
             preview=self._preview.view,
             events=self.events.newest(),
-            faults=self._book.faults,
+            faults=self._tracker.faults,
             now_s=now_s,
             access=self.access,
         )
@@ -116,7 +116,7 @@ class State:
         """Adds an event of this instant."""
         _log.info("event: %s", news.sentence or news.message)
         self.events.add(news, time.monotonic())
-        self.event_added.wake_all()
+        self.event_added.notify_all()
 
     def _runtime(self, now_s: float) -> Runtime:
         return Runtime(
@@ -128,12 +128,3 @@ class State:
             requests_refused=self._calls.refused,
             run_id=self.events.run_id,
         )
-
-
-def _rules(settings: GatewaySettings) -> Rules:
-    rules = {source: SourceRule(source.stale_after_ms, source.required) for source in settings.sources}
-    return Rules(
-        sources={source.kind: rule for source, rule in rules.items() if source.label is None},
-        mux_inputs={source.label: rule for source, rule in rules.items() if source.label},
-        platform_stale_after_ms=settings.platform.stale_after_ms,
-    )

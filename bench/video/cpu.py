@@ -18,7 +18,7 @@ from bench.video.progress import tell
 from bench.video.viewing import Viewer, watch
 from common.free import free_udp_port
 from preview.encoders.catalogue import CATALOGUE
-from preview.encoders.settings import vbv_ms
+from preview.encoders.properties import vbv_ms
 
 ROUNDS = 7
 TRIES = 12

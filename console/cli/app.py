@@ -1,4 +1,4 @@
-"""The commands of robotctl. Each asks, prints, and lets errors go up to `console.cli.run`."""
+"""The command line of robotctl. Commands raise their errors; console.cli.run reports them."""
 
 from typing import Annotated
 
@@ -10,13 +10,12 @@ from console.cli.events import events
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
 from console.cli.login import login
-from console.cli.monitor import monitor
-from console.cli.options import JsonOption, RobotOption, TargetOption, remember, session_of
+from console.cli.options import JsonOption, RobotOption, TargetOption, keep_global_options, session_of
 from console.cli.preview import preview_app
 from console.cli.robots import robots_app
 from console.cli.tables import overlay_view, status_view
-from console.cli.view import view
 from console.cli.watch import watch_until_stopped
+from console.cli.windows import monitor, view
 
 app = typer.Typer(
     name="robotctl",
@@ -26,15 +25,12 @@ app = typer.Typer(
 )
 app.add_typer(preview_app, name="preview")
 app.add_typer(robots_app, name="robots")
-app.command()(doctor)
-app.command()(events)
-app.command()(login)
-app.command()(monitor)
-app.command()(view)
+for command in (doctor, events, login, monitor, view):
+    app.command()(command)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"robotctl {project_version()}")
         raise typer.Exit
 
@@ -50,7 +46,7 @@ def robotctl(
     ] = False,
 ) -> None:
     """A robot's status and preview, for people and scripts."""
-    remember(context, target, robot, as_json)
+    keep_global_options(context, target, robot, as_json)
 
 
 @app.command()
@@ -60,14 +56,11 @@ def status(
     robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show everything the gateway knows about the robot, once."""
+    """Show the status of the whole robot, once."""
     session = session_of(context, target, as_json, robot)
     with session.connect() as gateway:
         answer = gateway.status()
-    if session.as_json:
-        session.print_json(json_form(answer))
-    else:
-        session.out.print(status_view(answer, gateway.target))
+    session.show(json_form(answer), status_view(answer, gateway.target))
 
 
 @app.command()
@@ -77,14 +70,11 @@ def overlay(
     robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what the robot sees and the newest events, once."""
+    """Show the robot's detections and the newest events, once."""
     session = session_of(context, target, as_json, robot)
     with session.connect() as gateway:
         snapshot = gateway.overlay()
-    if session.as_json:
-        session.print_json(json_form(snapshot))
-    else:
-        session.out.print(overlay_view(snapshot, gateway.target))
+    session.show(json_form(snapshot), overlay_view(snapshot, gateway.target))
 
 
 @app.command()
@@ -98,10 +88,7 @@ def info(
     session = session_of(context, target, as_json, robot)
     with session.connect() as gateway:
         answer = gateway.info()
-    if session.as_json:
-        session.print_json(info_json(answer))
-    else:
-        session.out.print(info_view(answer, gateway.target))
+    session.show(info_json(answer), info_view(answer, gateway.target))
 
 
 @app.command()
@@ -110,18 +97,20 @@ def watch(
     *,
     interval_s: Annotated[
         float,
-        typer.Option("--interval", min=0.1, max=3600, metavar="SECONDS", help="Time between two looks."),
+        typer.Option(
+            "--interval", min=0.1, max=3600, metavar="SECONDS", help="Shortest time between updates."
+        ),
     ] = 1.0,
     count: Annotated[
         int | None,
-        typer.Option("--count", min=1, help="End after so many looks.", show_default="until Ctrl-C"),
+        typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
     ] = None,
     target: TargetOption = None,
     robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the status again and again, until Ctrl-C.
+    """Show the status whenever it changes, until Ctrl-C.
 
-    On a terminal it is redrawn in place; into a pipe goes one line per look.
+    On a terminal it is redrawn in place; a pipe or a file gets one line per update.
     """
     watch_until_stopped(session_of(context, target, as_json, robot), interval_s, count)

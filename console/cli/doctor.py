@@ -1,4 +1,4 @@
-"""robotctl doctor: what is wrong between this computer and the robot."""
+"""robotctl doctor: finds faults between this computer and the robot."""
 
 import typer
 
@@ -15,7 +15,7 @@ def doctor(
     robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find out what is wrong between this computer and the robot, and what to type.
+    """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
 
     Ends 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """

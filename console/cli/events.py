@@ -1,4 +1,4 @@
-"""robotctl events: what happened on the robot, and with --follow what happens."""
+"""robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
 from datetime import datetime
@@ -13,18 +13,19 @@ from console.cli.json_form import json_form
 from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
 from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
+from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
 from console.presentation.formatting import plural
+from console.presentation.severity_style import FAULT_STYLES
 
 Item = Event | EventGap | CaughtUp | Outage
 
 _MS_PER_S: Final = 1000
-_STYLES: Final = {FaultSeverity.WARNING: "bold yellow", FaultSeverity.ERROR: "bold red"}
 
 
 class SeverityWord(StrEnum):
-    """The least that can be asked for."""
+    """The lowest severity that can be requested."""
 
     INFO = "info"
     WARNING = "warning"
@@ -40,15 +41,15 @@ def events(
         typer.Option("--since", metavar="RUN:SEQUENCE", help="Go on after this event.", show_default=False),
     ] = None,
     severity: Annotated[
-        SeverityWord, typer.Option("--severity", help="Leave out what matters less.")
+        SeverityWord, typer.Option("--severity", help="Leave out events of lower severity.")
     ] = SeverityWord.INFO,
     target: TargetOption = None,
     robot: RobotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show what happened on the robot, as far as the gateway keeps it.
+    """Show past events of the robot, as far back as the gateway keeps them.
 
-    With --follow also what happens from now on, each event once, whatever becomes of the connection.
+    With --follow also new ones, each once, across lost connections.
     """
     session = session_of(context, target, as_json, robot)
     after = _position(since)
@@ -59,7 +60,7 @@ def events(
                 if not follow:
                     return
             elif isinstance(item, Outage) and not follow:
-                # Who wants to know what was, and can't get it, has failed.
+                # Without --follow the past events are all that was asked for.
                 raise item.error
             else:
                 _show(session, item)
@@ -85,7 +86,7 @@ def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
         case Event():
             at = datetime.fromtimestamp(item.wall_clock_unix_ms / _MS_PER_S).astimezone()
             yield Text(at.strftime("%Y-%m-%d %H:%M:%S"), style="dim")
-            yield Text(f"{item.severity.value:7}", style=_STYLES.get(item.severity, ""))
+            yield Text(f"{item.severity.value:7}", style=_style(item.severity))
             yield Text(f"{item.component:10}")
             yield Text(item.message)
         case EventGap():
@@ -94,21 +95,26 @@ def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
             yield Text(f"--- {item.error.what}", style="bold red")
 
 
+def _style(severity: FaultSeverity) -> str:
+    loud = severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
+    return STYLES[FAULT_STYLES[severity]] if loud else ""
+
+
 def _missing(gap: EventGap) -> str:
     if gap.reason is GapReason.NEW_RUN:
-        here = f", and of this run {plural(gap.missed_count, 'event')}" if gap.missed_count else ""
-        return f"the gateway was started anew: what it had not sent before is missing{here}"
-    return f"{plural(gap.missed_count, 'event')} missing: more came than the gateway keeps"
+        here = f", and {plural(gap.missed_count, 'event')} of this run" if gap.missed_count else ""
+        return f"the gateway was restarted: events that it had not sent before are lost{here}"
+    return f"{plural(gap.missed_count, 'event')} missing: there were more than the gateway keeps"
 
 
-def _position(words: str | None) -> EventPosition | None:
-    if words is None:
+def _position(text: str | None) -> EventPosition | None:
+    if text is None:
         return None
-    run_id, _, sequence = words.rpartition(":")
+    run_id, _, sequence = text.rpartition(":")
     if not run_id or not sequence.isdecimal():
         raise UserError(
-            f"--since {words} is no place in the order of events",
-            "It has the form RUN:SEQUENCE; 'robotctl events --json' tells both with each event",
+            f"--since {text} is not an event position",
+            "It has the form RUN:SEQUENCE; 'robotctl events --json' prints both with each event",
             exit_code=ExitCode.USAGE,
         )
     return EventPosition(run_id, int(sequence))

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from console.cli.json_form import json_form
+from console.cli.tables import grid
 from console.client import GatewayInfo
 from console.presentation.formatting import UNKNOWN, age
 
@@ -16,14 +17,14 @@ _MS_PER_S: Final = 1000
 
 
 def info_json(info: GatewayInfo) -> dict[str, Any]:
-    """As scripts read it: the configuration as an object, not as text."""
+    """Returns the JSON form, with the configuration as an object instead of a text."""
     document: dict[str, Any] = json_form(info)
     text = document.pop("configuration_json")
     return document | {"configuration": json.loads(text) if text else None}
 
 
 def info_view(info: GatewayInfo, target: str) -> RenderableType:
-    """For people."""
+    """Returns the view for people: build and uptime, call counts, configuration."""
     return Group(
         Text.assemble((info.gateway_name or "robot", "bold"), (f"  {target}", "dim")),
         Text(),
@@ -37,9 +38,7 @@ def info_view(info: GatewayInfo, target: str) -> RenderableType:
 
 
 def _facts(info: GatewayInfo) -> Table:
-    table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
+    table = grid("nowrap", "fold")
     clock = datetime.fromtimestamp(info.wall_clock_unix_ms / _MS_PER_S, UTC)
     for label, text in (
         ("version", info.gateway_version or UNKNOWN),
@@ -48,15 +47,12 @@ def _facts(info: GatewayInfo) -> Table:
         ("boot", info.gateway.boot_id or UNKNOWN),
         ("its clock", clock.isoformat(timespec="seconds")),
     ):
-        table.add_row(label, Text(text))
+        table.add_row(Text(label, style="dim"), Text(text))
     return table
 
 
 def _calls(info: GatewayInfo) -> Table:
-    table = Table.grid(padding=(0, 2))
-    table.add_column(no_wrap=True)
-    for _ in range(3):
-        table.add_column(justify="right", no_wrap=True)
+    table = grid("nowrap", "right", "right", "right")
     table.add_row("method", "served", "refused", "failed", style="dim")
     for counts in info.methods:
         table.add_row(Text(counts.method), str(counts.served), str(counts.refused), str(counts.failed))

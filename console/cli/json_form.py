@@ -1,4 +1,4 @@
-"""Results as JSON: the same names, enumerations as their words, secrets left out."""
+"""Results as JSON: the same names, enumerations by their values, secrets left out."""
 
 import dataclasses
 import math
@@ -7,10 +7,10 @@ from typing import Any
 
 
 def json_form(value: Any) -> Any:
-    """What `json.dumps` takes, for a result, a part of one, or a plain value.
+    """Returns a result, a part of one or a plain value in the types that `json.dumps` takes.
 
-    A field that a result hides from its `repr` is a secret, and is left out here as well. JSON has no word
-    for NaN and infinity: they become null.
+    A field that a result hides from its `repr` is a secret, and is left out here as well. NaN and infinity,
+    which JSON does not have (RFC 8259 6), become null.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {

@@ -1,4 +1,4 @@
-"""robotctl login: keep what the robot's keeper handed over, after the robot has accepted it."""
+"""robotctl login: stores a login for a robot, after the robot has accepted it."""
 
 import sys
 from dataclasses import replace
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from common.errors import ExitCode, UserError
-from console.cli.options import JsonOption, json_wanted
+from console.cli.options import JsonOption, json_requested
 from console.cli.session import print_json, standard_output
 from console.client import Credentials, GatewayClient, parse_target
 from console.robots import read_credentials, read_robots_file
@@ -21,42 +21,43 @@ _STANDARD_INPUT = "-"
 
 def login(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(metavar="ROBOT", help="What you call it: --robot ROBOT.")],
+    name: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name from now on: --robot ROBOT.")],
     target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Its gateway.")],
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="The login; - reads it from standard input.")
     ] = _STANDARD_INPUT,
     *,
     ca: Annotated[
-        Path | None, typer.Option(help="Only exchange the robot's certificate authority for this one (PEM).")
+        Path | None, typer.Option(help="Only replace the robot's certificate authority by this one (PEM).")
     ] = None,
-    offline: Annotated[bool, typer.Option(help="Keep it without asking the robot.")] = False,
+    offline: Annotated[bool, typer.Option(help="Store it without asking the robot.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Keep what the robot's keeper gave you, for your eyes only, and use it from now on.
+    """Store a login that the robot's administrator gave you, and use it from now on.
 
     On one line: ssh HOST robot-gateway credentials add NAME --role operator | robotctl login ROBOT HOST:PORT
     """
     check_name(name)
     target = parse_target(target)
-    who, shown = _with_new_authority(name, ca) if ca else _read(file)
-    robot_says = ""
+    user, credentials = _with_new_authority(name, ca) if ca else _read(file)
+    gateway_name = ""
     if not offline:
-        with GatewayClient(target, credentials=shown) as gateway:
-            robot_says = gateway.status().gateway_name
-    book = keep_login(name, target, shown)
+        with GatewayClient(target, credentials=credentials) as gateway:
+            gateway_name = gateway.status().gateway_name
+    known = keep_login(name, target, credentials)
     out = standard_output()
-    if json_wanted(context, as_json):
-        print_json(out, {"robot": name, "target": target, "who": who, "gateway_name": robot_says})
+    if json_requested(context, as_json):
+        print_json(out, {"robot": name, "target": target, "who": user, "gateway_name": gateway_name})
         return
-    words = f"{robot_says} accepts you" if robot_says else "not asked"
-    out.print(f"{name} at {target}: {words}{f' as {who}' if who else ''}. Kept in {book.path.parent}.")
+    result = f"{gateway_name} accepts you" if gateway_name else "not asked"
+    as_user = f" as {user}" if user else ""
+    out.print(f"{name} at {target}: {result}{as_user}. Stored in {known.path.parent}.")
     out.print(f"Type: robotctl --robot {name} status")
 
 
 def _read(file: str) -> tuple[str, Credentials]:
-    found = parse_login(sys.stdin.read() if file == _STANDARD_INPUT else _text(Path(file)))
-    return ", ".join(word for word in (found.name, found.role) if word), found.credentials
+    login = parse_login(sys.stdin.read() if file == _STANDARD_INPUT else _text(Path(file)))
+    return ", ".join(word for word in (login.name, login.role) if word), login.credentials
 
 
 def _text(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The options every command has, before or after its name."""
+"""The options that every command has, before or after its name."""
 
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias
@@ -7,16 +7,16 @@ import typer
 
 from common.errors import UserError
 from console.cli.session import Session, open_session
-from console.client.target import DEFAULT_TARGET
+from console.client import DEFAULT_TARGET
 from console.robots import read_robots_file
 
 
 def robot_names(incomplete: str) -> list[tuple[str, str]]:
-    """What the shell offers after --robot: the names that begin so, each with its address."""
+    """Returns the completions of --robot: the names that begin so, each with its address."""
     try:
         robots = read_robots_file().robots
     except UserError:
-        # A line in the middle of somebody's typing helps nobody; the command itself will say it.
+        # An error message would break into the line being typed; the command itself reports it.
         return []
     return [(name, robot.target) for name, robot in robots.items() if name.startswith(incomplete)]
 
@@ -46,32 +46,32 @@ JsonOption: TypeAlias = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
-    """What stood before the command's name."""
+class GlobalOptions:
+    """The options before the command's name."""
 
     target: str | None
     robot: str | None
     as_json: bool
 
 
-def remember(context: typer.Context, target: str | None, robot: str | None, as_json: bool) -> None:
-    """Keeps what stood before the command's name."""
-    context.obj = Said(target, robot, as_json)
+def keep_global_options(context: typer.Context, target: str | None, robot: str | None, as_json: bool) -> None:
+    """Stores the options before the command's name in the context."""
+    context.obj = GlobalOptions(target, robot, as_json)
 
 
 def session_of(
     context: typer.Context, target: str | None, as_json: bool, robot: str | None = None
 ) -> Session:
-    """The session: what stands after the command's name goes first.
+    """Returns the session of a command. Options after its name take precedence over those before.
 
     Raises:
-        UserError: no robot has this name, or the file of known robots is wrong.
+        UserError: No robot has this name, or the file of known robots is wrong.
     """
-    said: Said = context.obj
-    return open_session(target or said.target, robot or said.robot, json_wanted(context, as_json))
+    before: GlobalOptions = context.obj
+    return open_session(target or before.target, robot or before.robot, json_requested(context, as_json))
 
 
-def json_wanted(context: typer.Context, as_json: bool) -> bool:
-    """Whether JSON was asked for, before or after the command's name."""
-    said: Said = context.obj
-    return as_json or said.as_json
+def json_requested(context: typer.Context, as_json: bool) -> bool:
+    """Returns whether --json was given, before or after the command's name."""
+    before: GlobalOptions = context.obj
+    return as_json or before.as_json

@@ -17,7 +17,7 @@ preview_app = typer.Typer(help="Turn the live preview on or off.", pretty_except
 
 
 class ProfileWord(StrEnum):
-    """The profiles that can be asked for."""
+    """The profiles that can be requested."""
 
     LOW_BW = "low-bw"
     BALANCED = "balanced"
@@ -30,7 +30,7 @@ ProfileOption = Annotated[
 ]
 WaitOption = Annotated[
     float,
-    typer.Option("--wait", min=0, max=120, metavar="SECONDS", help="How long to watch it come about."),
+    typer.Option("--wait", min=0, max=120, metavar="SECONDS", help="How long to wait for it."),
 ]
 
 
@@ -71,17 +71,17 @@ def preview_off(
 
 
 def _finish(session: Session, change: PreviewChange, wanted: PreviewState, wait_s: float) -> None:
-    trouble = _trouble(change, wanted, wait_s)
+    error = _error(change, wanted, wait_s)
     if session.as_json:
-        session.print_json({"ok": trouble is None, **json_form(change)})
-    elif trouble is None:
+        session.print_json({"ok": error is None, **json_form(change)})
+    elif error is None:
         session.out.print(change.message)
         session.out.print(rows_table(preview_rows(change.preview)))
-    if trouble:
-        raise trouble
+    if error:
+        raise error
 
 
-def _trouble(change: PreviewChange, wanted: PreviewState, wait_s: float) -> UserError | None:
+def _error(change: PreviewChange, wanted: PreviewState, wait_s: float) -> UserError | None:
     state = change.preview.state
     if not change.accepted:
         return UserError(f"the robot refused: {change.message}")
@@ -90,9 +90,9 @@ def _trouble(change: PreviewChange, wanted: PreviewState, wait_s: float) -> User
     if state is PreviewState.FAULTED:
         return UserError(f"the preview is faulted: {change.preview.last_error or change.message}")
     if wait_s == 0:
-        # Nobody wanted to wait: taking note is all that was asked for.
+        # Acceptance is all that was asked for.
         return None
     return UserError(
         f"the preview is {state.value}, not {wanted.value}, after {wait_s:g} s",
-        "Look again with: robotctl status",
+        "Type: robotctl status",
     )

@@ -1,4 +1,4 @@
-"""Runs the command line. Whatever goes wrong is one line on standard error and an exit code, no traceback."""
+"""Runs the command line. Every error is one line on standard error and an exit code, never a traceback."""
 
 import os
 import sys
@@ -14,34 +14,37 @@ _HELP = "Type: robotctl --help"
 
 
 def run() -> NoReturn:
-    """Ends the program."""
+    """Runs the command line of this process and ends it."""
     sys.exit(exit_code())
 
 
 def exit_code() -> int:
-    """Runs the command line of this process; returns what the program is to end with."""
+    """Runs the command line of this process and returns its exit code."""
     try:
         code = app(prog_name="robotctl", standalone_mode=False)
     except UserError as error:
-        report(error)
-        return int(error.exit_code)
+        return _failed(error)
     except typer.TyperException as error:
-        # A command line that can't be understood.
-        usage = UserError(error.format_message().removesuffix("."), _HELP, exit_code=ExitCode.USAGE)
-        report(usage)
-        return int(usage.exit_code)
+        # A wrong command line.
+        message = error.format_message().removesuffix(".")
+        return _failed(UserError(message, _HELP, exit_code=ExitCode.USAGE))
     except OSError as error:
-        # A connection's troubles are GatewayErrors; what is left is the output: a full disk, for example.
-        _forget_output()
-        report(UserError(f"the output can't be written: {error.strerror or error}", "Look at where it goes"))
-        return int(ExitCode.FAILED)
+        # Connections raise GatewayErrors, so this is the output: a full disk, for example.
+        _discard_output()
+        reason = error.strerror or error
+        return _failed(UserError(f"the output can't be written: {reason}", "Check where it goes"))
     except typer.Abort:
         return int(ExitCode.FAILED)
     return code if isinstance(code, int) else int(ExitCode.DONE)
 
 
-def _forget_output() -> None:
-    """What is still waiting to be written goes nowhere: Python would try again at the end, and complain."""
+def _failed(error: UserError) -> int:
+    report(error)
+    return int(error.exit_code)
+
+
+def _discard_output() -> None:
+    """Sends buffered output to the null device: Python would write it again at exit, and fail again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)

@@ -1,4 +1,4 @@
-"""What all commands of one run share: which robot, which form of output."""
+"""The robot and the output of one run of robotctl."""
 
 import json
 import os
@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 
 from common.errors import ExitCode, UserError
 from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
 from console.robots import Robot, choose, read_credentials, read_robots_file
 
-# Where nobody looks at columns, lines are left long rather than broken.
+# In a pipe or a file long lines are better than broken ones.
 _WIDTH_OF_A_FILE = 160
 
 
@@ -22,10 +22,10 @@ class Session:
     """One run of robotctl.
 
     Args:
-        robot: how the robot is reached.
-        as_json: print JSON instead of tables.
-        out: standard output; without colours where it is no terminal or NO_COLOR is set.
-        name: as the file of known robots calls it; None when only an address was given.
+        robot: How to reach the robot.
+        as_json: Whether to print JSON instead of tables.
+        out: Standard output; without colours where it is not a terminal or NO_COLOR is set.
+        name: The robot's name in the file of known robots; None when only an address was given.
     """
 
     robot: Robot
@@ -35,57 +35,64 @@ class Session:
 
     @property
     def target(self) -> str:
-        """The robot's gateway."""
+        """The address of the robot's gateway."""
         return self.robot.target
 
     def connect(self) -> GatewayClient:
-        """A client for this run, to be used in a `with` block."""
+        """Returns a client, to be used in a `with` block."""
         return GatewayClient(self.target, credentials=self.credentials())
 
     def connect_async(self) -> AsyncGatewayClient:
-        """As `connect`, for the running loop: to be used in an `async with` block."""
+        """Returns a client for the running loop, to be used in an `async with` block."""
         return AsyncGatewayClient(self.target, credentials=self.credentials())
 
     def credentials(self) -> Credentials:
-        """What proves to the robot who asks, as it is stored at this moment.
+        """Returns the robot's credentials as they are stored now.
 
         Raises:
-            UserError: a file is missing, others may read a secret, or it would be sent in the clear.
+            UserError: A file is missing, other users may read a secret, or it would be sent in the clear.
         """
-        shown = read_credentials(read_robots_file().find(self.name) if self.name else self.robot)
-        # A window would learn that these won't do only in a thread of its own, too late for one line.
-        shown.channel_credentials(parse_target(self.target))
-        return shown
+        credentials = read_credentials(read_robots_file().find(self.name) if self.name else self.robot)
+        # A window would find that out in a thread of its own, too late for an error on one line.
+        credentials.channel_credentials(parse_target(self.target))
+        return credentials
+
+    def show(self, document: Mapping[str, Any], view: RenderableType) -> None:
+        """Prints the JSON document, or the view for people."""
+        if self.as_json:
+            self.print_json(document)
+        else:
+            self.out.print(view)
 
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
-        """One JSON document, out at once."""
+        """Prints one JSON document and flushes the output."""
         print_json(self.out, value, on_one_line=on_one_line)
 
 
 def open_session(target: str | None, robot: str | None, as_json: bool) -> Session:
-    """A session on standard output with the robot that is meant.
+    """Returns a session on standard output with the chosen robot.
 
     Raises:
-        UserError: no robot has this name, or the file of known robots is wrong.
+        UserError: No robot has this name, or the file of known robots is wrong.
     """
     choice = choose(target, robot, os.environ)
     return Session(choice.robot, as_json, standard_output(), choice.name)
 
 
 def standard_output() -> Console:
-    """For people; without colours where it is no terminal or NO_COLOR is set."""
+    """Returns standard output; without colours where it is not a terminal or NO_COLOR is set."""
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
     return Console(highlight=False, markup=False, emoji=False, width=_WIDTH_OF_A_FILE if piped else None)
 
 
 def print_json(out: Console, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
-    """One JSON document, out at once."""
+    """Prints one JSON document and flushes the output."""
     text = json.dumps(value, indent=None if on_one_line else 2, allow_nan=False, ensure_ascii=False)
     print(text, file=out.file, flush=True)
 
 
 def error_as_json(error: UserError) -> dict[str, Any]:
-    """An error as scripts read it."""
+    """Returns the JSON form of an error."""
     return {
         "kind": _kind(error),
         "what": " ".join(error.what.split()),
@@ -95,7 +102,7 @@ def error_as_json(error: UserError) -> dict[str, Any]:
 
 
 def report(error: UserError) -> None:
-    """One line on standard error; JSON where the command line asks for JSON."""
+    """Prints an error on one line of standard error; as JSON where the command line has --json."""
     if "--json" in sys.argv[1:]:
         print(json.dumps({"error": error_as_json(error)}, ensure_ascii=False), file=sys.stderr)
     else:

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as the ordinary end of a command that goes on until it is told to stop."""
+"""SIGINT (Ctrl-C) and SIGTERM as the ordinary end of a command without an end of its own."""
 
 import signal
 import threading
@@ -13,13 +13,13 @@ ItemT = TypeVar("ItemT")
 
 
 class Stopped:
-    """Whether a signal has asked for the end."""
+    """Whether a signal has come."""
 
     def __init__(self) -> None:
         self.event = threading.Event()
 
     def as_end_of(self, items: Iterable[ItemT]) -> Iterator[ItemT]:
-        """The items; a stream that was cut off by the signal has simply ended."""
+        """Yields the items; a stream that the signal cut off ends without an error."""
         try:
             yield from items
         except Cancelled:
@@ -29,11 +29,11 @@ class Stopped:
 
 @contextmanager
 def until_stopped(cut_off: Callable[[], None]) -> Iterator[Stopped]:
-    """While the block lasts, SIGINT and SIGTERM call `cut_off` instead of ending the program.
+    """Has SIGINT and SIGTERM call `cut_off` instead of ending the program, while the block lasts.
 
     Args:
-        cut_off: ends what the block waits for; called in a thread of its own, because a signal may come
-            while the same lock is held.
+        cut_off: Ends the wait of the block. Called in a thread of its own, because a signal handler may run
+            while the block holds the same lock.
     """
     stopped = Stopped()
 

@@ -1,4 +1,4 @@
-"""Talks to a robot's gateway from Python, blocking or with asyncio; knows neither ROS nor GStreamer.
+"""Client library of a robot's gateway, blocking or with asyncio; needs neither ROS nor GStreamer.
 
     from console.client import GatewayClient, PreviewProfile
 
@@ -6,8 +6,8 @@
         status = robot.status()
         print(status.health.summary, status.odometry.linear_speed_mps)
 
-Every call has a deadline, is tried again for a moment while the robot can't be reached, and either returns a
-frozen value of `console.client.results` or raises a `GatewayError` that says what to do.
+Every call has a deadline, is retried for a moment while the robot is unreachable, and either returns a frozen
+value of `console.client.results` or raises a `GatewayError` that says what to do.
 """
 
 from console.client.aio import AsyncGatewayClient
@@ -27,6 +27,7 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
+from console.client.mapping.methods import PreviewRequest
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,
@@ -73,6 +74,7 @@ __all__ = [
     "Overloaded",
     "PreviewChange",
     "PreviewProfile",
+    "PreviewRequest",
     "PreviewState",
     "PreviewStatus",
     "Refused",

@@ -1,40 +1,59 @@
 """The blocking client: a facade over the asyncio client, which runs in a thread of its own."""
 
+import functools
 import weakref
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import suppress
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from console.client.aio import AsyncGatewayClient
-from console.client.clock import Offset
 from console.client.credentials import Credentials
 from console.client.errors import Cancelled
 from console.client.loop_thread import LoopThread
 from console.client.options import ClientOptions
-from console.client.results import (
-    CaughtUp,
-    Event,
-    EventGap,
-    EventPosition,
-    FaultSeverity,
-    GatewayInfo,
-    OverlaySnapshot,
-    PreviewChange,
-    PreviewProfile,
-    SystemStatus,
-    WatchedStatus,
-)
-from console.client.streams import Outage
 from console.client.target import DEFAULT_TARGET
 
-ItemT = TypeVar("ItemT")
+P = ParamSpec("P")
+ResultT = TypeVar("ResultT")
+
+
+def _blocking(
+    method: Callable[Concatenate[AsyncGatewayClient, P], Coroutine[Any, Any, ResultT]],
+) -> Callable[Concatenate["GatewayClient", P], ResultT]:
+    """Returns the method of the facade that waits for the result of an asyncio method."""
+
+    @functools.wraps(method)
+    def call(self: "GatewayClient", /, *args: P.args, **kwargs: P.kwargs) -> ResultT:
+        return self._loop.run(method(self._client, *args, **kwargs))
+
+    return call
+
+
+def _iterating(
+    method: Callable[Concatenate[AsyncGatewayClient, P], AsyncIterator[ResultT]],
+) -> Callable[Concatenate["GatewayClient", P], Iterator[ResultT]]:
+    """Returns the method of the facade that iterates over an asyncio stream."""
+
+    @functools.wraps(method)
+    def iterate(self: "GatewayClient", /, *args: P.args, **kwargs: P.kwargs) -> Iterator[ResultT]:
+        items = method(self._client, *args, **kwargs)
+        try:
+            while True:
+                yield self._loop.run(_next(items))
+        finally:
+            # Not waited for: the garbage collector may close this iterator in the loop's own thread.
+            with suppress(Cancelled):
+                self._loop.submit(_close(items))
+
+    return iterate
 
 
 class GatewayClient:
     """Client of one robot's gateway, for blocking code. May be used from several threads at once.
 
-    Every method does what that of `AsyncGatewayClient` does, and returns when the answer is there.
+    Every method does what that of `AsyncGatewayClient` does, and returns when the answer is there; streams
+    are ordinary iterators.
 
     Example:
         with GatewayClient("robot.local") as robot:
@@ -63,14 +82,23 @@ class GatewayClient:
 
         self._loop = LoopThread()
         # Also at the end of a program that does not close its client.
-        self._stop = weakref.finalize(self, self._loop.stop)
+        stop = weakref.finalize(self, self._loop.stop)
         try:
             self._client = self._loop.run(create())
         except BaseException:
-            self._stop()
+            stop()
             raise
         self.target = self._client.target
         self.clock = self._client.clock
+
+    status = _blocking(AsyncGatewayClient.status)
+    overlay = _blocking(AsyncGatewayClient.overlay)
+    info = _blocking(AsyncGatewayClient.info)
+    enable_preview = _blocking(AsyncGatewayClient.enable_preview)
+    disable_preview = _blocking(AsyncGatewayClient.disable_preview)
+    ping = _blocking(AsyncGatewayClient.ping)
+    watch_status = _iterating(AsyncGatewayClient.watch_status)
+    events = _iterating(AsyncGatewayClient.events)
 
     @property
     def reconnects(self) -> int:
@@ -81,42 +109,6 @@ class GatewayClient:
     def retries(self) -> int:
         """Attempts beyond the first, of all calls together."""
         return self._client.retries
-
-    def status(self) -> SystemStatus:
-        """Returns the status of the whole robot."""
-        return self._loop.run(self._client.status())
-
-    def overlay(self) -> OverlaySnapshot:
-        """Returns status, detections and the newest events, all of one instant."""
-        return self._loop.run(self._client.overlay())
-
-    def info(self) -> GatewayInfo:
-        """Returns the gateway program's build, call counts and configuration."""
-        return self._loop.run(self._client.info())
-
-    def enable_preview(
-        self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
-    ) -> PreviewChange:
-        """Turns the preview on, or changes its profile, and waits until frames leave or the start failed."""
-        return self._loop.run(self._client.enable_preview(profile, settle_within_s=settle_within_s))
-
-    def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
-        """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""
-        return self._loop.run(self._client.disable_preview(settle_within_s=settle_within_s))
-
-    def ping(self) -> Offset:
-        """Returns the offset of the robot's clock. Each call improves `clock`."""
-        return self._loop.run(self._client.ping())
-
-    def watch_status(self, min_interval_s: float = 0.1) -> Iterator[WatchedStatus | Outage]:
-        """Yields the status at once, on every change, and once a second without one. Never ends."""
-        return self._iterate(self._client.watch_status(min_interval_s))
-
-    def events(
-        self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN
-    ) -> Iterator[Event | EventGap | CaughtUp | Outage]:
-        """Yields each event once and in order; events that are not available any more, as an `EventGap`."""
-        return self._iterate(self._client.events(after, least=least))
 
     def close(self) -> None:
         """Closes the connection. Pending calls and streams in other threads end with `Cancelled`."""
@@ -135,17 +127,9 @@ class GatewayClient:
     ) -> None:
         self.close()
 
-    def _iterate(self, items: AsyncIterator[ItemT]) -> Iterator[ItemT]:
-        async def next_item() -> ItemT:
-            return await anext(items)
 
-        try:
-            while True:
-                yield self._loop.run(next_item())
-        finally:
-            # Not waited for: the garbage collector may close this iterator in the loop's own thread.
-            with suppress(Cancelled):
-                self._loop.submit(_close(items))
+async def _next(items: AsyncIterator[ResultT]) -> ResultT:
+    return await anext(items)
 
 
 async def _close(items: Any) -> None:

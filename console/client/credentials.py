@@ -1,4 +1,4 @@
-"""What proves to a robot who asks, and what proves to the client that it is that robot."""
+"""Token and certificates of a client, and the certificate authority of the robot."""
 
 import ipaddress
 from dataclasses import dataclass, field
@@ -13,13 +13,14 @@ _TOKEN_HEADER: Final = "authorization"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """The contents of a robot's files; None for what there is not. Secrets are not in the `repr`.
+    """Credentials for one robot; None for those that it does not require. Secrets are not in the `repr`.
 
     Args:
-        ca_certificate: who signed the gateway's certificate (PEM); with it the connection is encrypted.
-        client_certificate: PEM.
-        client_key: PEM.
-        token: without white space around it.
+        ca_certificate: Certificate of the authority that signed the gateway's certificate (PEM); with it the
+            connection is encrypted.
+        client_certificate: This client's certificate (PEM).
+        client_key: Its private key (PEM).
+        token: Bearer token, without white space around it.
     """
 
     ca_certificate: bytes | None = None
@@ -28,30 +29,30 @@ class Credentials:
     token: str | None = field(default=None, repr=False)
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
-        """What every call carries."""
+        """Returns the metadata of every call (RFC 6750 2.1)."""
         return ((_TOKEN_HEADER, f"Bearer {self.token}"),) if self.token else ()
 
     def channel_credentials(self, target: str) -> grpc.ChannelCredentials | None:
-        """What the connection is encrypted with; None for plaintext.
+        """Returns the TLS credentials of the connection; None for plaintext.
 
         Args:
             target: HOST:PORT of the gateway.
 
         Raises:
-            UserError: they would be sent where others can read them.
+            UserError: A secret would be sent over the network unencrypted.
         """
         if self.ca_certificate is not None:
             return grpc.ssl_channel_credentials(self.ca_certificate, self.client_key, self.client_certificate)
         if self.client_certificate is not None:
             raise UserError(
                 "a client certificate needs the robot's CA certificate beside it",
-                "Type: robotctl login, with what the robot's keeper gave you",
+                "Type: robotctl login, with the login of this robot",
                 exit_code=ExitCode.USAGE,
             )
         if self.token is not None and not _is_loopback(target):
             raise UserError(
-                f"the token would go to {target} in the clear",
-                "Name the robot's CA certificate, too (robotctl login), or use a tunnel to 127.0.0.1",
+                f"the token would be sent to {target} in the clear",
+                "Add the robot's CA certificate (robotctl login), or use a tunnel to 127.0.0.1",
                 exit_code=ExitCode.USAGE,
             )
         return None

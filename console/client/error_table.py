@@ -1,4 +1,4 @@
-"""Two total tables: what each gRPC code, and each reason of a gateway, means to someone who asked a robot."""
+"""Maps gRPC codes and the gateway's reasons to the client's exceptions. Both tables are total."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -24,7 +24,7 @@ from console.client.refusal import refusal_in
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
     {
-        # An error that carries OK is itself out of order.
+        # An error with the code OK is a defect of the server.
         grpc.StatusCode.OK: GatewayFailed,
         grpc.StatusCode.CANCELLED: Cancelled,
         grpc.StatusCode.UNKNOWN: GatewayFailed,
@@ -63,25 +63,25 @@ REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
         Reason.INTERNAL: GatewayFailed,
     }
 )
-"""Total. What a gateway says counts more than the code; a word of a newer one leaves the code to speak."""
+"""A reason takes precedence over the code; an unknown one, of a newer gateway, leaves it to that."""
 
 _ADVICE: Final[Mapping[str, str]] = MappingProxyType(
     {
-        Reason.TOO_MANY_CONNECTIONS: "Close a program that watches this robot, or wait a little",
+        Reason.TOO_MANY_CONNECTIONS: "Close another program that is connected to this robot, or wait",
         Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
-        Reason.CREDENTIAL_EXPIRED: "Ask whoever keeps this robot for a new login, then type: robotctl login",
+        Reason.CREDENTIAL_EXPIRED: "Ask this robot's administrator for a new one, then type: robotctl login",
         Reason.ROLE_TOO_LOW: (
-            "Ask whoever keeps this robot for a login with that role, then type: robotctl login"
+            "Ask this robot's administrator for a login with that role, then type: robotctl login"
         ),
-        Reason.LOCKED_OUT: "Wait as long as it says; if the stored login is an old one, type: robotctl login",
+        Reason.LOCKED_OUT: "Wait as long as it says; if the stored login is outdated, type: robotctl login",
     }
 )
-"""Where a reason lets us say more than the family's own advice does."""
+"""Where a reason allows more specific advice than the class."""
 
-_CLOSED: Final = "the connection was closed, as by a gateway that wants to know who asks (robotctl login)"
+_CLOSED: Final = "the connection was closed, as by a gateway that requires a login (robotctl login)"
 
-# gRPC's words for a dead link, and ours. They only shorten the line: unknown wording is printed as it came.
-_PLAIN_WORDS: Final = (
+# gRPC's messages about a connection, and plainer ones. Unknown messages are passed on unchanged.
+_PLAIN_MESSAGES: Final = (
     ("before receiving settings", "something listens there, but it does not answer as a gateway"),
     ("connection refused", "nothing listens there"),
     ("dns resolution failed", "the name does not resolve"),
@@ -101,16 +101,19 @@ _PLAIN_WORDS: Final = (
     ("failed parsing http/2", "what listens there does not speak gRPC"),
 )
 _NOT_TRUSTED: Final = (
-    ("certificate has expired", "its certificate has ended"),
+    ("certificate has expired", "its certificate has expired"),
     ("certificate is not yet valid", "its certificate is not valid yet, by this computer's clock"),
     ("hostname verification", "its certificate is for other names than this one"),
-    ("certificate_verify_failed", "its certificate was not signed by the authority of this robot's login"),
+    (
+        "certificate_verify_failed",
+        "its certificate was not signed by the certificate authority of this robot's login",
+    ),
 )
-"""The same for a connection that was encrypted and then given up, because of whom it led to."""
+"""The same for a TLS handshake that failed because of the server's certificate."""
 
 
 class _Coded(Protocol):
-    """What the errors of both flavours of gRPC carry; they share no class that says so."""
+    """The interface of an RPC error, which gRPC's types do not declare."""
 
     def code(self) -> grpc.StatusCode: ...
 
@@ -120,17 +123,17 @@ class _Coded(Protocol):
 
 
 def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> GatewayError:
-    """The family member for a failed call.
+    """Returns the exception for a failed call.
 
     Args:
-        failure: what gRPC raised; it carries a code and details.
-        target: the robot's address, for the message.
-        timeout_s: how long the call was allowed to take.
+        failure: Raised by gRPC; it carries a code and details.
+        target: The robot's address, for the message.
+        timeout_s: The deadline of the call.
     """
     coded = cast("_Coded", failure)
     code, refusal = coded.code(), refusal_in(coded.trailing_metadata())
     details = coded.details() or code.name
-    if code is grpc.StatusCode.UNAVAILABLE and (why := _words_for(details, _NOT_TRUSTED)):
+    if code is grpc.StatusCode.UNAVAILABLE and (why := _message_for(details, _NOT_TRUSTED)):
         return NotTrusted(f"what answers at {target} is not trusted: {why}")
     family = REASONS.get(refusal.reason, ERRORS[code])
     error = family(_sentence(family, details, target, timeout_s), _ADVICE.get(refusal.reason))
@@ -139,21 +142,21 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
 
 
 def stream_error_from(error: GatewayError | None, target: str) -> GatewayError:
-    """Why a stream ended that nobody here has ended.
+    """Returns the exception for a stream that the gateway ended.
 
     Args:
-        error: what its call ended with; None for an end in good order.
-        target: the robot's address, for the message.
+        error: The error of its call; None for an orderly end.
+        target: The robot's address, for the message.
     """
     if error is None or isinstance(error, Cancelled):
-        # A gateway that stops ends its streams, by a good end or by cancelling them.
+        # A gateway that stops completes its streams or cancels them.
         return Unreachable(f"no robot gateway reached at {target}: it ended the stream")
     return error
 
 
 def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: float) -> str:
     if family is Unreachable:
-        return f"no robot gateway reached at {target}: {_in_plain_words(details)}"
+        return f"no robot gateway reached at {target}: {_plain(details)}"
     if family is DeadlineExceeded:
         return f"the robot gateway at {target} did not answer within {timeout_s:.1f} s"
     if issubclass(family, Refused | InvalidRequest):
@@ -161,10 +164,10 @@ def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: 
     return f"the call to the robot gateway at {target} failed: {details}"
 
 
-def _in_plain_words(details: str) -> str:
-    return _words_for(details, _PLAIN_WORDS) or details
+def _plain(details: str) -> str:
+    return _message_for(details, _PLAIN_MESSAGES) or details
 
 
-def _words_for(details: str, table: tuple[tuple[str, str], ...]) -> str:
+def _message_for(details: str, table: tuple[tuple[str, str], ...]) -> str:
     lowered = details.lower()
     return next((plain for fragment, plain in table if fragment in lowered), "")

@@ -1,10 +1,10 @@
-"""What can go wrong between a client and a robot: one small family, each member with what to do.
+"""The exceptions of the client: one small family, each with a remedy.
 
-They are named by what happened, without the word "error". None knows gRPC: `console.client.error_table` is
-the one place that turns a gRPC code into one of these.
+They are named after the condition, without the suffix "Error". None of them knows gRPC:
+`console.client.error_table` maps gRPC codes to them.
 """
 
-# ruff: noqa: N818 - `except Unreachable` reads as what it is.
+# ruff: noqa: N818 - `except Unreachable` reads as a sentence.
 
 from typing import ClassVar
 
@@ -12,25 +12,25 @@ from common.errors import ExitCode, UserError
 
 
 class GatewayError(UserError):
-    """A call to a robot's gateway did not work. `str()` is one line: what happened and what to do.
+    """A call to a robot's gateway failed. `str()` is one line: what happened and what to do.
 
     Args:
-        what: what happened, naming the robot's address.
-        remedy: what to do; the member's own advice when left out.
+        what: What happened, with the robot's address.
+        remedy: What to do; the class's own advice when left out.
     """
 
     kind: ClassVar[str] = "failed"
-    """A stable word for machines: `robotctl --json` prints it."""
+    """Stable identifier for programs; `robotctl --json` prints it."""
     ends_with: ClassVar[ExitCode] = ExitCode.FAILED
-    """How a program ends that can't go on without the answer."""
-    advice: ClassVar[str] = "Look into the gateway's log on the robot"
+    """Exit code of a program that can't continue without the answer."""
+    advice: ClassVar[str] = "Check the gateway's log on the robot"
 
     reason: str = ""
-    """The gateway's own stable word for why it refused (docs/errors.md); empty where it told none."""
+    """The gateway's reason (docs/errors.md); empty where it gave none."""
     fields: tuple[str, ...] = ()
-    """The fields of the request that it refused."""
+    """The invalid fields of the request."""
     retry_after_s: float | None = None
-    """When to try again; None when nobody knows."""
+    """When to retry; None where the gateway does not say."""
 
     def __init__(self, what: str, remedy: str | None = None) -> None:
         super().__init__(what, self.advice if remedy is None else remedy, exit_code=self.ends_with)
@@ -45,7 +45,7 @@ class Unreachable(GatewayError):
 
 
 class DeadlineExceeded(GatewayError):
-    """The gateway did not answer in time. Whether it did what was asked is not known."""
+    """The gateway did not answer in time. Whether it carried out the call is unknown."""
 
     kind = "deadline_exceeded"
     ends_with = ExitCode.UNREACHABLE
@@ -53,55 +53,57 @@ class DeadlineExceeded(GatewayError):
 
 
 class Refused(GatewayError):
-    """The gateway understood and said no. Asking again changes nothing until the reason is gone."""
+    """The gateway refused the call. A retry fails as well until the reason is gone."""
 
     kind = "refused"
     advice = "The robot's answer gives the reason"
 
 
 class NotAllowed(Refused):
-    """This client may not do that, or did not say who it is."""
+    """This client is not authenticated, or lacks the role."""
 
     kind = "not_allowed"
-    advice = "Ask whoever keeps this robot for access, then type: robotctl login"
+    advice = "Ask this robot's administrator for access, then type: robotctl login"
 
 
 class NotTrusted(GatewayError):
-    """What answers there can't prove that it is the robot: its certificate is another's, or has ended."""
+    """The server's certificate does not prove that it is the robot: it is another's, or has expired."""
 
     kind = "not_trusted"
-    advice = "Type: robotctl login, with what this robot's keeper gave you; if you have, ask them"
+    advice = (
+        "Type: robotctl login, with the login of this robot; if you have, ask its administrator for a new one"
+    )
 
 
 class Overloaded(Refused):
-    """The gateway has no room for this client or for so many requests."""
+    """The gateway has reached a limit of connections, streams or requests."""
 
     kind = "overloaded"
-    advice = "Wait a little and ask less often"
+    advice = "Wait, then send fewer requests"
 
 
 class InvalidRequest(GatewayError):
-    """The request itself is wrong; nothing changed on the robot."""
+    """The request is invalid; nothing changed on the robot."""
 
     kind = "invalid_request"
     advice = "Correct the request; this client may be newer or older than the gateway"
 
 
 class Unsupported(GatewayError):
-    """The gateway doesn't know the method: it is older than this client."""
+    """The gateway does not have the method: it is older than this client."""
 
     kind = "unsupported"
     advice = "Update the gateway, or use the client of the gateway's version"
 
 
 class GatewayFailed(GatewayError):
-    """The gateway met an error of its own, or sent what this client can't read."""
+    """The gateway had an internal error, or sent an unreadable answer."""
 
     kind = "gateway_failed"
 
 
 class Cancelled(GatewayError):
-    """The call was given up before an answer came: by this program, or because the client was closed."""
+    """The call was cancelled by this program, or the client was closed."""
 
     kind = "cancelled"
-    advice = "Open a new client and ask again"
+    advice = "Open a new client and repeat the call"

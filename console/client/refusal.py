@@ -1,4 +1,4 @@
-"""What a refusing gateway told programs: its reason, the fields, when to try again (google.rpc.Status)."""
+"""The error details of a refusal: reason, invalid fields, retry delay (google.rpc.Status)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, RetryInfo
 from google.rpc.status_pb2 import Status
 
 DOMAIN: Final = "omniseer.gateway.v1"
-"""Whose reasons are known here; those of a proxy on the way are not."""
+"""The domain of the gateway's reasons; those of a proxy have another."""
 _KEY: Final = "grpc-status-details-bin"
 _NS_PER_S: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """Empty where the gateway told nothing: it is older, or gRPC itself refused."""
+    """The details; empty where an older gateway, or gRPC itself, refused."""
 
     reason: str = ""
     fields: tuple[str, ...] = ()
@@ -24,7 +24,7 @@ class Refusal:
 
 
 def refusal_in(metadata: Iterable[Any] | None) -> Refusal:
-    """What the trailing metadata of a failed call tells. What can't be read counts as not told."""
+    """Returns the details in the trailing metadata of a failed call; unreadable ones count as absent."""
     data = next((value for key, value in metadata or () if key == _KEY), b"")
     status = Status()
     try:

@@ -1,4 +1,4 @@
-"""Where a robot's gateway listens, as people write it."""
+"""The address of a robot's gateway."""
 
 import re
 from typing import Final
@@ -8,16 +8,16 @@ from common.errors import ExitCode, UserError
 DEFAULT_TARGET: Final = "127.0.0.1:50051"
 DEFAULT_PORT: Final = 50051
 
-# A name or an IPv4 address, or an IPv6 address in brackets; then perhaps a port.
+# A name or an IPv4 address, or an IPv6 address in brackets (RFC 3986 3.2.2); then an optional port.
 _FORM: Final = re.compile(r"(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+)(?::(?P<port>\d{1,5}))?")
 _HIGHEST_PORT: Final = 65535
 
 
 def parse_target(text: str) -> str:
-    """HOST:PORT out of HOST or HOST:PORT; IPv6 addresses stand in brackets.
+    """Returns HOST:PORT for HOST or HOST:PORT. IPv6 addresses are in brackets.
 
     Raises:
-        UserError: it is neither (a wrong command line).
+        UserError: It is neither (a wrong command line).
     """
     match = _FORM.fullmatch(text.strip())
     port = int(match["port"] or DEFAULT_PORT) if match else 0

@@ -1,7 +1,6 @@
 """The gRPC channel of a client: methods in, results or `GatewayError`s out. Belongs to one asyncio loop."""
 
 import asyncio
-from collections import deque
 from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
@@ -115,10 +114,8 @@ class Responses:
 
     def __init__(self, call: Any, transport: GrpcTransport, *, newest_only: bool) -> None:
         self._transport = transport
-        self._capacity = None if newest_only else _MOST_WAITING
-        self._items: deque[Any] = deque(maxlen=1 if newest_only else None)
-        self._error: GatewayError | None = None
-        self._changed = asyncio.Condition()
+        self._newest_only = newest_only
+        self._queue: asyncio.Queue[Any] = asyncio.Queue(1 if newest_only else _MOST_WAITING)
         self._task = asyncio.create_task(self._receive(call), name="gateway-stream")
 
     async def read(self, within_s: float) -> Any:
@@ -129,15 +126,13 @@ class Responses:
         """
         self._transport.check_open()
         try:
-            async with asyncio.timeout(within_s), self._changed:
-                await self._changed.wait_for(lambda: self._items or self._error)
-                if not self._items:
-                    assert self._error, "the condition that was waited for"
-                    raise self._error
-                self._changed.notify_all()
-                return self._items.popleft()
+            async with asyncio.timeout(within_s):
+                item = await self._queue.get()
         except TimeoutError:
             raise DeadlineExceeded(f"the robot gateway sent nothing for {within_s:.1f} s") from None
+        if isinstance(item, GatewayError):
+            raise item
+        return item
 
     def cancel(self) -> None:
         """Ends the call."""
@@ -147,10 +142,9 @@ class Responses:
         error: GatewayError
         try:
             async for item in call:
-                async with self._changed:
-                    await self._changed.wait_for(self._has_room)
-                    self._items.append(item)
-                    self._changed.notify_all()
+                if self._newest_only and self._queue.full():
+                    self._queue.get_nowait()
+                await self._queue.put(item)
             error = self._transport.end_of_stream(None)
         except grpc.RpcError as failure:
             error = self._transport.end_of_stream(failure)
@@ -160,12 +154,8 @@ class Responses:
             if self._task.cancelling():
                 raise
             error = Cancelled("this client was closed")
-        async with self._changed:
-            self._error = error
-            self._changed.notify_all()
-
-    def _has_room(self) -> bool:
-        return self._capacity is None or len(self._items) < self._capacity
+        # Behind the items that wait to be read.
+        await self._queue.put(error)
 
 
 def _by_name(multicallable: Any, methods: tuple[Method[Any, Any], ...]) -> Mapping[str, Any]:

@@ -1,1 +1,1 @@
-"""What is wrong between this computer and the robot, from the name of the robot up to the picture."""
+"""Finds faults between this computer and the robot, from name resolution up to the video stream."""

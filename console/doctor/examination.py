@@ -1,4 +1,4 @@
-"""The examination: from the outside in, and no further than the first thing that lets nothing through."""
+"""The examination, from the network inwards; it stops at the first fault that blocks the rest."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -20,15 +20,15 @@ from console.doctor import network, robot
 
 
 class Examination:
-    """One look at everything.
+    """One examination.
 
     Args:
         target: HOST:PORT.
-        credentials: what proves to the robot who asks.
-        wall_clock: seconds since 1970; this computer's calendar clock.
+        credentials: Token and certificates for the robot.
+        wall_clock: This computer's wall clock, in seconds since 1970.
 
     Attributes:
-        reached: whether the gateway answered; known when the findings are all there.
+        reached: Whether the gateway answered; valid after the last finding.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Examination:
         self.reached = False
 
     def findings(self) -> Iterator[Finding]:
-        """One after the other, as they are found."""
+        """Yields the findings as they are made."""
         host, port = network.split(self._target)
         name = network.name_finding(host)
         yield name
@@ -58,10 +58,14 @@ class Examination:
                 status = client.status()
             except (NotAllowed, NotTrusted) as error:
                 self.reached = True
-                yield wrong("access", error.what, "The gateway tells nothing to strangers", error.remedy)
+                yield wrong(
+                    "access", error.what, "The gateway serves authenticated clients only", error.remedy
+                )
                 return
             except GatewayError as error:
-                yield wrong("grpc", error.what, "Something listens there, but no gateway", error.remedy)
+                yield wrong(
+                    "grpc", error.what, "Something listens there, but it is not a gateway", error.remedy
+                )
                 return
             self.reached = True
             yield good("grpc", f"the gateway '{status.gateway_name}' answers")

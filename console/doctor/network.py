@@ -1,4 +1,4 @@
-"""The way to the robot, below gRPC: its name, its TCP port, the UDP port of its stream."""
+"""The network path to the robot, below gRPC: its name, its TCP port, the UDP port of its stream."""
 
 import socket
 import time
@@ -13,14 +13,14 @@ _WITHIN_S: Final = 2.0
 
 
 def split(target: str) -> tuple[str, int]:
-    """Host (without brackets) and port of HOST:PORT."""
+    """Returns host (without brackets) and port of HOST:PORT."""
     host, _, port = target.rpartition(":")
     return host.strip("[]"), int(port)
 
 
 def name_finding(host: str) -> Finding:
-    """Whether the robot's name leads to an address."""
-    # The resolver can't be told how long to try: it is left behind in a thread of its own.
+    """Checks whether the robot's name resolves."""
+    # The resolver takes no timeout: it is left behind in a thread of its own.
     pool = ThreadPoolExecutor(max_workers=1)
     try:
         found = pool.submit(socket.getaddrinfo, host, None, type=socket.SOCK_STREAM).result(_WITHIN_S)
@@ -28,8 +28,8 @@ def name_finding(host: str) -> Finding:
         reason = f"no answer within {_WITHIN_S:g} s" if isinstance(error, FutureTimeoutError) else str(error)
         return wrong(
             "name",
-            f"'{host}' leads to no address: {reason}",
-            "Without an address nothing can be asked",
+            f"'{host}' does not resolve: {reason}",
+            "Without an address the robot can't be reached",
             f"Use the robot's address instead (--target ADDRESS), or look the name up: getent hosts {host}",
         )
     finally:
@@ -39,7 +39,7 @@ def name_finding(host: str) -> Finding:
 
 
 def tcp_finding(host: str, port: int) -> Finding:
-    """Whether something listens on the gateway's port."""
+    """Checks whether something listens on the gateway's port."""
     begin_s = time.monotonic()
     try:
         with socket.create_connection((host, port), timeout=_WITHIN_S):
@@ -50,32 +50,33 @@ def tcp_finding(host: str, port: int) -> Finding:
 
 
 def _why_not(error: OSError, host: str, port: int) -> tuple[str, str, str]:
+    """Returns what happened, why it matters and the remedy."""
     if isinstance(error, ConnectionRefusedError):
         return (
             f"nothing listens on port {port} of {host}",
-            "The robot is there, but its gateway does not run, or listens on another address or port",
+            "The robot is up, but its gateway is not running, or listens on another address or port",
             "Type on the robot: systemctl status robot-gateway, or robot-gateway doctor",
         )
     if isinstance(error, TimeoutError):
         return (
             f"{host} does not answer on port {port} within {_WITHIN_S:g} s",
-            "The robot is off, on another network, or a firewall swallows the packets",
+            "The robot is off, on another network, or a firewall drops the packets",
             f"Type: ping {host}",
         )
     return (
-        f"no way to {host}: {error.strerror or error}",
-        "This computer and the robot are not on networks that know each other",
+        f"{host} is unreachable: {error.strerror or error}",
+        "There is no route from this computer's network to the robot's",
         "Type: ip route",
     )
 
 
 def stream_finding(host: str, port: int) -> Finding:
-    """Whether the running stream's UDP port answers as SRT does."""
+    """Checks whether an SRT listener answers on the running stream's UDP port."""
     if answers_as_srt(host, port):
         return good("stream", f"the stream answers on UDP port {port} of {host}")
     return wrong(
         "stream",
         f"UDP port {port} of {host} does not answer, though the preview is running",
-        "Status and commands work (TCP), but no picture will come: a firewall between lets no UDP through",
+        "Status and commands work (TCP), but no video will arrive: a firewall on the way blocks UDP",
         f"Open UDP port {port} on the way; on the robot: sudo ss -lunp 'sport = :{port}'",
     )

@@ -1,4 +1,4 @@
-"""What the robot says of itself, turned into findings."""
+"""Findings from the robot's own status and info."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -11,34 +11,34 @@ LARGEST_SKEW_S: Final = 1.0
 
 
 def version_finding(gateway_version: str, own_version: str) -> Finding:
-    """Whether both sides are of the same version."""
+    """Checks whether both programs are of the same version."""
     if _series(gateway_version) == _series(own_version):
         return good("version", f"the gateway is {gateway_version}, this program {own_version}")
     return note(
         "version",
         f"the gateway is {gateway_version or 'of an unknown version'}, this program {own_version}",
-        "They understand each other, but the older one lacks what the newer one has",
+        "They work together, but the older one lacks features of the newer one",
         "Update the older one",
     )
 
 
 def old_gateway_finding() -> Finding:
-    """The gateway does not know the method that tells about itself."""
+    """Reports a gateway without GetGatewayInfo."""
     return note(
         "version",
-        "the gateway is older than this program: it can't tell its clock, its calls and its configuration",
-        "They understand each other, but some checks are not possible",
+        "the gateway is older than this program: it does not report its clock, calls and configuration",
+        "They work together, but some checks are not possible",
         "Update the gateway",
     )
 
 
 def clock_finding(robot_unix_s: float, own_unix_s: float, uncertainty_s: float) -> Finding:
-    """Whether both calendar clocks agree.
+    """Checks whether both wall clocks agree.
 
     Args:
-        robot_unix_s: what the robot's clock showed.
-        own_unix_s: what ours showed in the middle of the call.
-        uncertainty_s: half of the time the call took.
+        robot_unix_s: The robot's clock, in seconds since 1970.
+        own_unix_s: This computer's clock in the middle of the call.
+        uncertainty_s: Half of the round trip.
     """
     skew_s = robot_unix_s - own_unix_s
     about = f"{abs(skew_s):.1f} s (± {uncertainty_s:.1f} s)"
@@ -47,28 +47,24 @@ def clock_finding(robot_unix_s: float, own_unix_s: float, uncertainty_s: float) 
     return wrong(
         "clock",
         f"the robot's clock is {about} {'ahead of' if skew_s > 0 else 'behind'} this computer's",
-        "Logs and recordings of both sides don't fit together, and certificates may be refused. "
-        "No age in the status depends on it",
+        "Logs and recordings of both can't be aligned, and certificates may be refused. "
+        "The ages in the status do not depend on it",
         "Type on both: timedatectl; then: sudo timedatectl set-ntp true",
     )
 
 
 def health_finding(status: SystemStatus) -> Finding:
-    """The robot's own verdict; no trouble of its own where a fault tells of the same."""
+    """Reports the robot's own verdict; as a note where an active fault is the reason."""
     health = status.health
     if health.ready:
         return good("health", health.summary)
     if any(fault.active and fault.severity is FaultSeverity.ERROR for fault in status.faults):
-        return note(
-            "health", health.summary, "The robot can't take work", "The faults below say what is missing"
-        )
-    return wrong(
-        "health", health.summary, "The robot can't take work", "The findings below say what is missing"
-    )
+        return note("health", health.summary, "The robot can't work", "See the faults below")
+    return wrong("health", health.summary, "The robot can't work", "See the findings below")
 
 
 def fault_findings(status: SystemStatus) -> Iterator[Finding]:
-    """Everything the gateway itself calls wrong."""
+    """Yields the gateway's active faults."""
     for fault in status.faults:
         if not fault.active:
             continue
@@ -80,76 +76,79 @@ def fault_findings(status: SystemStatus) -> Iterator[Finding]:
 
 
 _WHY: Final = {
-    SourceState.WAITING: ("Nobody on the robot offers it", "Start the program that makes it"),
-    SourceState.SILENT: ("It is offered and nothing comes", "Look at the program that makes it"),
-    SourceState.STALE: ("It came and stopped", "Look at the program that makes it"),
+    SourceState.WAITING: ("Nothing on the robot publishes it", "Start the program that publishes it"),
+    SourceState.SILENT: ("It has a publisher that sends nothing", "Check the program that publishes it"),
+    SourceState.STALE: ("Its publisher has stopped sending", "Check the program that publishes it"),
     SourceState.QOS_MISMATCH: (
-        "Publisher and gateway ask for different guarantees: nothing can come",
+        "Publisher and gateway have incompatible QoS: nothing can be received",
         "Change reliability or durability of this source in the gateway's configuration",
     ),
     SourceState.WRONG_TYPE: (
-        "Publisher and gateway mean different types: nothing can come",
+        "Publisher and gateway use different types: nothing can be received",
         "Correct the type of this source in the gateway's configuration",
     ),
-    SourceState.TYPE_MISSING: ("It can't be read", "Type on the robot: robot-gateway doctor"),
+    SourceState.TYPE_MISSING: (
+        "The gateway lacks the message type",
+        "Type on the robot: robot-gateway doctor",
+    ),
     SourceState.UNKNOWN: ("The gateway is newer than this program", "Update this program"),
 }
 
 
 def source_findings(status: SystemStatus) -> Iterator[Finding]:
-    """Every source that is not told as a fault already."""
-    told = {fault.id.rpartition(".")[0] for fault in status.faults if fault.active}
+    """Yields one finding per source, except those that a fault covers."""
+    faulted = {fault.id.rpartition(".")[0] for fault in status.faults if fault.active}
     for source in status.sources:
         check = f"source.{source.name}"
         if source.state is SourceState.RECEIVING:
-            yield good(check, f"comes, {source.age_ms} ms old")
-        elif source.name not in told:
+            yield good(check, f"received, {source.age_ms} ms old")
+        elif source.name not in faulted:
             yield note(check, source.detail or source.state.value, *_WHY[source.state])
 
 
 def encoder_finding(status: SystemStatus) -> Finding:
-    """Whether the encoder has proved itself: an encoder that runs has."""
+    """Checks the encoder: one that runs has proved itself."""
     preview = status.preview
     if preview.state is PreviewState.RUNNING and preview.encoder:
         kind = "hardware" if preview.encoder.hardware else "the robot's processor"
-        return good("encoder", f"{preview.encoder.name} ({kind}) delivers pictures")
+        return good("encoder", f"{preview.encoder.name} ({kind}) delivers frames")
     if preview.state is PreviewState.FAULTED:
         return wrong(
             "encoder",
-            f"no picture: {preview.last_error}",
-            "The preview is wanted and does not work",
+            f"no video: {preview.last_error}",
+            "The preview is enabled and does not work",
             "Type on the robot: robot-preview encoders",
         )
     return note(
         "encoder",
-        f"not proven: the preview is {preview.state.value}",
-        "Whether an encoder works is known only when it runs",
+        f"not tested: the preview is {preview.state.value}",
+        "An encoder is tested only by running it",
         "Type: robotctl preview on; robotctl doctor",
     )
 
 
 def access_finding(status: SystemStatus) -> Finding | None:
-    """Whether everybody on the network may do what this computer may."""
+    """Reports a gateway without authentication."""
     if not status.insecure:
         return None
     return note(
         "access",
-        "the gateway serves everybody who reaches it, unencrypted",
-        "Whoever is on that network may read and switch everything",
+        "the gateway serves any computer that reaches it, unencrypted",
+        "Any computer on that network can read the status and switch the preview",
         "Set security.insecure to false in the gateway's configuration, and use a tunnel",
     )
 
 
 def calls_finding(info: GatewayInfo) -> Finding:
-    """Calls that ended with the gateway's own error."""
+    """Checks for calls that ended with an internal error of the gateway."""
     failed = sum(counts.failed for counts in info.methods)
     if failed == 0:
         return good("calls", f"{info.gateway.requests_served or 0} calls answered, none failed")
     return wrong(
         "calls",
-        f"{failed} calls ended with an error of the gateway's own",
+        f"{failed} calls ended with an internal error of the gateway",
         "That is a defect of the gateway",
-        "Look into its log for 'failed', and report it",
+        "Search its log for 'failed', and report it",
     )
 
 

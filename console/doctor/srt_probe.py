@@ -1,6 +1,7 @@
-"""Asks a UDP port whether SRT is spoken there, without opening a connection: the first packet of a handshake.
+"""Probes a UDP port for an SRT listener with the induction of a handshake, without opening a connection.
 
-The listener answers a caller's induction with a cookie and forgets it; no viewer appears in its statistics.
+The listener answers it with a cookie and keeps no state (draft-sharabayko-srt 4.3.1.1); no viewer appears in
+its statistics.
 """
 
 import socket
@@ -25,7 +26,7 @@ _WAIT_S: Final = 0.3
 
 
 def answers_as_srt(host: str, port: int) -> bool:
-    """Whether an SRT listener answers there within about a second."""
+    """Returns whether an SRT listener answers there within about a second."""
     family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
     with socket.socket(family, kind, protocol) as probe:
         probe.connect(address)
@@ -34,14 +35,14 @@ def answers_as_srt(host: str, port: int) -> bool:
 
 
 def induction() -> bytes:
-    """The first packet that a caller sends."""
+    """Returns the induction packet of a caller."""
     header = _HEADER.pack(_HANDSHAKE, 0, 0, 0)
     body = _BODY.pack(_UDT_VERSION, 0, _DATAGRAM, 0, _MTU, _WINDOW, _INDUCTION, _OUR_ID, 0, bytes(16))
     return header + body
 
 
 def is_answer(packet: bytes) -> bool:
-    """Whether a packet is a listener's answer to `induction`."""
+    """Returns whether a packet is a listener's answer to `induction`."""
     if len(packet) < _HEADER.size + _BODY.size:
         return False
     kind, _, _, destination = _HEADER.unpack_from(packet)
@@ -59,6 +60,6 @@ def _ask(probe: socket.socket) -> bool:
             if is_answer(probe.recv(2048)):
                 return True
     except OSError:
-        # Refused (nobody is there) or timed out (nobody answered): the next try, or the verdict, follows.
+        # Refused (ICMP port unreachable) or timed out: the next try, or the verdict, follows.
         return False
     return False

@@ -102,7 +102,7 @@ def parse_robots_file(path: Path, text: str) -> RobotsFile:
     """Returns the content of a text.
 
     Raises:
-        UserError: As `read_robots_file`; the line names the file, the key and what is allowed.
+        UserError: As `read_robots_file`; the line names the file, the key and the allowed values.
     """
     try:
         document = tomllib.loads(text)

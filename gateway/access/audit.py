@@ -48,7 +48,7 @@ class AuditLog:
         self._queue: queue.Queue[str | None] = queue.Queue(_QUEUE)
         self.lost = 0
         """Lines that did not reach the file since the start."""
-        self.trouble = ""
+        self.error = ""
         """Why the newest line could not be written; empty when it was."""
 
     def record(self, action: ControlAction) -> None:
@@ -96,7 +96,7 @@ class AuditLog:
             except OSError as error:
                 self._lose(f"{path} can't be written: {error.strerror}")
             else:
-                self.trouble = ""
+                self.error = ""
 
     def _make_room(self, path: Path, more_bytes: int) -> None:
         """The file as it is becomes an older generation where it would grow too large."""
@@ -117,7 +117,7 @@ class AuditLog:
                 newer.replace(older)
 
     def _lose(self, why: str) -> None:
-        self.trouble = why
+        self.error = why
         self.lost += 1
         if self.lost % _COMPLAIN_EVERY == 1:
             _log.error("audit: %s; %d lines are lost so far", why, self.lost)

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Coroutine
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
 from typing import Any, Final, Generic, NoReturn, Protocol, TypeVar
@@ -76,10 +76,9 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         name: of the service and where it listens, for the log.
         silence_s: a service without a report for so long is gone.
         apply_deadline_s: limit of one request; applying takes a healthy service milliseconds.
-        clock: monotonic, in seconds.
 
     Attributes:
-        changes: wakes on each change of the view.
+        changes: wakes on each request, report, refusal and loss.
     """
 
     def __init__(
@@ -90,14 +89,12 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         *,
         silence_s: float = 2.5,
         apply_deadline_s: float = 2.0,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._name = name
         self._connector = connector
         self._reconciler = reconciler
         self._silence_s = silence_s
         self._apply_deadline_s = apply_deadline_s
-        self._clock = clock
         self._backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         self._last_error = ""
         self.changes = Broadcast()
@@ -121,12 +118,16 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         """Replaces the desired state; returns without waiting for the service."""
         desired = self._reconciler.request(spec, request_id.current())
         _log.info("%s: revision %d requested: %s", self._name, desired.revision, spec)
-        self.changes.wake_all()
+        self.changes.notify_all()
         return desired
 
-    async def settles(self, desired: Desired[SpecT], within_s: float) -> bool:
-        """Returns whether `desired` is reached, failed or replaced within that time."""
-        return await self.changes.wait_until(lambda: self._reconciler.settled(desired), within_s)
+    def settled(self, desired: Desired[SpecT]) -> bool:
+        """Whether `desired` was reached, failed or replaced."""
+        return self._reconciler.settled(desired)
+
+    async def wait_until_settled(self, desired: Desired[SpecT], timeout_s: float) -> bool:
+        """Returns whether `desired` has settled before the timeout."""
+        return await self.changes.wait_until(lambda: self.settled(desired), timeout_s)
 
     async def run(self) -> NoReturn:
         """Connects, and reconnects whenever the connection breaks, until cancelled."""
@@ -137,7 +138,7 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
                 _log.warning("%s lost: %s", self._name, detail)
             elif self._backoff.failures == 1:
                 _log.warning("%s not reached: %s", self._name, detail)
-            self.changes.wake_all()
+            self.changes.notify_all()
             await self._pause(pause_s)
 
     async def _pause(self, pause_s: float) -> None:
@@ -170,10 +171,8 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
         while True:
             await self.changes.wait_until(lambda: self._reconciler.pending() is not None)
-            desired = self._reconciler.pending()
-            if desired is None:
-                continue
-            await self._apply(client, desired)
+            if desired := self._reconciler.pending():
+                await self._apply(client, desired)
             # Normally applied by now. Two gateways at one service would overwrite each other without a pause.
             if self._reconciler.pending():
                 await self._pause(backoff.next_s())
@@ -186,20 +185,18 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         except RefusedError as error:
             _log.error("%s refuses revision %d: %s", self._name, desired.revision, error)
             self._reconciler.take_refusal(desired, str(error))
-            self.changes.wake_all()
+            self.changes.notify_all()
             return
         if report is None:
             raise LinkLostError(f"no answer to a request for {self._apply_deadline_s:g} s")
         self._take_report(report)
 
     def _take_report(self, report: ReportT) -> None:
-        if self._reconciler.take_report(report, self._clock()):
-            failures = self._backoff.failures
-            _log.info(
-                "%s connected (process %s), after %d failures", self._name, report.instance_id, failures
-            )
+        if self._reconciler.take_report(report, time.monotonic()):
+            who, failures = report.instance_id, self._backoff.failures
+            _log.info("%s connected (process %s), after %d failures", self._name, who, failures)
             self._backoff.reset()
-        self.changes.wake_all()
+        self.changes.notify_all()
 
 
 async def _within(timeout_s: float, step: Awaitable[ResultT]) -> ResultT | None:

@@ -64,7 +64,7 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
 
     Args:
         first_revision: larger than any that an earlier gateway of this boot assigned.
-        model: what is particular to this service.
+        model: the rules of this service.
 
     Attributes:
         desired: newest desired state.
@@ -91,11 +91,8 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
         if self.report is None or self._refusal is None:
             return None
         instance_id, revision, reason = self._refusal
-        return (
-            reason
-            if (instance_id, revision) == (self.report.value.instance_id, self.desired.revision)
-            else None
-        )
+        current = (self.report.value.instance_id, self.desired.revision)
+        return reason if (instance_id, revision) == current else None
 
     def request(self, spec: SpecT, request_id: str = "") -> Desired[SpecT]:
         """Replaces the desired state; returns it with its revision."""

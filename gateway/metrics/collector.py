@@ -14,7 +14,7 @@ from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.event_stream import EventStream
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.status_stream import StatusStream
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 

@@ -9,8 +9,8 @@ from google.protobuf.message import Message
 
 from common import request_id
 from common.interceptors import Call, RpcContext
+from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
-from gateway.access.site import site_of
 from gateway.rpc.methods import method_at
 
 _LOCAL_SOCKET: Final = "local socket"
@@ -26,7 +26,7 @@ class Peer:
         address: for people: "10.0.0.5:41234", or "local socket" for a Unix one.
         host: the address without its port.
         ip: IPv4 also where IPv6 carries it (RFC 4291 2.5.5.2); None for a Unix socket.
-        site: what one sender can't change at will, see `site_of`.
+        site: what one sender can't change at will, see `address_prefix`.
     """
 
     connection: str
@@ -44,7 +44,7 @@ def peer_of(connection: str) -> Peer:
         return Peer(connection, _LOCAL_SOCKET, _LOCAL_SOCKET, None, _LOCAL_SOCKET)
     host = rest.rpartition(":")[0].strip("[]") or rest
     ip = host.removeprefix("::ffff:") if "." in host else host
-    return Peer(connection, rest, host, ip, site_of(host))
+    return Peer(connection, rest, host, ip, address_prefix(host))
 
 
 class CallContext(Call):

@@ -9,7 +9,7 @@ from common.broadcast import Broadcast
 from gateway.rpc.mapping.events import event_message, gap_message, position_message
 from gateway.status.event import Event
 from gateway.status.events import EventLog, Gap, Position
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 
 HEARTBEAT_S: Final = 5.0

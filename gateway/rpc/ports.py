@@ -39,7 +39,7 @@ class AuditTrail(Protocol):
 class CredentialFiles(Protocol):
     """Where credentials come from."""
 
-    async def look_for_unknown(self) -> None:
+    async def reload_for_unknown(self) -> None:
         """Reads them again: a caller showed one that is not among them."""
 
 

@@ -13,9 +13,9 @@ from gateway.rpc.mapping.status import system_status
 from gateway.rpc.ports import SnapshotSource
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.response_cache import REUSE_S
-from gateway.status.change import essence
-from gateway.status.pace import TICK_MS, Pace
+from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot
+from gateway.status.watch_pacing import TICK_MS, WatchPacing
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
 
 _TICK_S: Final = TICK_MS / 1000
@@ -29,7 +29,7 @@ _NS_PER_S: Final = 1_000_000_000
 
 @dataclass(eq=False, slots=True)
 class _Watcher:
-    pace: Pace
+    pacing: WatchPacing
     wake: asyncio.Future[None] | None = None
     """What it waits for; None while a response is on the way to it."""
 
@@ -50,7 +50,7 @@ class StatusStream:
         self._tick = 0
         self._version = 0
         self._snapshot = state.snapshot()
-        self._essence = essence(self._snapshot)
+        self._change_key = change_key(self._snapshot)
         self._responses: dict[Recipient, bytes] = {}
         self.skipped = 0
         """Responses that came due while the one before was still on its way: those readers got newer ones."""
@@ -83,15 +83,15 @@ class StatusStream:
             while True:
                 yield self._newest(recipient)
                 # The next one may have come due while this one was on its way.
-                if not watcher.pace.due(self._tick, self._version):
+                if not watcher.pacing.due(self._tick, self._version):
                     watcher.wake = loop.create_future()
                     await watcher.wake
                     watcher.wake = None
-                watcher.pace.given(self._tick, self._version)
+                watcher.pacing.sent(self._tick, self._version)
 
     @contextmanager
     def _watching(self, min_interval_ms: int) -> Iterator[_Watcher]:
-        watcher = _Watcher(Pace(min_interval_ms, self._tick, self._version))
+        watcher = _Watcher(WatchPacing(min_interval_ms, self._tick, self._version))
         self._watchers.add(watcher)
         self._watched.set()
         try:
@@ -102,9 +102,9 @@ class StatusStream:
     def _refresh(self) -> None:
         self._snapshot = self._state.snapshot()
         self._responses.clear()
-        seen = essence(self._snapshot)
-        if seen != self._essence:
-            self._essence = seen
+        seen = change_key(self._snapshot)
+        if seen != self._change_key:
+            self._change_key = seen
             self._version += 1
 
     def _refresh_if_older_than(self, seconds: float) -> None:
@@ -121,7 +121,7 @@ class StatusStream:
 
     def _wake_due(self) -> None:
         """Wakes groups spread over the tick: any other call waits for one group only."""
-        watchers = [each for each in self._watchers if each.pace.due(self._tick, self._version)]
+        watchers = [each for each in self._watchers if each.pacing.due(self._tick, self._version)]
         due = [each.wake for each in watchers if each.wake is not None]
         self.skipped += len(watchers) - len(due)
         loop = asyncio.get_running_loop()

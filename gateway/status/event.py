@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from gateway.status.faults.fault import Fault, Severity
+from gateway.status.fault import Fault, Severity
 from gateway.status.preview import PreviewState, Profile
 
 

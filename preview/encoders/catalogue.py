@@ -1,12 +1,12 @@
-"""The encoders we know, as data: how each family spells what we need of it.
+"""Catalogue of encoder elements, as data: how each family spells the properties that we need.
 
-Ranks are useless for choosing and names and units differ everywhere, so each family says here how it is told
-its bit rate, how far apart key frames are, that it shall not hold frames back, and what it takes as input.
-Properties come and go between versions and forks of an element: whoever sets them asks `find_property`
-first (settings.py does), so an entry may name more than one release has.
+GStreamer ranks are useless for choosing an encoder, and property names and units differ between families. So
+each family states here the properties for bit rate, GOP length and low latency, and its input caps.
+Properties come and go between versions and forks of an element: properties.py sets only those that
+`find_property` finds, so an entry may name more than one release has.
 
-Values are written as in gst-launch. None of the hardware families could be tried on hardware; what is said
-about them is read from their sources and documentation.
+Values are written as in gst-launch. No hardware family was tried on hardware: their entries come from the
+elements' sources and documentation.
 """
 
 from collections.abc import Mapping
@@ -19,14 +19,14 @@ from preview.values import Codec
 
 
 class Unit(Enum):
-    """What a bit rate property counts; the value is how many of it make 1 kbit/s."""
+    """Unit of a bit rate property; the value is the factor from kbit/s."""
 
     BIT_PER_S = 1000
     KBIT_PER_S = 1
 
 
 class KeyFrameBy(Enum):
-    """How an encoder is asked for a key frame."""
+    """How a key frame is requested."""
 
     EVENT = "GstForceKeyUnit"
     SIGNAL = "force-IDR"
@@ -34,20 +34,19 @@ class KeyFrameBy(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Spelling:
-    """How a family of elements spells things.
+    """Property names and values of a family of elements.
 
     Args:
         bitrate: properties for the bit rate; each one that exists is set.
-        unit: their unit.
-        gop: properties for the longest distance between key frames, in frames.
-        fixed: low latency, no B-frames, headers with every key frame.
-        vbv_ms: property for the size of the rate buffer in ms. Empty: the family has none in that unit.
+        unit: unit of `bitrate`.
+        gop: properties for the GOP length (longest distance between key frames), in frames.
+        fixed: constant properties: low latency, no B-frames, headers with every key frame.
+        vbv_ms: property for the size of the rate buffer (VBV) in ms. Empty: none in that unit.
         vbv_options: property with options, of which `vbv-maxrate` and `vbv-bufsize` make the rate buffer.
         controls: V4L2 controls, packed into `extra-controls`: control -> "bitrate", "gop" or a number.
-        input_caps: what is fed to the element.
-        upload: an element that brings frames to where the encoder wants them.
-        live_bitrate: whether the bit rate may change while playing.
-        key_frame_by: how it is asked for a key frame.
+        input_caps: caps of the element's input.
+        upload: element that copies frames into the encoder's memory.
+        key_frame_by: how a key frame is requested.
     """
 
     bitrate: tuple[str, ...] = ("bitrate",)
@@ -59,13 +58,12 @@ class Spelling:
     controls: Mapping[str, str | int] = field(default_factory=dict)
     input_caps: str = "video/x-raw,format=NV12"
     upload: str = ""
-    live_bitrate: bool = True
     key_frame_by: KeyFrameBy = KeyFrameBy.EVENT
 
 
 @dataclass(frozen=True, slots=True)
 class Encoder:
-    """One entry of the catalogue: an element, what it makes, and how it is spoken to."""
+    """One entry of the catalogue: an element, its codec and its properties."""
 
     name: str
     family: str
@@ -80,11 +78,11 @@ _MPP = Spelling(
     bitrate=("bps", "bitrate"),
     unit=Unit.BIT_PER_S,
     gop=("gop",),
-    # max-pending: frames kept in the encoder, 16 unless told.
+    # max-pending: frames kept in the encoder; the default is 16.
     fixed={"header-mode": "each-idr", "rc-mode": "cbr", "max-pending": "1"},
 )
 _V4L2 = Spelling(
-    # Own properties exist from 1.29 only; before, everything goes through V4L2 controls.
+    # Properties of its own exist from GStreamer 1.29 only; before, everything is a V4L2 control.
     bitrate=(),
     gop=(),
     controls={
@@ -123,7 +121,7 @@ _QSV = Spelling(
 )
 _MSDK = Spelling(
     gop=("gop-size",),
-    # b-frames is -1 (the driver's choice) unless told.
+    # The default of b-frames is -1, the driver's choice.
     fixed={"rate-control": "cbr", "b-frames": "0", "low-delay-brc": "true", "async-depth": "1"},
 )
 _X264 = Spelling(
@@ -134,12 +132,12 @@ _X264 = Spelling(
         "byte-stream": "true",
         "intra-refresh": "false",
     },
-    # 600 ms unless told, which allows key frames so large that they cost latency.
+    # The default of 600 ms allows key frames so large that they cost latency.
     vbv_ms="vbv-buf-capacity",
     input_caps="video/x-raw,format={ I420, NV12 }",
 )
 _X265 = Spelling(
-    # The element knows no VBV: it comes with the options, and so does all that may delay a frame.
+    # The element has no VBV property: it is among the options, as is everything that may delay a frame.
     fixed={
         "tune": "zerolatency",
         "speed-preset": "ultrafast",
@@ -147,12 +145,11 @@ _X265 = Spelling(
     },
     vbv_options="option-string",
     input_caps="video/x-raw,format=I420",
-    live_bitrate=True,
 )
 
 
 def _pair(family: str, h265: str, h264: str, spelling: Spelling, *more: tuple[str, str]) -> list[Encoder]:
-    """The entries of a hardware family, the one for H.265 first; `more` are (suffix, element) for H.265."""
+    """Returns the entries of a hardware family, H.265 first; `more` are (suffix, element) for H.265."""
     return [
         Encoder(f"{family}-h265", family, h265, Codec.H265, True, spelling),
         *(
@@ -183,4 +180,4 @@ DEFAULT_ORDER: Final = (
     *(e.name for e in _ENTRIES if e.hardware and e.codec is Codec.H264),
     "x264",
 )
-"""Hardware H.265, hardware H.264, then the CPU. x265 is too dear for a robot's CPU: only by configuration."""
+"""Hardware H.265, hardware H.264, then x264. x265 costs too much CPU on a robot: only by configuration."""

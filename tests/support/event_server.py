@@ -13,7 +13,7 @@ from gateway.rpc.event_stream import EventStream
 from gateway.rpc.mapping.events import position_from
 from gateway.status.event import ModeChanged, News
 from gateway.status.events import EventLog
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 
 
@@ -41,7 +41,7 @@ class EventServer:
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
             self._log.add(News(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
-        self._appended.wake_all()
+        self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
 
     async def restart(self) -> None:

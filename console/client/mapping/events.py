@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from console.client.mapping import enums
-from console.client.mapping.faults import fault
+from console.client.mapping.status import fault
 from console.client.results import (
     CaughtUp,
     ControlAction,
@@ -19,8 +19,8 @@ from omniseer.gateway.v1 import event_pb2 as wire
 from omniseer.gateway.v1 import robot_gateway_pb2
 
 
-def item(message: robot_gateway_pb2.SubscribeEventsResponse) -> Event | EventGap | CaughtUp | None:
-    """The next thing to know; None for what only a newer client understands."""
+def event_item(message: robot_gateway_pb2.SubscribeEventsResponse) -> Event | EventGap | CaughtUp | None:
+    """Returns the next item; None for a kind that only a newer client knows."""
     match message.WhichOneof("item"):
         case "event":
             return event(message.event)
@@ -33,7 +33,7 @@ def item(message: robot_gateway_pb2.SubscribeEventsResponse) -> Event | EventGap
 
 
 def event(message: wire.Event) -> Event:
-    """Something happened."""
+    """Returns one event."""
     kind, parts = _KINDS.get(message.WhichOneof("payload") or "", _NO_KIND)
     return Event(
         position=EventPosition(message.run_id, message.sequence),
@@ -48,7 +48,7 @@ def event(message: wire.Event) -> Event:
 
 
 def gap(message: wire.EventGap) -> EventGap:
-    """Events are missing."""
+    """Returns one gap."""
     return EventGap(
         reason=enums.gap_reason(message.reason),
         missed_count=message.missed_count,
@@ -57,7 +57,7 @@ def gap(message: wire.EventGap) -> EventGap:
 
 
 def position(message: wire.EventPosition) -> EventPosition:
-    """A place in the order of events."""
+    """Returns one position."""
     return EventPosition(message.run_id, message.sequence)
 
 

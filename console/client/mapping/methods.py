@@ -1,14 +1,16 @@
-"""The contract's methods: bytes out of a request's values, a result out of the answer's bytes.
+"""The contract's methods: request values to message bytes, message bytes to results.
 
-gRPC moves bytes; it is told here how they are made and read, so that everything above speaks results only.
+gRPC moves bytes; these tables are its serializers, so that the code above sees results only.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
-from console.client.mapping.enums import profile_number, severity_number
-from console.client.mapping.events import item
+from google.protobuf.message import Message
+
+from console.client.mapping import enums
+from console.client.mapping.events import event_item
 from console.client.mapping.info import gateway_info
 from console.client.mapping.overlay import overlay_snapshot
 from console.client.mapping.preview import preview
@@ -27,10 +29,10 @@ from console.client.results import (
     SystemStatus,
     WatchedStatus,
 )
-from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2, system_status_pb2
+from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
+from omniseer.gateway.v1 import robot_gateway_pb2 as wire
 
-_SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-
+_SERVICE: Final = wire.DESCRIPTOR.services_by_name["RobotGateway"]
 _MS_PER_S: Final = 1000
 
 RequestT = TypeVar("RequestT")
@@ -39,7 +41,7 @@ ResultT = TypeVar("ResultT")
 
 @dataclass(frozen=True, slots=True)
 class PreviewRequest:
-    """What the operator wants of the preview. A profile that is UNKNOWN keeps the current one."""
+    """The desired state of the preview. A profile that is UNKNOWN keeps the current one."""
 
     enabled: bool
     profile: PreviewProfile = PreviewProfile.UNKNOWN
@@ -47,11 +49,11 @@ class PreviewRequest:
 
 @dataclass(frozen=True, slots=True)
 class EventsRequest:
-    """Which events are asked for.
+    """A subscription.
 
     Args:
-        after: where to go on; None takes what the gateway still keeps.
-        least: what matters less is left out; UNKNOWN leaves out nothing.
+        after: Where to resume; None begins with the oldest event that the gateway keeps.
+        least: Events of lower severity are left out; UNKNOWN leaves out none.
     """
 
     after: EventPosition | None = None
@@ -63,115 +65,91 @@ class Method(Generic[RequestT, ResultT]):
     """One method of the contract.
 
     Args:
-        name: as in the schema.
-        encode: request value to message bytes.
-        decode: message bytes to result.
-        idempotent: whether asking twice does the same as asking once, so that a lost answer may be asked
-            for again.
+        name: As in the schema.
+        request: Makes the request message.
+        answer: Class of the answer message.
+        result: Reads the answer message.
+        idempotent: Whether two calls have the effect of one, so that a call may be retried.
     """
 
     name: str
-    encode: Callable[[RequestT], bytes]
-    decode: Callable[[bytes], ResultT]
-    idempotent: bool
+    request: Callable[[RequestT], Message]
+    answer: type[Message]
+    result: Callable[[Any], ResultT]
+    idempotent: bool = True
 
     @property
     def path(self) -> str:
-        """The method's address on the wire."""
+        """The method's path in HTTP/2, as gRPC forms it: /package.Service/Method."""
         return f"/{_SERVICE.full_name}/{_SERVICE.methods_by_name[self.name].name}"
 
+    def encode(self, request: RequestT) -> bytes:
+        """Returns the bytes of the request."""
+        return self.request(request).SerializeToString()
 
-def _encode_status_request(_: None) -> bytes:
-    return robot_gateway_pb2.GetSystemStatusRequest().SerializeToString()
-
-
-def _encode_overlay_request(_: None) -> bytes:
-    return robot_gateway_pb2.GetOverlaySnapshotRequest().SerializeToString()
-
-
-def _encode_info_request(_: None) -> bytes:
-    return robot_gateway_pb2.GetGatewayInfoRequest().SerializeToString()
+    def decode(self, data: bytes) -> ResultT:
+        """Returns the result of the answer's bytes."""
+        return self.result(self.answer.FromString(data))
 
 
-def _encode_preview_wish(wish: PreviewRequest) -> bytes:
-    request = robot_gateway_pb2.SetPreviewModeRequest(
-        enabled=wish.enabled, profile=profile_number(wish.profile)
-    )
-    return request.SerializeToString()
+def _preview_request(request: PreviewRequest) -> Message:
+    profile = enums.preview_profile.number(request.profile)
+    return wire.SetPreviewModeRequest(enabled=request.enabled, profile=profile)
 
 
-def _decode_status(data: bytes) -> SystemStatus:
-    return system_status(system_status_pb2.SystemStatus.FromString(data))
-
-
-def _decode_overlay(data: bytes) -> OverlaySnapshot:
-    return overlay_snapshot(overlay_pb2.OverlaySnapshot.FromString(data))
-
-
-def _decode_info(data: bytes) -> GatewayInfo:
-    return gateway_info(robot_gateway_pb2.GetGatewayInfoResponse.FromString(data))
-
-
-def _decode_preview_change(data: bytes) -> PreviewChange:
-    answer = robot_gateway_pb2.SetPreviewModeResponse.FromString(data)
+def _preview_change(answer: wire.SetPreviewModeResponse) -> PreviewChange:
     return PreviewChange(accepted=answer.accepted, message=answer.message, preview=preview(answer.preview))
 
 
-def _encode_watch_request(min_interval_s: float) -> bytes:
-    milliseconds = round(min_interval_s * _MS_PER_S)
-    return robot_gateway_pb2.WatchSystemStatusRequest(min_interval_ms=milliseconds).SerializeToString()
+def _watch_request(min_interval_s: float) -> Message:
+    return wire.WatchSystemStatusRequest(min_interval_ms=round(min_interval_s * _MS_PER_S))
 
 
-def _encode_events_request(wanted: EventsRequest) -> bytes:
-    request = robot_gateway_pb2.SubscribeEventsRequest(min_severity=severity_number(wanted.least))
-    if wanted.after is not None:
-        request.after.run_id, request.after.sequence = wanted.after.run_id, wanted.after.sequence
-    return request.SerializeToString()
+def _watched_status(answer: wire.WatchSystemStatusResponse) -> WatchedStatus:
+    return WatchedStatus(status=system_status(answer.status), monotonic_ns=answer.monotonic_ns)
 
 
-def _encode_ping_request(_: None) -> bytes:
-    return robot_gateway_pb2.PingRequest().SerializeToString()
+def _events_request(request: EventsRequest) -> Message:
+    message = wire.SubscribeEventsRequest(min_severity=enums.fault_severity.number(request.least))
+    if request.after is not None:
+        message.after.run_id, message.after.sequence = request.after.run_id, request.after.sequence
+    return message
 
 
-def _decode_watched(data: bytes) -> WatchedStatus:
-    message = robot_gateway_pb2.WatchSystemStatusResponse.FromString(data)
-    return WatchedStatus(status=system_status(message.status), monotonic_ns=message.monotonic_ns)
-
-
-def _decode_event_item(data: bytes) -> Event | EventGap | CaughtUp | None:
-    return item(robot_gateway_pb2.SubscribeEventsResponse.FromString(data))
-
-
-def _decode_time(data: bytes) -> RobotTime:
-    message = robot_gateway_pb2.PingResponse.FromString(data)
+def _robot_time(answer: wire.PingResponse) -> RobotTime:
     return RobotTime(
-        monotonic_ns=message.monotonic_ns,
-        wall_clock_unix_ns=message.wall_clock_unix_ns,
-        boot_id=message.boot_id or None,
+        monotonic_ns=answer.monotonic_ns,
+        wall_clock_unix_ns=answer.wall_clock_unix_ns,
+        boot_id=answer.boot_id or None,
     )
 
 
 GET_SYSTEM_STATUS: Final[Method[None, SystemStatus]] = Method(
-    "GetSystemStatus", _encode_status_request, _decode_status, idempotent=True
+    "GetSystemStatus", lambda _: wire.GetSystemStatusRequest(), system_status_pb2.SystemStatus, system_status
 )
-# A wish names the state that is wanted, not a change: to wish twice is to wish once.
+# Idempotent, because a request names the desired state, not a change.
 SET_PREVIEW_MODE: Final[Method[PreviewRequest, PreviewChange]] = Method(
-    "SetPreviewMode", _encode_preview_wish, _decode_preview_change, idempotent=True
+    "SetPreviewMode", _preview_request, wire.SetPreviewModeResponse, _preview_change
 )
 GET_OVERLAY_SNAPSHOT: Final[Method[None, OverlaySnapshot]] = Method(
-    "GetOverlaySnapshot", _encode_overlay_request, _decode_overlay, idempotent=True
+    "GetOverlaySnapshot",
+    lambda _: wire.GetOverlaySnapshotRequest(),
+    overlay_pb2.OverlaySnapshot,
+    overlay_snapshot,
 )
 GET_GATEWAY_INFO: Final[Method[None, GatewayInfo]] = Method(
-    "GetGatewayInfo", _encode_info_request, _decode_info, idempotent=True
+    "GetGatewayInfo", lambda _: wire.GetGatewayInfoRequest(), wire.GetGatewayInfoResponse, gateway_info
 )
-PING: Final[Method[None, RobotTime]] = Method("Ping", _encode_ping_request, _decode_time, idempotent=True)
+PING: Final[Method[None, RobotTime]] = Method(
+    "Ping", lambda _: wire.PingRequest(), wire.PingResponse, _robot_time
+)
 WATCH_SYSTEM_STATUS: Final[Method[float, WatchedStatus]] = Method(
-    "WatchSystemStatus", _encode_watch_request, _decode_watched, idempotent=True
+    "WatchSystemStatus", _watch_request, wire.WatchSystemStatusResponse, _watched_status
 )
 SUBSCRIBE_EVENTS: Final[Method[EventsRequest, Event | EventGap | CaughtUp | None]] = Method(
-    "SubscribeEvents", _encode_events_request, _decode_event_item, idempotent=True
+    "SubscribeEvents", _events_request, wire.SubscribeEventsResponse, event_item
 )
 METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT, GET_GATEWAY_INFO, PING)
-"""Every method of the contract with one answer."""
+"""The unary methods."""
 STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS)
-"""Every method with a stream of answers (a test compares both lists with the schema)."""
+"""The server-streaming methods. A test compares both lists with the schema."""

@@ -1,13 +1,13 @@
 """Detections and events, from the contract's messages."""
 
-from console.client.mapping.known import number, when
 from console.client.mapping.status import system_status
+from console.client.mapping.values import number, sample, when
 from console.client.results import Detection, Detections, OperatorEvent, OverlaySnapshot
 from omniseer.gateway.v1 import overlay_pb2 as wire
 
 
 def overlay_snapshot(message: wire.OverlaySnapshot) -> OverlaySnapshot:
-    """What a screen draws over the picture."""
+    """Returns status, detections and events of one instant."""
     return OverlaySnapshot(
         status=system_status(message.status),
         detections=_detections(message.detections),
@@ -21,9 +21,7 @@ def overlay_snapshot(message: wire.OverlaySnapshot) -> OverlaySnapshot:
 def _detections(message: wire.DetectionOverlayStatus) -> Detections:
     here = message.available
     return Detections(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         source_width_px=when(here, message.source_width_px),
         source_height_px=when(here, message.source_height_px),
         count=when(here, message.detection_count),

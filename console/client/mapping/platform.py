@@ -1,12 +1,12 @@
 """The robot's computer, from the contract's messages."""
 
-from console.client.mapping.known import number_when, when
+from console.client.mapping.values import number_when, sample, when
 from console.client.results import Battery, Compute, Network, Platform, Power
 from omniseer.gateway.v1 import platform_pb2 as wire
 
 
 def platform(message: wire.PlatformStatus) -> Platform:
-    """The robot's computer."""
+    """Returns load, memory, network and batteries."""
     return Platform(
         compute=_compute(message.compute),
         network=_network(message.network),
@@ -20,9 +20,7 @@ def platform(message: wire.PlatformStatus) -> Platform:
 def _compute(message: wire.ComputeStatus) -> Compute:
     here = message.available
     return Compute(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         cpu_percent=number_when(here, message.cpu_percent),
         cpu_temperature_c=number_when(here and message.cpu_temperature_available, message.cpu_temperature_c),
         thermal_throttled=when(here and message.thermal_throttled_available, message.thermal_throttled),
@@ -36,9 +34,7 @@ def _compute(message: wire.ComputeStatus) -> Compute:
 def _network(message: wire.NetworkStatus) -> Network:
     here = message.available
     return Network(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         connected=when(here, message.connected),
         interface_name=when(here, message.interface_name),
         wifi_signal_dbm=when(here and message.wifi_signal_available, message.wifi_signal_dbm),
@@ -49,9 +45,7 @@ def _network(message: wire.NetworkStatus) -> Network:
 def _battery(message: wire.BatteryStatus) -> Battery:
     here = message.available
     return Battery(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         source=when(here, message.source),
         present=when(here, message.present),
         voltage_v=number_when(here and message.voltage_available, message.voltage),

@@ -1,7 +1,7 @@
 """The live preview, from the contract's messages."""
 
 from console.client.mapping import enums
-from console.client.mapping.known import number, number_when, when
+from console.client.mapping.values import number, number_when, sample, when
 from console.client.results import (
     Encoder,
     PreviewCounters,
@@ -14,7 +14,7 @@ from omniseer.gateway.v1 import preview_pb2 as wire
 
 
 def preview(message: wire.PreviewStatus) -> PreviewStatus:
-    """The live preview."""
+    """Returns the live preview's status."""
     return PreviewStatus(
         state=enums.preview_state(message.state),
         profile=enums.preview_profile(message.profile),
@@ -61,9 +61,7 @@ def _video(message: wire.VideoFormat) -> VideoFormat:
 def _measured(message: wire.StreamMeasurement) -> PreviewMeasurement:
     here = message.available
     return PreviewMeasurement(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         fps=number_when(here, message.fps),
         bitrate_kbps=number_when(here, message.bitrate_kbps),
         viewer_count=when(here, message.viewer_count),

@@ -1,27 +1,28 @@
-"""The whole status, from the contract's messages."""
+"""The whole status with faults and sources, from the contract's messages."""
 
 from console.client.mapping import enums
-from console.client.mapping.faults import fault
 from console.client.mapping.info import gateway_facts
-from console.client.mapping.known import number, number_when, when
 from console.client.mapping.platform import platform
 from console.client.mapping.preview import preview
-from console.client.mapping.sources import source
+from console.client.mapping.values import number, number_when, sample, when
 from console.client.results import (
     EffectiveCommand,
+    Fault,
     Health,
     Mission,
     Odometry,
+    Source,
     SystemStatus,
     Teleop,
     TeleopCommand,
     Vision,
 )
+from omniseer.gateway.v1 import fault_pb2, source_pb2
 from omniseer.gateway.v1 import system_status_pb2 as wire
 
 
 def system_status(message: wire.SystemStatus) -> SystemStatus:
-    """Everything the gateway knows."""
+    """Returns the status of the whole robot."""
     return SystemStatus(
         gateway_name=message.gateway_name,
         gateway_version=message.gateway_version,
@@ -35,8 +36,33 @@ def system_status(message: wire.SystemStatus) -> SystemStatus:
         teleop=_teleop(message.teleop),
         faults=tuple(fault(each) for each in message.faults),
         mission=_mission(message.mission),
-        sources=tuple(source(each) for each in message.sources),
-        gateway=gateway_facts(message.gateway, told=message.HasField("gateway")),
+        sources=tuple(_source(each) for each in message.sources),
+        gateway=gateway_facts(message.gateway, reported=message.HasField("gateway")),
+    )
+
+
+def fault(message: fault_pb2.Fault) -> Fault:
+    """Returns one fault."""
+    return Fault(
+        id=message.id,
+        severity=enums.fault_severity(message.severity),
+        component=message.component,
+        message=message.message,
+        remedy=message.remedy,
+        active=message.active,
+        age_ms=message.age_ms,
+        cleared_age_ms=when(message.HasField("cleared_age_ms"), message.cleared_age_ms),
+        times_raised=message.times_raised,
+    )
+
+
+def _source(message: source_pb2.SourceStatus) -> Source:
+    return Source(
+        **sample(message),
+        name=message.name,
+        state=enums.source_state(message.state),
+        required=message.required,
+        detail=message.detail,
     )
 
 
@@ -61,9 +87,7 @@ def _odometry(message: wire.RobotHealth) -> Odometry:
 def _vision(message: wire.VisionStatus) -> Vision:
     here = message.available
     return Vision(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         producer_fps=number_when(here, message.producer_fps),
         consumer_fps=number_when(here, message.consumer_fps),
         last_infer_ms=number_when(here, message.last_infer_ms),
@@ -92,18 +116,13 @@ def _teleop(message: wire.TeleopStatus) -> Teleop:
 
 
 def _mission(message: wire.MissionStatus) -> Mission:
-    here = message.available
-    return Mission(
-        available=here, stale=message.stale, age_ms=when(here, message.age_ms), mode=when(here, message.mode)
-    )
+    return Mission(**sample(message), mode=when(message.available, message.mode))
 
 
 def _effective_command(message: wire.EffectiveCommand) -> EffectiveCommand:
     here = message.available
     return EffectiveCommand(
-        available=here,
-        stale=message.stale,
-        age_ms=when(here, message.age_ms),
+        **sample(message),
         vx_mps=number_when(here, message.vx_mps),
         vy_mps=number_when(here, message.vy_mps),
         wz_rad_s=number_when(here, message.wz_rad_s),

@@ -1,10 +1,9 @@
-"""What a robot's gateway answers, as frozen values with units in their names; free of the wire format.
+"""The answers of a robot's gateway as frozen values, with units in their names; free of the wire format.
 
-None means "not known". Enumerations have a member `UNKNOWN`: the gateway did not say, or it is newer than
-this client and said something this client has no word for.
+None means "unknown". Enumerations have a member `UNKNOWN`: the gateway did not set the field, or it is newer
+than this client and set a value that this client does not know.
 """
 
-from console.client.results.clock import RobotTime, WatchedStatus
 from console.client.results.event import (
     CaughtUp,
     ControlAction,
@@ -43,11 +42,13 @@ from console.client.results.status import (
     HealthState,
     Mission,
     Odometry,
+    RobotTime,
     SystemStatus,
     Teleop,
     TeleopCommand,
     TeleopState,
     Vision,
+    WatchedStatus,
 )
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""What happens on the robot, as it happens."""
+"""Events on the robot."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -8,10 +8,10 @@ from console.client.results.preview import PreviewProfile, PreviewState
 
 
 class EventKind(Enum):
-    """What kind of thing happened; the part of the `Event` with the same name tells more."""
+    """Kind of an event; the part of the `Event` with the same name has the details."""
 
     UNKNOWN = "unknown"
-    """The gateway is newer than this client; `Event.message` says what it is."""
+    """The gateway is newer than this client; `Event.message` describes the event."""
     FAULT_RAISED = "fault-raised"
     FAULT_CLEARED = "fault-cleared"
     PREVIEW = "preview"
@@ -23,7 +23,7 @@ class EventKind(Enum):
 
 
 class ControlResult(Enum):
-    """What became of a control action."""
+    """Result of a control action."""
 
     UNKNOWN = "unknown"
     ACCEPTED = "accepted"
@@ -33,17 +33,17 @@ class ControlResult(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EventPosition:
-    """A place in the order of events. Keep it, and `events(after=...)` goes on from there."""
+    """A position in the order of events. `events(after=...)` resumes from it."""
 
     run_id: str
-    """Which run of the gateway program: another one after each start of it."""
+    """Identifies the run of the gateway program; every start has a new one."""
     sequence: int
-    """The newest event before this place; 0 before the first."""
+    """Number of the newest event before this position; 0 before the first."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewEvent:
-    """The preview came to rest in another state, or another profile is in force."""
+    """The preview has settled in another state or changed its profile."""
 
     state: PreviewState
     profile: PreviewProfile
@@ -52,7 +52,7 @@ class PreviewEvent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncoderFallback:
-    """Another encoder than the robot's first choice took over."""
+    """An encoder other than the robot's first choice took over."""
 
     running: str
     wanted: str
@@ -61,10 +61,10 @@ class EncoderFallback:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlAction:
-    """Somebody asked for something that changes the robot."""
+    """A client requested a change of the robot."""
 
     who: str
-    """Empty where the gateway doesn't ask who calls."""
+    """Name of the user; empty where the gateway has no authentication."""
     address: str
     method: str
     request: str
@@ -74,27 +74,27 @@ class ControlAction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something happened. Of the parts below `kind`, the one that belongs to the kind is set."""
+    """One event. Of the parts below `kind`, the one that belongs to the kind is set."""
 
     position: EventPosition
-    """The place after this event."""
+    """The position after this event."""
     monotonic_ns: int
-    """When, on the robot's monotonic clock; `Clock.local_s` makes it an instant of this computer."""
+    """Time on the robot's monotonic clock; `Clock.local_s` converts it to this computer's."""
     wall_clock_unix_ms: int
-    """What the robot's calendar clock showed."""
+    """Time on the robot's wall clock, in ms since 1970 UTC."""
     severity: FaultSeverity
     component: str
     message: str
     kind: EventKind
     fault: Fault | None = None
-    """Of a fault raised or cleared; its ages are those at the time of the event."""
+    """The fault that was raised or cleared, with its ages at the time of the event."""
     preview: PreviewEvent | None = None
     encoder_fallback: EncoderFallback | None = None
     client_address: str | None = None
-    """Of a client that joined or left."""
+    """Address of the client that joined or left."""
     control: ControlAction | None = None
     mode: str | None = None
-    """The robot's mode, in its own words."""
+    """The robot's mode, as the robot names it."""
 
 
 class GapReason(Enum):
@@ -102,24 +102,24 @@ class GapReason(Enum):
 
     UNKNOWN = "unknown"
     NO_LONGER_KEPT = "no-longer-kept"
-    """More came than the gateway keeps."""
+    """There were more than the gateway keeps."""
     NEW_RUN = "new-run"
-    """The gateway was started anew; what the earlier run had not sent is lost."""
+    """The gateway was restarted; events that the earlier run had not sent are lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventGap:
-    """Here events are missing; what follows is whole again."""
+    """Events are missing here; those that follow are complete again."""
 
     reason: GapReason
     missed_count: int
-    """Of the present run. How many of an earlier run are missing nobody knows."""
+    """Of the present run; those of an earlier run can't be counted."""
     position: EventPosition
-    """The place after the gap."""
+    """The position after the gap."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CaughtUp:
-    """Everything that has happened up to here was told."""
+    """All events up to this position have been delivered."""
 
     position: EventPosition

@@ -1,39 +1,39 @@
-"""What is wrong with the robot, or was a moment ago."""
+"""Faults of the robot, active or recently cleared."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class FaultSeverity(Enum):
-    """How much a fault matters."""
+    """Severity of a fault or an event."""
 
     UNKNOWN = "unknown"
     INFO = "info"
-    """Worth knowing; nothing is lost."""
+    """No function is affected."""
     WARNING = "warning"
-    """Something is lost or will be; the robot can still take work."""
+    """A function is or will be impaired; the robot can still work."""
     ERROR = "error"
-    """The robot can't do a part of its work until this is mended."""
+    """The robot can't do a part of its work until this is repaired."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """One fault, found by the gateway itself."""
+    """One fault, detected by the gateway."""
 
     id: str
-    """The same for the same trouble whenever it comes: "odometry.stale"."""
+    """Stable identifier of the condition: "odometry.stale"."""
     severity: FaultSeverity
     component: str
-    """The part of the robot that has it."""
+    """The affected part of the robot."""
     message: str
-    """What is wrong."""
+    """Description of the fault."""
     remedy: str
-    """What to look at or to do."""
+    """What to check or to do."""
     active: bool
-    """Whether it is there now. Faults that are over stay listed for a while."""
+    """Whether it is present now. Cleared faults stay listed for a while."""
     age_ms: int
-    """How long ago it began."""
+    """Time since it was raised."""
     cleared_age_ms: int | None
-    """How long ago it was over. None while it is active."""
+    """Time since it was cleared. None while it is active."""
     times_raised: int
-    """How often it came since the gateway started, this time included."""
+    """How often it was raised since the gateway started, this time included."""

@@ -5,24 +5,24 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GatewayFacts:
-    """Small facts that come with every status. None where the gateway is older than they are."""
+    """Facts about the gateway program in every status. None where an older gateway does not report them."""
 
     revision: str | None
-    """The git revision it was built from. None also when its build does not tell."""
+    """The git revision it was built from. None also where its build does not record it."""
     boot_id: str | None
-    """Another one after each start of the robot's computer."""
+    """Kernel boot ID of the robot's computer."""
     uptime_ms: int | None
     client_count: int | None
-    """Connections that asked for something during the last 10 s."""
+    """Connections with a call during the last 10 s."""
     requests_served: int | None
     requests_refused: int | None
     run_id: str | None
-    """Another one after each start of the gateway program; it numbers the events."""
+    """Identifies the run of the gateway program; event numbers start again with each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodCounts:
-    """How often one method was called since the gateway started."""
+    """Counts of one method's calls since the gateway started."""
 
     method: str
     served: int
@@ -32,13 +32,13 @@ class MethodCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GatewayInfo:
-    """What is known of the gateway program."""
+    """Build, call counts and configuration of the gateway program."""
 
     gateway_name: str
     gateway_version: str
     gateway: GatewayFacts
     wall_clock_unix_ms: int
-    """What the robot's own calendar clock showed, in ms since 1970 UTC."""
+    """Time on the robot's wall clock, in ms since 1970 UTC."""
     methods: tuple[MethodCounts, ...]
     configuration_json: str
     """The configuration in force, without secrets."""

@@ -1,4 +1,4 @@
-"""What a screen draws over the picture."""
+"""Detections and events, as an overlay on the video shows them."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,15 @@ from console.client.results.status import SystemStatus
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detection:
-    """One object; its box in pixels of the source image: x right, y down, origin upper left."""
+    """One detected object; its box in pixels of the source frame: x right, y down, origin upper left."""
 
     class_id: int
     class_name: str
-    """Empty when the robot gives none."""
+    """Empty where the robot does not name its classes."""
     score: float
     """Confidence, 0 to 1."""
     track_id: str
-    """The same object keeps the same id from image to image. Empty when objects are not tracked."""
+    """Constant for one object from frame to frame. Empty where objects are not tracked."""
     center_x_px: float
     center_y_px: float
     width_px: float
@@ -25,29 +25,29 @@ class Detection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Detections(Sample):
-    """The newest set of detections. Don't draw it when it is stale."""
+    """The newest detections. Do not draw them when they are stale."""
 
     source_width_px: int | None
     source_height_px: int | None
     count: int | None
-    """How many objects there were; `items` holds fewer when the gateway capped the list."""
+    """Number of detected objects; `items` has fewer where the gateway capped the list."""
     items: tuple[Detection, ...]
     """Empty when not available."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorEvent:
-    """Something happened that an operator should know."""
+    """An event in short form."""
 
     sequence: int
-    """Counts up by one from 1 since the gateway started."""
+    """Number of the event since the gateway started, from 1."""
     age_ms: int
     message: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverlaySnapshot:
-    """Status, detections and the newest events, at one instant."""
+    """Status, detections and the newest events, all of one instant."""
 
     status: SystemStatus
     detections: Detections

@@ -7,13 +7,13 @@ from console.client.results.sample import Sample
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compute(Sample):
-    """CPU, temperature, memory and disk. Single values are None where the computer does not tell them."""
+    """CPU, temperature, memory and disk. Values that the computer does not report are None."""
 
     cpu_percent: float | None
     """Load of all cores together, 0-100."""
     cpu_temperature_c: float | None
     thermal_throttled: bool | None
-    """Whether the clock is held down because of heat."""
+    """Whether the CPU clock is reduced because of heat."""
     ram_used_bytes: int | None
     ram_total_bytes: int | None
     ram_used_percent: float | None
@@ -37,7 +37,7 @@ class Battery(Sample):
     """One battery."""
 
     source: str | None
-    """Which of the robot's batteries this is, as its configuration names it."""
+    """The battery's name in the robot's configuration."""
     present: bool | None
     voltage_v: float | None
     charge_percent: float | None

@@ -1,4 +1,4 @@
-"""The live preview: what it does, where to watch it, how well it runs."""
+"""The live preview: its state, address, encoder and measurements."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -7,35 +7,35 @@ from console.client.results.sample import Sample
 
 
 class PreviewState(Enum):
-    """Where the preview is in its life."""
+    """State of the preview."""
 
     UNKNOWN = "unknown"
     DISABLED = "disabled"
     RUNNING = "running"
-    """Frames leave the robot; a viewer that connects now gets a picture."""
+    """Frames leave the robot; a viewer that connects now receives video."""
     STARTING = "starting"
     STOPPING = "stopping"
     FAULTED = "faulted"
-    """Wanted, but not delivering; `PreviewStatus.last_error` says why. The robot retries by itself."""
+    """Enabled, but without frames; `PreviewStatus.last_error` has the reason. The robot retries."""
 
     @property
     def settled(self) -> bool:
-        """Whether the state stays as it is until somebody asks or something breaks."""
+        """Whether only a request or a fault changes the state."""
         return self not in (PreviewState.STARTING, PreviewState.STOPPING)
 
 
 class PreviewProfile(Enum):
-    """How much bandwidth the preview may take."""
+    """Bandwidth profile of the preview."""
 
     UNKNOWN = "unknown"
-    """In an answer: none was ever chosen. In a request: keep the current one."""
+    """In an answer: none was chosen yet. In a request: keep the current one."""
     LOW_BW = "low-bw"
     BALANCED = "balanced"
     HIGH_QUALITY = "high-quality"
 
 
 class VideoCodec(Enum):
-    """How the pictures are compressed."""
+    """Codec of the video."""
 
     UNKNOWN = "unknown"
     H264 = "h264"
@@ -43,14 +43,14 @@ class VideoCodec(Enum):
 
 
 class StreamTransport(Enum):
-    """How the stream reaches the viewer."""
+    """Transport of the stream."""
 
     UNKNOWN = "unknown"
     SRT = "srt"
 
 
 class StreamContainer(Enum):
-    """What the compressed pictures are packed in."""
+    """Container of the encoded frames."""
 
     UNKNOWN = "unknown"
     MPEG_TS = "mpeg-ts"
@@ -58,16 +58,16 @@ class StreamContainer(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StreamEndpoint:
-    """Everything a viewer needs to open the stream."""
+    """Address and parameters that a viewer needs to open the stream."""
 
     transport: StreamTransport
     host: str
     port: int
     """The UDP port the robot listens on while the preview runs."""
     uri: str
-    """The whole address, ready for a player; without the passphrase."""
+    """The stream's URI for a player, without the passphrase."""
     latency_ms: int
-    """The robot's SRT latency. The larger of both sides counts: ask for this value."""
+    """The robot's SRT latency. The larger of both peers' values is in effect."""
     codec: VideoCodec
     container: StreamContainer
     encrypted: bool
@@ -77,19 +77,19 @@ class StreamEndpoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encoder:
-    """Which encoder makes the stream, and whether it is the one that was wanted."""
+    """The encoder in use, and the robot's first choice."""
 
     name: str
     hardware: bool
     wanted: str
     fallback_reason: str
-    """Why the wanted one does not run. Empty when it does."""
+    """Why the first choice (`wanted`) is not in use. Empty when it is."""
     codec: VideoCodec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VideoFormat:
-    """Size and rate of the pictures that the profile asks for."""
+    """Frame size and rate of the profile."""
 
     width_px: int
     height_px: int
@@ -98,42 +98,42 @@ class VideoFormat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewMeasurement(Sample):
-    """Figures taken from the running stream, twice a second."""
+    """Measurements of the running stream, twice a second."""
 
     fps: float | None
     bitrate_kbps: float | None
     viewer_count: int | None
     last_frame_age_ms: int | None
-    """Age of the newest encoded picture. None before the first one."""
+    """Age of the newest encoded frame. None before the first one."""
     worst_rtt_ms: float | None
-    """Of all viewers. None without viewers."""
+    """Longest round trip of any viewer. None without viewers."""
     worst_loss_percent: float | None
-    """Of all viewers, before retransmission. None without viewers."""
+    """Largest packet loss of any viewer, before retransmission. None without viewers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewCounters:
-    """Event counts since the gateway started."""
+    """Counters since the gateway started."""
 
     starts: int
     restarts: int
     """Starts by the robot itself after a fault."""
     faults: int
     fallbacks: int
-    """Times an encoder was passed over for the next one."""
+    """Times an encoder failed and the next one was used."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewStatus:
-    """The live preview as the gateway knows it."""
+    """Status of the live preview."""
 
     state: PreviewState
     profile: PreviewProfile
-    """In force, or, while disabled, what the next enable will use."""
+    """The current one or, while disabled, that of the next start."""
     last_error: str
-    """What went wrong last and what to do. Empty while it works."""
+    """The newest error and its remedy. Empty while the preview works."""
     endpoint: StreamEndpoint | None
-    """None until the preview service has told what it serves."""
+    """None until the preview service has reported it."""
     encoder: Encoder | None
     """None while no pipeline exists."""
     video: VideoFormat | None
@@ -141,16 +141,16 @@ class PreviewStatus:
     target_bitrate_kbps: int
     """0 while no pipeline exists."""
     bitrate_reason: str
-    """Why the target is what it is, when the robot changed it on its own. Else empty."""
+    """Why the robot has changed the target by itself. Empty while it has not."""
     measured: PreviewMeasurement
     counters: PreviewCounters
     service_reachable: bool
-    """Whether the program that makes the video answers the gateway."""
+    """Whether the preview service answers the gateway."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewChange:
-    """What became of a wish to turn the preview on or off."""
+    """Answer to a preview request."""
 
     accepted: bool
     message: str

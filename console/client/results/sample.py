@@ -1,31 +1,31 @@
-"""Freshness: every measured part of an answer says whether it is there and how old it is."""
+"""Freshness of measured values."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Freshness(Enum):
-    """Whether a value may be relied on."""
+    """Freshness of a value."""
 
     MISSING = "missing"
     """Nothing was received since the gateway started."""
     STALE = "stale"
-    """Older than the limit the robot is configured with."""
+    """Older than the limit in the robot's configuration."""
     FRESH = "fresh"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
-    """A measured part of an answer. While `available` is false, all values of the part are None."""
+    """A measured part of an answer. All its values are None while `available` is false."""
 
     available: bool
     stale: bool
     age_ms: int | None
-    """Since the robot's gateway received it, on the gateway's monotonic clock. None when not available."""
+    """Time since the gateway received it, on its monotonic clock. None when not available."""
 
     @property
     def freshness(self) -> Freshness:
-        """The two flags in one word."""
+        """Both flags as one value."""
         if not self.available:
             return Freshness.MISSING
         return Freshness.STALE if self.stale else Freshness.FRESH

@@ -1,4 +1,4 @@
-"""Where the robot's values come from, and whether they do."""
+"""The data sources of the gateway."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -7,32 +7,32 @@ from console.client.results.sample import Sample
 
 
 class SourceState(Enum):
-    """What is known of a source."""
+    """State of a source."""
 
     UNKNOWN = "unknown"
     WAITING = "waiting"
-    """Nothing has come, and nobody on the robot offers it."""
+    """Nothing was received, and nothing on the robot publishes it."""
     SILENT = "silent"
-    """Somebody on the robot offers it, but nothing has come."""
+    """It has a publisher, but nothing was received."""
     RECEIVING = "receiving"
     STALE = "stale"
-    """It came; the newest value is too old."""
+    """The newest value is too old."""
     QOS_MISMATCH = "qos_mismatch"
-    """Offered with delivery guarantees that exclude the gateway's: nothing can come."""
+    """The publisher's QoS is incompatible with the gateway's: nothing can be received."""
     WRONG_TYPE = "wrong_type"
-    """Offered in another form than configured: nothing can come."""
+    """Published with another type than configured: nothing can be received."""
     TYPE_MISSING = "type_missing"
-    """The gateway lacks the message type: nothing can come."""
+    """The gateway lacks the message type: nothing can be received."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source(Sample):
-    """One of the sources that the gateway is configured to read."""
+    """One source in the gateway's configuration."""
 
     name: str
-    """What it tells: "odometry"."""
+    """What it measures: "odometry"."""
     state: SourceState
     required: bool
-    """Whether the robot counts as degraded without it."""
+    """Whether the robot is degraded without it."""
     detail: str
-    """The state in a sentence. Empty while all is well."""
+    """The state as a sentence. Empty while it is received."""

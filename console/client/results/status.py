@@ -12,7 +12,7 @@ from console.client.results.source import Source
 
 
 class HealthState(Enum):
-    """One word for whether the robot can be relied on."""
+    """Overall health of the robot."""
 
     UNKNOWN = "unknown"
     OK = "ok"
@@ -20,7 +20,7 @@ class HealthState(Enum):
 
 
 class TeleopState(Enum):
-    """Whether the robot takes velocity commands from the operator."""
+    """Whether the robot accepts velocity commands from the operator."""
 
     UNKNOWN = "unknown"
     """The gateway has no teleoperation."""
@@ -30,17 +30,17 @@ class TeleopState(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Health:
-    """Whether the robot can be relied on."""
+    """Health of the robot."""
 
     state: HealthState
     ready: bool
     summary: str
-    """One sentence: the first thing that is wrong, or "robot healthy"."""
+    """One sentence: the most severe condition, or "robot healthy"."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Odometry(Sample):
-    """How the robot moves, in its own frame: x forward, y left, turning counter-clockwise from above."""
+    """Measured velocity in the robot's frame (REP 103): x forward, y left, turning counter-clockwise."""
 
     linear_speed_mps: float | None
     """Speed over ground, never negative."""
@@ -53,7 +53,7 @@ class Odometry(Sample):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vision(Sample):
-    """The robot's vision process, from its own report. Counts are since that process started."""
+    """Figures that the robot's vision process reports. Counts are since that process started."""
 
     producer_fps: float | None
     """Frames per second taken from the camera."""
@@ -82,13 +82,13 @@ class Teleop:
     max_linear_mps: float
     max_angular_rad_s: float
     last_error: str
-    """Why the newest command was refused. Empty when it was not."""
+    """Why the newest command was refused. Empty when it was accepted."""
     last_command: TeleopCommand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EffectiveCommand(Sample):
-    """The velocity command the robot is following, whoever gave it, in the robot's own frame."""
+    """The velocity command in effect, from any source, in the robot's frame."""
 
     vx_mps: float | None
     vy_mps: float | None
@@ -99,20 +99,20 @@ class EffectiveCommand(Sample):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mission(Sample):
-    """What the robot is about. One that tells its mode only when it changes still has it when stale."""
+    """The robot's task. A mode that is published on change only stays valid when stale."""
 
     mode: str | None
-    """In the robot's own words."""
+    """As the robot names it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SystemStatus:
-    """Everything a gateway knows about its robot, at one instant."""
+    """Status of the whole robot at one instant."""
 
     gateway_name: str
     gateway_version: str
     insecure: bool
-    """Whether the gateway talks without encryption to the network, by its owner's explicit choice."""
+    """Whether the gateway serves the network without encryption, by explicit configuration."""
     health: Health
     odometry: Odometry
     vision: Vision
@@ -121,8 +121,27 @@ class SystemStatus:
     effective_command: EffectiveCommand
     teleop: Teleop
     faults: tuple[Fault, ...]
-    """What is wrong, the worst first; then what was wrong a moment ago, the newest first."""
+    """Active faults, the most severe first; then cleared ones, the newest first."""
     mission: Mission
     sources: tuple[Source, ...]
-    """Everything the gateway is configured to read."""
+    """All sources in the gateway's configuration."""
     gateway: GatewayFacts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchedStatus:
+    """A status with its time on the robot's monotonic clock."""
+
+    status: SystemStatus
+    monotonic_ns: int | None
+    """None where an older gateway was polled."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotTime:
+    """Both clocks of the robot's computer, read together."""
+
+    monotonic_ns: int
+    wall_clock_unix_ns: int
+    boot_id: str | None
+    """Kernel boot ID: the monotonic clock starts again with each boot."""

@@ -38,7 +38,7 @@ class PreviewControl:
         desired = self._link.desired
         spec, state = desired.spec, self._link.view.state
         same = spec.enabled == enabled and (not enabled or profile in {None, spec.profile})
-        if same and state is PreviewState.RUNNING and await self._link.settles(desired, 0):
+        if same and state is PreviewState.RUNNING and self._link.settled(desired):
             return f"preview is already running, {spec.profile_name}; nothing changed"
         # The same request again makes a faulted preview retry at once.
         if not same or (enabled and state is PreviewState.FAULTED):
@@ -46,7 +46,7 @@ class PreviewControl:
         patience_s = self._settle_s
         if remaining_s is not None:
             patience_s = max(0.0, min(patience_s, remaining_s - DEADLINE_MARGIN_S))
-        await self._link.settles(desired, patience_s)
+        await self._link.wait_until_settled(desired, patience_s)
         if self._link.desired.revision != desired.revision:
             return f"replaced by a newer request: preview {self._link.desired.spec}"
         return _result(desired.spec, self._link.view)

@@ -54,7 +54,7 @@ class PreviewModel:
         return spec, False
 
     def take_report(self, spec: PreviewSpec, report: PreviewReport, *, reapplying: bool) -> None:
-        """Counts."""
+        """Adds the counters to the totals."""
         if reapplying and spec.enabled:
             self._totals.next_start_is_restart()
         self._totals.take(report.instance_id, report.counters)

@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -107,6 +107,7 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         raise LinkLostError(
             f"it reports the unknown state number {message.state}; its version does not match"
         )
+    codec = CODECS.get(message.stream.codec)
     return PreviewReport(
         instance_id=message.instance_id,
         applied_revision=message.applied_revision,
@@ -114,19 +115,15 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         profile=_PROFILE_OF.get(message.profile),
         last_error=message.last_error,
         listener=_equal(Listener, message.listener) if message.HasField("listener") else None,
-        stream=_stream(message.stream) if message.HasField("stream") else None,
+        stream=_equal(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
         encoder=_equal(Encoder, message.encoder) if message.HasField("encoder") else None,
         measurement=_equal(Measurement, message.measurement) if message.HasField("measurement") else None,
         counters=_equal(Counters, message.counters),
     )
 
 
-def _stream(message: pb.Stream) -> Stream:
-    return replace(_equal(Stream, message), codec=CODECS.get(message.codec))
-
-
-def _equal(kind: type[ValueT], message: Message) -> ValueT:
-    """Returns the equally named fields of a message; None for an optional one that is unset."""
+def _equal(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
+    """Returns the equally named fields of a message, None for an unset optional one, and those converted."""
     unset = {f.name for f in message.DESCRIPTOR.fields if f.has_presence and not message.HasField(f.name)}
     values: Any = {f.name: None if f.name in unset else getattr(message, f.name) for f in fields(kind)}
-    return kind(**values)
+    return kind(**(values | converted))

@@ -8,11 +8,11 @@ from google.protobuf.message import Message
 
 from common.errors import DomainError, NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.interceptors import Interceptor
-from gateway.access.attempts import Attempts
+from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
 from gateway.rpc.ports import AuditTrail, EventSink
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 _COMPONENT: Final = "gateway"
 _MAX_TEXT: Final = 200
@@ -25,13 +25,13 @@ class Audit(Interceptor[CallContext]):
     Args:
         events: operators see the actions there.
         trail: keeps them.
-        attempts: limits how many refusals of one caller are recorded: a flood of them must fill neither.
+        refusals: limits how many refusals of one caller are recorded: a flood of them must fill neither.
     """
 
-    def __init__(self, events: EventSink, trail: AuditTrail, attempts: Attempts) -> None:
+    def __init__(self, events: EventSink, trail: AuditTrail, refusals: RefusalLimiter) -> None:
         self._events = events
         self._trail = trail
-        self._attempts = attempts
+        self._refusals = refusals
         self._answers: dict[CallContext, str] = {}
 
     def on_response(self, call: CallContext, response: Any) -> None:
@@ -45,7 +45,7 @@ class Audit(Interceptor[CallContext]):
         if not call.method.changes_robot:
             return
         if isinstance(error, NotAuthenticatedError | NotAllowedError):
-            left_out = self._attempts.left_out(call.principal.name if call.principal else call.peer.site)
+            left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
             if left_out is None:
                 return
             more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""

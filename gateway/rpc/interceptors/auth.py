@@ -13,8 +13,8 @@ from common.errors import NotAllowedError, NotAuthenticatedError
 from common.grpc_errors import STATUS_CODES, metadata_of
 from common.interceptors import Interceptor, RpcContext
 from common.reasons import Reason
+from gateway.access.authenticator import Authenticator, combined
 from gateway.access.credential import Principal
-from gateway.access.keyring import Keyring, both
 from gateway.access.lockout import Lockout
 from gateway.rpc.call import CallContext
 from gateway.rpc.methods import Method, Open
@@ -38,7 +38,7 @@ class Auth(Interceptor[CallContext]):
     """Refuses callers without a valid credential, or whose role does not suffice.
 
     Args:
-        keyring: knows the credentials.
+        authenticator: knows the credentials.
         lockout: delays those who show wrong ones.
         files: read again when an unknown credential is shown.
         stream_key: renewed when a caller that was admitted loses access.
@@ -47,14 +47,14 @@ class Auth(Interceptor[CallContext]):
 
     def __init__(
         self,
-        keyring: Keyring,
+        authenticator: Authenticator,
         lockout: Lockout,
         files: CredentialFiles,
         stream_key: StreamKey,
         *,
         certificates: bool,
     ) -> None:
-        self._keyring = keyring
+        self._authenticator = authenticator
         self._lockout = lockout
         self._files = files
         self._stream_key = stream_key
@@ -93,14 +93,13 @@ class Auth(Interceptor[CallContext]):
 
     async def revoke(self) -> None:
         """Ends every stream whose credential is no longer valid, and renews the secret its caller knows."""
-        lost = [ids for ids, each in self._admitted.items() if not self._keyring.still_valid(each)]
+        lost = [ids for ids, each in self._admitted.items() if not self._authenticator.still_valid(each)]
         for credential_ids in lost:
             del self._admitted[credential_ids]
         if lost:
             self._stream_key.renew_passphrase()
-        ending = [
-            call for call in self._streams if call.principal and not self._keyring.still_valid(call.principal)
-        ]
+        valid = self._authenticator.still_valid
+        ending = [call for call in self._streams if call.principal and not valid(call.principal)]
         await asyncio.gather(*(self._end(call, self._streams.pop(call)) for call in ending))
 
     async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
@@ -128,25 +127,27 @@ class Auth(Interceptor[CallContext]):
                 "this robot asks callers for a credential; type: robotctl login", Reason.CREDENTIAL_MISSING
             )
         if not self._knows(token, fingerprint):
-            await self._files.look_for_unknown()
-        by_certificate = self._keyring.of_certificate(fingerprint) if fingerprint is not None else None
+            await self._files.reload_for_unknown()
+        by_certificate = None
+        if fingerprint is not None:
+            by_certificate = self._authenticator.authenticate_certificate(fingerprint)
         by_token = self._of_token(call, token) if token is not None else None
         if by_certificate and by_token:
-            return both(by_certificate, by_token)
+            return combined(by_certificate, by_token)
         found = by_certificate or by_token
         assert found is not None, "one of them was shown"
         return found
 
     def _knows(self, token: str | None, fingerprint: str | None) -> bool:
-        return (token is None or bool(self._keyring.owner(token))) and (
-            fingerprint is None or self._keyring.knows_certificate(fingerprint)
+        return (token is None or bool(self._authenticator.id_of_token(token))) and (
+            fingerprint is None or self._authenticator.knows_certificate(fingerprint)
         )
 
     def _of_token(self, call: CallContext, token: str) -> Principal:
-        host, owner = call.peer.host, self._keyring.owner(token)
+        host, owner = call.peer.host, self._authenticator.id_of_token(token)
         self._lockout.admit(host, owner)
         try:
-            principal = self._keyring.of_token(token)
+            principal = self._authenticator.authenticate_token(token)
         except NotAuthenticatedError as error:
             # An expired or revoked token is no guess: its secret was right.
             if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(host, owner):

@@ -9,7 +9,7 @@ from common.interceptors import Interceptor
 from gateway.rpc.call import CallContext
 from gateway.rpc.ports import EventSink
 from gateway.status.event import ClientJoined, ClientLeft, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 JOINED_AFTER_S: Final = 2.0
 """How long a stream has been open before its client has joined: one look at the status, or a client that

@@ -1,4 +1,4 @@
-"""Events, as the contract tells them."""
+"""Events as messages of the contract."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -23,7 +23,7 @@ _NS_PER_S: Final = 1_000_000_000
 
 
 def event_message(event: Event, run_id: str) -> pb.Event:
-    """One event of this run."""
+    """Returns one event of this run."""
     news = event.news
     field, payload = _PAYLOADS[type(news.detail)]
     message = pb.Event(
@@ -40,19 +40,19 @@ def event_message(event: Event, run_id: str) -> pb.Event:
 
 
 def gap_message(gap: Gap) -> pb.EventGap:
-    """Events are missing."""
+    """Returns the notice that events are missing."""
     return pb.EventGap(
         reason=GAP_REASONS[gap.reason], missed_count=gap.missed, position=position_message(gap.position)
     )
 
 
 def position_message(position: Position) -> pb.EventPosition:
-    """A place in the order of events."""
+    """Returns the position in the event log."""
     return pb.EventPosition(run_id=position.run_id, sequence=position.sequence)
 
 
 def position_from(message: pb.EventPosition) -> Position:
-    """The place a client wants to go on from."""
+    """Returns the position after which a client resumes."""
     return Position(message.run_id, message.sequence)
 
 
@@ -95,4 +95,4 @@ _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
     ControlAction: ("control_action", _control),
     ModeChanged: ("robot_mode_changed", lambda detail, _: pb.RobotModeChanged(mode=detail.mode)),
 }
-"""Total: a test walks every kind of event, and every payload of the schema."""
+"""Total: a test checks every kind of event, and every payload of the schema."""

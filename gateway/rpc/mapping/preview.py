@@ -1,9 +1,10 @@
-"""The live preview as the contract tells it."""
+"""The live preview as messages of the contract."""
 
 from typing import Final
 
 from common.bind import bracketed
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.recipient import Recipient
 from gateway.status.freshness import Sample
 from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
@@ -23,7 +24,7 @@ _NO_STREAM: Final = Stream(
 def preview_status(
     preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
 ) -> pb.PreviewStatus:
-    """The preview as `recipient` may see it."""
+    """Returns the preview as `recipient` may see it."""
     stream = preview.stream or _NO_STREAM
     encoder = preview.encoder
     return pb.PreviewStatus(
@@ -74,15 +75,12 @@ def _video(stream: Stream) -> pb.VideoFormat:
 
 
 def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
-    freshness = sample.freshness
     return pb.StreamMeasurement(
-        available=freshness.available,
-        stale=freshness.stale,
-        age_ms=freshness.age_ms,
+        **freshness_fields(sample.freshness),
         fps=measurement.fps,
         bitrate_kbps=measurement.bitrate_kbps,
         viewer_count=measurement.viewer_count,
-        last_frame_age_ms=measurement.last_frame_age_ms + freshness.age_ms,
+        last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
     )

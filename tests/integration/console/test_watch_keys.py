@@ -138,12 +138,12 @@ def test_a_key_never_holds_up_the_redraw_nor_the_next_key() -> None:
         try:
             screen.wait_to_see("q quit")
             screen.press("p")
-            screen.wait_to_see("preview on: the robot is asked ...")
+            screen.wait_to_see("preview on: request sent ...")
             assert slow.asked.wait(10)
             slow.status.health.measured_vx_mps = slow.status.health.linear_speed_mps = 1.25
             screen.wait_to_see("1.25 m/s")
             screen.press("p12")
-            screen.wait_to_see("the robot is asked ...")
+            screen.wait_to_see("request sent ...")
             screen.press("q")
             left_in_order(screen)
             assert not slow.wishes, "it did not wait for the answer"

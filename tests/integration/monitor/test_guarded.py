@@ -100,11 +100,11 @@ def test_a_viewer_sees_which_role_is_missing_and_goes_on_watching(robot: Guarded
 def test_a_revoked_login_is_reported_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
     robot.log_in("carla", Role.OPERATOR)
     with in_front_of(robot) as carla:
-        robot.keeper.revoke("carla")
+        robot.admin.revoke("carla")
         carla.link_is("not allowed")
         banner = carla.window.banner
         assert banner.isVisible()
-        assert "was revoked. Ask whoever keeps this robot" in banner.text.text()
+        assert "was revoked. Ask this robot's administrator" in banner.text.text()
         assert "robotctl login" in banner.text.text()
         assert not carla.window.preview.switch.isEnabled()
         let_pass(WATCHED_S)
@@ -143,7 +143,7 @@ def test_another_certificate_is_taken_over_like_another_token(tmp_path: Path) ->
     with guarded_program(tmp_path / "robot", tmp_path / "laptop", Kind.CERTIFICATE) as robot:
         robot.log_in("emma", Role.OPERATOR)
         with in_front_of(robot) as emma:
-            robot.keeper.revoke("emma")
+            robot.admin.revoke("emma")
             emma.link_is("not allowed")
             assert "the certificate of emma" in emma.window.banner.text.text()
             robot.log_in("emma", Role.OPERATOR)

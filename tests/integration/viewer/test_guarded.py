@@ -55,7 +55,7 @@ def test_a_viewer_by_the_robots_name_sees_an_encrypted_stream(robot: Guarded) ->
 def test_without_a_valid_login_there_is_no_video(robot: Guarded) -> None:
     robot.switch_on()
     robot.log_in("carl", Role.VIEWER)
-    robot.keeper.revoke("carl")
+    robot.admin.revoke("carl")
     wait_until(lambda: view(robot)[0] == 1, "carl is refused", SHOWN_WITHIN_S)
     code, said, complaints = view(robot)
     assert (code, said) == (1, "")
@@ -76,7 +76,7 @@ def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Gua
             lambda: "dora is viewer, and SetPreviewMode needs operator" in window.notes.text(),
             "what is missing",
         )
-        robot.keeper.revoke("dora")
+        robot.admin.revoke("dora")
         until(
             lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
             "no access",
@@ -85,7 +85,7 @@ def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Gua
         card = banner(window.robot.session.playback())
         assert card
         assert (
-            "was revoked. Ask whoever keeps this robot for access, then type: robotctl login" in card.detail
+            "was revoked. Ask this robot's administrator for access, then type: robotctl login" in card.detail
         )
         robot.log_in("dora", Role.OPERATOR)
         until(
@@ -95,7 +95,7 @@ def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Gua
         )
         press(window, Qt.Key.Key_P)
         until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
-        robot.keeper.revoke("dora")
+        robot.admin.revoke("dora")
         # The video ends, too: the stream has another passphrase from then on, which she does not get.
         until(
             lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
@@ -114,7 +114,7 @@ def test_after_a_revocation_the_other_viewers_reconnect_by_themselves(robot: Gua
     assert known
     with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
         until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
-        robot.keeper.revoke("emil")
+        robot.admin.revoke("emil")
         with robot.client() as client:
             wait_until(
                 lambda: (

@@ -170,7 +170,7 @@ def seeing(
             bbox_height_px=box.height,
         )
     with RunningPreview(directory, settings) as preview, serving(double) as port:
-        preview.wish()
+        preview.enable()
         preview.running()
         shown = double.status.preview
         shown.state = states.PREVIEW_RUNNING

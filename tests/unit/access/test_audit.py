@@ -71,8 +71,8 @@ def test_a_full_disk_leaves_no_half_line_and_is_told(tmp_path: Path, monkeypatch
         for number in range(10):
             log.record(action(number))
         wait_until(lambda: log.lost > 0, "a line is lost")
-        wait_until(lambda: log.trouble, "the trouble is told")
-        assert "No space left" in log.trouble
+        wait_until(lambda: log.error, "the trouble is told")
+        assert "No space left" in log.error
     kept = lines(tmp_path / "a")
     assert kept == [str(number) for number in range(len(kept))]
     assert 0 < len(kept) < 10
@@ -94,7 +94,7 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.M
         for number in range(1000):
             log.record(action(number))
         assert log.lost == 1000 - 256
-        assert "too slow" in log.trouble
+        assert "too slow" in log.error
         goes_on.set()
 
 

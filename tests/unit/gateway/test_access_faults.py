@@ -2,16 +2,16 @@
 
 import pytest
 
-from gateway.status.access import UNGUARDED, AccessView, CertificateEnd
+from gateway.status.access import UNGUARDED, AccessView, CertificateExpiry
+from gateway.status.fault import Severity
 from gateway.status.faults.access import access_faults
-from gateway.status.faults.fault import Severity
 
 DAY_S = 86_400.0
 
 
 def ending(left_s: float) -> AccessView:
     return AccessView(
-        (CertificateEnd("server_certificate", "the certificate", "2027-03-01", left_s, "rotate"),)
+        (CertificateExpiry("server_certificate", "the certificate", "2027-03-01", left_s, "rotate"),)
     )
 
 

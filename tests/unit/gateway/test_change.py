@@ -1,16 +1,17 @@
 """What wakes watchers, and what does not."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
 
-from gateway.status.board import Board, SourceKind
-from gateway.status.change import essence
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.board import Board
+from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Counters, Measurement, PreviewState, PreviewView
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.values import Mode, Odometry, Received
 
 OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
@@ -20,8 +21,10 @@ FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"),
 def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
     values: dict[str, Any] = {
         "identity": Identity("t", "0", insecure=False),
-        "rules": Rules({SourceKind.ODOMETRY: SourceRule(1000, required=True)}, 3000),
-        "board": Board(odometry=Received(Odometry(0.5, 0, 0), 99.9), mode=Received(Mode("idle"), 99.0)),
+        "rules": Rules(
+            {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(60_000, required=False)}, 3000
+        ),
+        "board": Board({ODOMETRY: Received(Odometry(0.5, 0, 0), 99.9), MODE: Received(Mode("idle"), 99.0)}),
         "preview": replace(OFF, measured=Received(Measurement(30, 2500, 1, 10, None, None), 99.9)),
         "events": (),
         "faults": (FAULT,),
@@ -31,7 +34,7 @@ def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
     return take(**(values | changed))
 
 
-BEFORE = essence(snapshot())
+BEFORE = change_key(snapshot())
 
 
 @pytest.mark.parametrize(
@@ -41,7 +44,9 @@ BEFORE = essence(snapshot())
         pytest.param(snapshot(gateway=Runtime("r", "b", 2000, 7, 99, 3)), id="others ask"),
         pytest.param(
             snapshot(
-                board=Board(odometry=Received(Odometry(0.5, 0, 0), 99.99), mode=Received(Mode("idle"), 99.5))
+                board=Board(
+                    {ODOMETRY: Received(Odometry(0.5, 0, 0), 99.99), MODE: Received(Mode("idle"), 99.5)}
+                )
             ),
             id="the same values come again",
         ),
@@ -49,13 +54,15 @@ BEFORE = essence(snapshot())
     ],
 )
 def test_this_is_no_change(later: Snapshot) -> None:
-    assert essence(later) == BEFORE
+    assert change_key(later) == BEFORE
 
 
 @pytest.mark.parametrize(
     "later",
     [
-        pytest.param(snapshot(board=Board(odometry=Received(Odometry(0.6, 0, 0), 99.9))), id="another speed"),
+        pytest.param(
+            snapshot(board=Board({ODOMETRY: Received(Odometry(0.6, 0, 0), 99.9)})), id="another speed"
+        ),
         pytest.param(snapshot(now_s=101.5), id="it grows stale"),
         pytest.param(snapshot(faults=()), id="a fault is gone"),
         pytest.param(snapshot(faults=(replace(FAULT, cleared_s=100.0),)), id="a fault is over"),
@@ -67,4 +74,9 @@ def test_this_is_no_change(later: Snapshot) -> None:
     ],
 )
 def test_this_is_a_change(later: Snapshot) -> None:
-    assert essence(later) != BEFORE
+    assert change_key(later) != BEFORE
+
+
+def test_every_field_of_the_snapshot_is_projected_or_excluded_by_name() -> None:
+    assert PROJECTIONS.keys() | EXCLUDED == {field.name for field in fields(Snapshot)}
+    assert not PROJECTIONS.keys() & EXCLUDED

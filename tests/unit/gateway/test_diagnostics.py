@@ -3,8 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.status.diagnostics import COMPONENTS_KEPT, merged
-from gateway.status.values import DiagnosticItem, DiagnosticLevel, Diagnostics
+from gateway.status.values import MAX_COMPONENTS, DiagnosticItem, DiagnosticLevel, Diagnostics
 
 
 def said(*items: tuple[str, str]) -> Diagnostics:
@@ -12,19 +11,19 @@ def said(*items: tuple[str, str]) -> Diagnostics:
 
 
 def test_a_message_changes_only_what_it_names() -> None:
-    known = merged(said(("drive", "a"), ("arm", "b")), said(("drive", "c")))
+    known = said(("drive", "a"), ("arm", "b")).merged(said(("drive", "c")))
     assert {item.component: item.message for item in known.items} == {"drive": "c", "arm": "b"}
 
 
 def test_a_component_named_twice_has_the_later_word() -> None:
-    assert merged(said(), said(("drive", "a"), ("drive", "b"))) == said(("drive", "b"))
+    assert said().merged(said(("drive", "a"), ("drive", "b"))) == said(("drive", "b"))
 
 
 def test_too_many_components_forget_those_who_are_silent_longest() -> None:
-    known = said(*((str(number), "") for number in range(COMPONENTS_KEPT)))
-    known = merged(known, said(("0", "still here"), ("new", "")))
+    known = said(*((str(number), "") for number in range(MAX_COMPONENTS)))
+    known = known.merged(said(("0", "still here"), ("new", "")))
     names = [item.component for item in known.items]
-    assert len(names) == COMPONENTS_KEPT
+    assert len(names) == MAX_COMPONENTS
     assert names[-2:] == ["0", "new"]
     assert "1" not in names
 
@@ -40,7 +39,7 @@ def test_too_many_components_forget_those_who_are_silent_longest() -> None:
 def test_the_last_word_of_each_is_kept_whatever_comes(messages: list[Diagnostics]) -> None:
     known, model = said(), {}
     for message in messages:
-        known = merged(known, message)
+        known = known.merged(message)
         model |= {item.component: item for item in message.items}
     assert {item.component: item for item in known.items} == model
     assert len(known.items) == len(model)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from common.errors import InvalidRequestError
 from gateway.status.event import ModeChanged, News
 from gateway.status.events import ON_OVERLAY, EventLog, Gap, GapReason, Position
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 
 
 def news(words: str, sentence: str | None = None) -> News:

@@ -20,7 +20,7 @@ from gateway.status.event import (
     PreviewChanged,
 )
 from gateway.status.events import Gap, GapReason, Position
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import PreviewState, Profile
 from omniseer.gateway.v1.event_pb2 import Event as EventMessage
 

@@ -1,10 +1,11 @@
 from dataclasses import replace
 
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.event import EncoderFallback, FaultRaised, News, PreviewChanged
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.values import Mode, Odometry, Received
 from tests.support.fault_rules import new_observer
 
@@ -24,7 +25,7 @@ OFF = PreviewView(
 def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> Snapshot:
     return take(
         identity=Identity("t", "0", insecure=False),
-        rules=Rules({SourceKind.ODOMETRY: SourceRule(1000, required=True)}, 3000),
+        rules=Rules({ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(0, required=False)}, 3000),
         board=board,
         preview=preview,
         events=(),
@@ -44,14 +45,14 @@ def test_the_first_look_is_the_ground_and_no_news() -> None:
 def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
     observer, board = new_observer(startup_grace_s=0.2), Board()
     assert sentences(observer.observe(snapshot(board, now_s=99.0))) == []
-    missing = "no odometry since the gateway started, and nobody on the robot offers it"
+    missing = "no odometry since the gateway started, and nothing on the robot publishes it"
     assert sentences(observer.observe(snapshot(board, now_s=99.2))) == [f"error: {missing}"]
-    board.odometry = Received(Odometry(0, 0, 0), at_s=100.0)
-    assert sentences(observer.observe(snapshot(board, now_s=100.1))) == [f"over: {missing}"]
+    board[ODOMETRY] = Received(Odometry(0, 0, 0), at_s=100.0)
+    assert sentences(observer.observe(snapshot(board, now_s=100.1))) == [f"cleared: {missing}"]
     assert sentences(observer.observe(snapshot(board, now_s=100.2))) == []
     assert sentences(observer.observe(snapshot(board, now_s=101.5))) == ["error: odometry stopped coming"]
-    board.odometry = Received(Odometry(0, 0, 0), at_s=102.0)
-    assert sentences(observer.observe(snapshot(board, now_s=102.0))) == ["over: odometry stopped coming"]
+    board[ODOMETRY] = Received(Odometry(0, 0, 0), at_s=102.0)
+    assert sentences(observer.observe(snapshot(board, now_s=102.0))) == ["cleared: odometry stopped coming"]
 
 
 def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
@@ -66,7 +67,7 @@ def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
         assert sentences(observer.observe(snapshot(Board(), faulted))) == []
     running = replace(OFF, state=PreviewState.RUNNING)
     assert sentences(observer.observe(snapshot(Board(), running))) == [
-        f"over: {message}",
+        f"cleared: {message}",
         "preview running, BALANCED",
     ]
 
@@ -117,10 +118,10 @@ def test_a_fallback_to_another_encoder_is_news() -> None:
 
 def test_another_mode_is_news() -> None:
     observer, board = new_observer(startup_grace_s=60), Board()
-    board.mode = Received(Mode("idle"), at_s=99.0)
+    board[MODE] = Received(Mode("idle"), at_s=99.0)
     observer.observe(snapshot(board))
     assert sentences(observer.observe(snapshot(board))) == []
-    board.mode = Received(Mode("exploring"), at_s=100.0)
+    board[MODE] = Received(Mode("exploring"), at_s=100.0)
     assert sentences(observer.observe(snapshot(board))) == ["robot mode: exploring"]
     assert sentences(observer.observe(snapshot(board, now_s=5000.0)))[1:] == []
 
@@ -129,7 +130,7 @@ def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> No
     observer = new_observer()
     observer.observe(snapshot(Board()))
     gone = replace(OFF, service_reachable=False)
-    message = "the preview service does not answer: there can be no video"
+    message = "the preview service does not answer: video is not available"
 
     def news(preview: PreviewView) -> list[str]:
         told = sentences(observer.observe(snapshot(Board(), preview)))
@@ -137,4 +138,4 @@ def test_an_unreachable_service_is_news_and_worse_when_somebody_wants_it() -> No
 
     assert news(gone) == [f"warning: {message}"]
     assert news(replace(gone, state=PreviewState.FAULTED)) == [f"error now: {message}"]
-    assert news(OFF) == [f"over: {message}"]
+    assert news(OFF) == [f"cleared: {message}"]

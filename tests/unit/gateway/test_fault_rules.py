@@ -7,15 +7,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from gateway.fault_settings import FaultSettings, LowerLimit, UpperLimit
-from gateway.status.board import Board, Presence, SourceKind
-from gateway.status.faults.fault import Condition, Severity
+from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
+from gateway.status.board import Board, Publishers
+from gateway.status.fault import Condition, Severity
 from gateway.status.faults.limits import Limit
 from gateway.status.faults.rules import FaultRules, conditions
-from gateway.status.faults.sources import TROUBLES
+from gateway.status.faults.sources import STATE_FAULTS
 from gateway.status.preview import Counters, Encoder, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.sources import SourceState, detail
+from gateway.status.source_view import SourceState, detail
+from gateway.status.sources import (
+    BATTERY,
+    COMPUTE,
+    DETECTIONS,
+    DIAGNOSTICS,
+    MODE,
+    NETWORK,
+    ODOMETRY,
+    ONBOARD_BATTERY,
+    SOURCES,
+)
 from gateway.status.values import (
     Battery,
     Compute,
@@ -34,6 +45,7 @@ RULES = FaultRules(LIMITS, startup_grace_s=5.0)
 OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
 COOL = Compute(10.0, 50.0, False, 1, 4, 50.0)
 STRONG = Network("wlan0", True, -50, 90)
+BY_NAME = {spec.name: spec for spec in SOURCES}
 FULL = Battery(True, 15.0, 90.0, False)
 
 
@@ -45,17 +57,19 @@ def board(
     at_s: float = NOW_S,
 ) -> Board:
     return Board(
-        compute=Received(compute, at_s),
-        network=Received(network, at_s),
-        battery=Received(battery, at_s),
-        onboard_battery=Received(onboard, at_s),
+        {
+            COMPUTE: Received(compute, at_s),
+            NETWORK: Received(network, at_s),
+            BATTERY: Received(battery, at_s),
+            ONBOARD_BATTERY: Received(onboard, at_s),
+        }
     )
 
 
 def snapshot(of: Board, preview: PreviewView = OFF, **required: bool) -> Snapshot:
     return take(
         identity=Identity("t", "0", insecure=False),
-        rules=Rules({SourceKind(kind): SourceRule(1000, must) for kind, must in required.items()}, 3000),
+        rules=Rules({BY_NAME[name]: SourceRule(1000, must) for name, must in required.items()}, 3000),
         board=of,
         preview=preview,
         events=(),
@@ -69,14 +83,14 @@ def found(of: Snapshot, active: frozenset[str] = frozenset(), up_s: float = 100.
 
 def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:
     well = board()
-    well.odometry = Received(Odometry(0, 0, 0), NOW_S)
+    well[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S)
     assert found(snapshot(well, odometry=True, battery=False)) == {}
 
 
 def test_every_state_of_a_source_has_its_verdict() -> None:
-    assert set(TROUBLES) == set(SourceState)
+    assert set(STATE_FAULTS) == set(SourceState)
     for state in SourceState:
-        assert bool(detail(state, "odometry", None)) == (TROUBLES[state] is not None)
+        assert bool(detail(state, "odometry", None)) == (STATE_FAULTS[state] is not None)
 
 
 @pytest.mark.parametrize(
@@ -94,48 +108,48 @@ def test_a_source_that_does_not_come(
     at_s: float | None, required: bool, up_s: float, expected: dict[str, Severity]
 ) -> None:
     of = board()
-    of.odometry = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
 
 
 @pytest.mark.parametrize(
-    ("presence", "at_s", "expected"),
+    ("publishers", "at_s", "expected"),
     [
-        (Presence(1), None, "odometry.silent"),
-        (Presence(2, qos_mismatch="x"), None, "odometry.qos_mismatch"),
-        (Presence(1, wrong_type=True), None, "odometry.wrong_type"),
-        (Presence(0), None, "odometry.missing"),
-        (Presence(1), NOW_S - 2, "odometry.stale"),
-        (Presence(1, qos_mismatch="x"), NOW_S - 2, "odometry.qos_mismatch"),
-        (Presence(0), NOW_S - 2, "odometry.stale"),
-        (Presence(1, wrong_type=True), NOW_S, None),
+        (Publishers(1), None, "odometry.silent"),
+        (Publishers(2, qos_mismatch="x"), None, "odometry.qos_mismatch"),
+        (Publishers(1, wrong_type=True), None, "odometry.wrong_type"),
+        (Publishers(0), None, "odometry.missing"),
+        (Publishers(1), NOW_S - 2, "odometry.stale"),
+        (Publishers(1, qos_mismatch="x"), NOW_S - 2, "odometry.qos_mismatch"),
+        (Publishers(0), NOW_S - 2, "odometry.stale"),
+        (Publishers(1, wrong_type=True), NOW_S, None),
     ],
 )
-def test_why_a_source_does_not_come(presence: Presence, at_s: float | None, expected: str | None) -> None:
+def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, expected: str | None) -> None:
     of = board()
-    of.odometry = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
-    of.presence["odometry"] = presence
+    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of.publishers[ODOMETRY] = publishers
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
 
 def test_two_publishers_of_one_source_are_said_so() -> None:
     of = board()
-    of.odometry, of.presence["odometry"] = Received(Odometry(0, 0, 0), NOW_S), Presence(2)
+    of[ODOMETRY], of.publishers[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S), Publishers(2)
     (source,) = snapshot(of, odometry=True).sources
-    assert (source.state, source.detail[:24]) == (SourceState.RECEIVING, "2 programs offer odometr")
+    assert (source.state, source.detail[:24]) == (SourceState.RECEIVING, "2 programs publish odome")
 
 
 def test_a_mode_that_does_not_change_is_no_fault() -> None:
     of = board()
-    of.mode = Received(Mode("idle"), NOW_S - 100)
+    of[MODE] = Received(Mode("idle"), NOW_S - 100)
     assert found(snapshot(of, mode=False)) == {}
     assert set(found(snapshot(of, mode=True))) == {"mode.stale"}
 
 
 def reported(*items: DiagnosticItem) -> dict[str, Condition]:
     of = board()
-    of.diagnostics = Received(Diagnostics(items), NOW_S)
+    of[DIAGNOSTICS] = Received(Diagnostics(items), NOW_S)
     return found(snapshot(of, diagnostics=False))
 
 
@@ -152,7 +166,7 @@ def test_components_in_trouble_are_faults_and_others_are_not() -> None:
     }
     motor = faults["diagnostics.drive_left_motor_current"]
     assert motor.message == "drive left_motor: Current: over current"
-    assert faults["diagnostics.lidar"].message == "lidar: nothing is heard of it"
+    assert faults["diagnostics.lidar"].message == "lidar: has stopped reporting"
 
 
 def test_names_that_are_no_names_and_texts_without_end() -> None:
@@ -168,7 +182,7 @@ def test_names_that_are_no_names_and_texts_without_end() -> None:
 
 def test_a_type_that_is_not_installed_is_told_at_once_and_names_no_type() -> None:
     of = board()
-    of.unusable["detections"] = "message type yolo_msgs/msg/DetectionArray is not installed"
+    of.unusable[DETECTIONS] = "message type yolo_msgs/msg/DetectionArray is not installed"
     faults = found(snapshot(of, detections=False), up_s=0.0)
     assert set(faults) == {"detections.type_missing"}
     assert "yolo" not in str(faults)

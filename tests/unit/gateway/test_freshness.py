@@ -3,11 +3,12 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
 from gateway.status.health import Health, HealthState, assess
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, SourceRule, take
+from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Odometry, Received, Vision
 
 SECONDS = st.floats(min_value=0, max_value=1e7, allow_nan=False)
@@ -81,10 +82,10 @@ def test_health_follows_the_contract_line_by_line(
     now_s = 1000.0
     rules = Rules(
         sources={
-            kind: SourceRule(limit, required)
-            for kind, limit, required in [
-                (SourceKind.ODOMETRY, 1000, odometry_required),
-                (SourceKind.VISION, 2000, vision_required),
+            spec: SourceRule(limit, required)
+            for spec, limit, required in [
+                (ODOMETRY, 1000, odometry_required),
+                (VISION, 2000, vision_required),
             ]
             if required is not None
         },
@@ -93,9 +94,9 @@ def test_health_follows_the_contract_line_by_line(
     # Half a millisecond off, so that no age sits on a rounding edge.
     board = Board()
     if odometry_age_ms is not None:
-        board.odometry = Received(Odometry(0, 0, 0), now_s - (odometry_age_ms + 0.5) / 1000)
+        board[ODOMETRY] = Received(Odometry(0, 0, 0), now_s - (odometry_age_ms + 0.5) / 1000)
     if vision_age_ms is not None:
-        board.vision = Received(Vision(0, 0, 0, 0, 0), now_s - (vision_age_ms + 0.5) / 1000)
+        board[VISION] = Received(Vision(0, 0, 0, 0, 0), now_s - (vision_age_ms + 0.5) / 1000)
 
     health = take(
         identity=Identity("t", "0", insecure=False),
@@ -113,4 +114,4 @@ def test_health_follows_the_contract_line_by_line(
 
 
 def test_a_robot_without_both_sources_is_healthy() -> None:
-    assert assess(None, None) == Health(HealthState.OK, "robot healthy")
+    assert assess([]) == Health(HealthState.OK, "robot healthy")

@@ -10,7 +10,6 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
-from gateway.links.preview import wire
 from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
@@ -18,9 +17,9 @@ from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.methods import method_at
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.server import SERVICE, Services
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.events import OperatorEvent
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import (
     Codec,
@@ -35,7 +34,19 @@ from gateway.status.preview import (
 )
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.sources import SourceState
+from gateway.status.source_view import SourceState
+from gateway.status.sources import (
+    BATTERY,
+    COMPUTE,
+    DETECTIONS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    NETWORK,
+    ODOMETRY,
+    ONBOARD_BATTERY,
+    ROS_SOURCES,
+    VISION,
+)
 from gateway.status.values import (
     Battery,
     Compute,
@@ -57,7 +68,6 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
-from omniseer.preview.v1 import preview_service_pb2
 
 NOW_S = 1000.0
 CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
@@ -83,15 +93,6 @@ def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table:
     assert set(domain) <= set(table) <= {None, *domain}
     assert len(set(table.values())) == len(table)
     assert {0, *table.values()} == set(wire_enum.values())
-
-
-def test_the_preview_service_and_the_domain_cover_each_other() -> None:
-    assert set(wire.STATES.values()) == set(PreviewState)
-    assert {0, *wire.STATES} == set(preview_service_pb2.LifecycleState.values())
-    assert set(wire.PROFILES) == set(Profile)
-    assert {0, *wire.PROFILES.values()} == set(preview_service_pb2.Profile.values())
-    assert set(wire.CODECS.values()) == set(Codec)
-    assert {0, *wire.CODECS} == set(preview_service_pb2.Codec.values())
 
 
 def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
@@ -138,23 +139,23 @@ def everything() -> Snapshot:
         passphrase="a-passphrase",
     )
     board = Board(
-        odometry=Received(Odometry(0.3, 0.4, -0.5), at_s),
-        vision=Received(Vision(30.0, 29.0, 11.0, 7, 1), at_s),
-        detections=Received(
-            Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s
-        ),
-        battery=Received(Battery(True, 15.0, 80.0, True), at_s),
-        mode=Received(Mode("exploring"), at_s),
-        effective_command=Received(Velocity(0.25, -0.5, 0.75), at_s),
-        compute=Received(Compute(40.0, 60.0, True, 1, 2, 50.0), at_s),
-        network=Received(Network("wlan0", True, -60, 70), at_s),
-        onboard_battery=Received(Battery(True, 12.0, 70.0, True), at_s),
+        {
+            ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), at_s),
+            VISION: Received(Vision(30.0, 29.0, 11.0, 7, 1), at_s),
+            DETECTIONS: Received(
+                Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s
+            ),
+            BATTERY: Received(Battery(True, 15.0, 80.0, True), at_s),
+            MODE: Received(Mode("exploring"), at_s),
+            EFFECTIVE_COMMAND: Received(Velocity(0.25, -0.5, 0.75), at_s),
+            COMPUTE: Received(Compute(40.0, 60.0, True, 1, 2, 50.0), at_s),
+            NETWORK: Received(Network("wlan0", True, -60, 70), at_s),
+            ONBOARD_BATTERY: Received(Battery(True, 12.0, 70.0, True), at_s),
+        }
     )
     return take(
         identity=Identity("lab", "1.2.3", insecure=True),
-        rules=Rules(
-            {kind: SourceRule(1000, required=kind is SourceKind.BATTERY) for kind in SourceKind}, 3000
-        ),
+        rules=Rules({spec: SourceRule(1000, required=spec is BATTERY) for spec in ROS_SOURCES}, 3000),
         board=board,
         preview=preview,
         events=(OperatorEvent(1, at_s, "something happened"),),
@@ -242,7 +243,7 @@ def test_the_passphrase_goes_only_to_those_who_sees_passphrase() -> None:
 def test_an_empty_snapshot_claims_nothing() -> None:
     nothing = take(
         identity=Identity("lab", "1.2.3", insecure=False),
-        rules=Rules({kind: SourceRule(1000, required=True) for kind in SourceKind}, 3000),
+        rules=Rules(dict.fromkeys(ROS_SOURCES, SourceRule(1000, required=True)), 3000),
         board=Board(),
         preview=PreviewView(PreviewState.DISABLED, None, "", False, None, None, None, None, Counters()),
         events=(),

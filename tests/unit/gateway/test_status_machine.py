@@ -5,50 +5,50 @@ model remembers the true moment of each newest message and nothing else.
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from gateway.ros.reception import Instant, received_at
-from gateway.status.board import Board, SourceKind
-from gateway.status.faults.book import FaultBook
+from gateway.ros.receive_time import Instant, received_at
+from gateway.status.board import Board
+from gateway.status.faults.tracker import FaultTracker
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
-from gateway.status.sources import SourceState
+from gateway.status.source_view import SourceState
+from gateway.status.sources import BATTERY, ODOMETRY, VISION, SourceSpec
 from gateway.status.values import Battery, Odometry, Received, Vision
 from tests.support.fault_rules import new_observer
 
 GRACE_S, CLEAR_AFTER_S, PASS_S = 5.0, 2.0, 0.05
-LIMITS_MS = {SourceKind.ODOMETRY: 1000, SourceKind.VISION: 2000, SourceKind.BATTERY: 5000}
-REQUIRED = {SourceKind.ODOMETRY, SourceKind.VISION}
-WORDS = {SourceKind.ODOMETRY: "odometry", SourceKind.VISION: "vision telemetry"}
+LIMITS_MS = {ODOMETRY: 1000, VISION: 2000, BATTERY: 5000}
+REQUIRED = {ODOMETRY, VISION}
+WORDS = {ODOMETRY: "odometry", VISION: "vision telemetry"}
 OFF = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
-KINDS = st.sampled_from(sorted(LIMITS_MS, key=lambda kind: kind.value))
+SPECS = st.sampled_from(sorted(LIMITS_MS, key=lambda spec: spec.name))
 
 
-def value_of(kind: SourceKind, number: int) -> Odometry | Vision | Battery:
-    match kind:
-        case SourceKind.ODOMETRY:
-            return Odometry(float(number), 0.0, 0.0)
-        case SourceKind.VISION:
-            return Vision(float(number), 0.0, 0.0, 0, 0)
-        case _:
-            return Battery(True, float(number), 80.0, False)
+def value_of(spec: SourceSpec[Any], number: int) -> Odometry | Vision | Battery:
+    if spec is ODOMETRY:
+        return Odometry(float(number), 0.0, 0.0)
+    if spec is VISION:
+        return Vision(float(number), 0.0, 0.0, 0, 0)
+    return Battery(True, float(number), 80.0, False)
 
 
 @dataclass
 class Model:
     """What is true."""
 
-    numbers: dict[SourceKind, int] = field(default_factory=dict)
+    numbers: dict[SourceSpec[Any], int] = field(default_factory=dict)
     """Of the newest message."""
-    arrived_s: dict[SourceKind, float] = field(default_factory=dict)
-    slack_s: dict[SourceKind, float] = field(default_factory=dict)
+    arrived_s: dict[SourceSpec[Any], float] = field(default_factory=dict)
+    slack_s: dict[SourceSpec[Any], float] = field(default_factory=dict)
     """How wrong its age may be: nothing, or one sampling period when the system clock was set meanwhile."""
 
-    def age_s(self, kind: SourceKind, now_s: float) -> float | None:
-        return now_s - self.arrived_s[kind] if kind in self.arrived_s else None
+    def age_s(self, spec: SourceSpec[Any], now_s: float) -> float | None:
+        return now_s - self.arrived_s[spec] if spec in self.arrived_s else None
 
 
 class Life(RuleBasedStateMachine):
@@ -58,21 +58,21 @@ class Life(RuleBasedStateMachine):
         super().__init__()
         self.now_s, self.wall_ns = 1000.0, 1_700_000_000_000_000_000
         self.board, self.model, self.sent = Board(), Model(), 0
-        self.book = FaultBook(CLEAR_AFTER_S, keep_cleared_s=1e9)
-        self.observer = new_observer(startup_grace_s=GRACE_S, book=self.book)
+        self.tracker = FaultTracker(CLEAR_AFTER_S, keep_cleared_s=1e9)
+        self.observer = new_observer(startup_grace_s=GRACE_S, tracker=self.tracker)
         self.raised = self.cleared = 0
         self.look()
 
-    @rule(kind=KINDS, waits=st.floats(0, PASS_S), jump_s=st.sampled_from([0, 0, 0, 0.02, -3600, 3600, 1e9]))
-    def a_message_arrives_and_is_fetched(self, kind: SourceKind, waits: float, jump_s: float) -> None:
+    @rule(spec=SPECS, waits=st.floats(0, PASS_S), jump_s=st.sampled_from([0, 0, 0, 0.02, -3600, 3600, 1e9]))
+    def a_message_arrives_and_is_fetched(self, spec: SourceSpec[Any], waits: float, jump_s: float) -> None:
         """It waits for the next pass of the sampler; in between somebody may set the system clock."""
-        self.one_message(kind, waits, jump_s)
+        self.one_message(spec, waits, jump_s)
 
-    @rule(kind=KINDS, count=st.integers(2, 20))
-    def a_burst_arrives_at_once(self, kind: SourceKind, count: int) -> None:
+    @rule(spec=SPECS, count=st.integers(2, 20))
+    def a_burst_arrives_at_once(self, spec: SourceSpec[Any], count: int) -> None:
         """Late messages in one heap: the newest one counts, its age is since it came here."""
         self.sent += count - 1
-        self.one_message(kind, 0.0, 0.0)
+        self.one_message(spec, 0.0, 0.0)
 
     @rule(seconds=st.floats(0.01, 20))
     def nothing_happens(self, seconds: float) -> None:
@@ -82,7 +82,7 @@ class Life(RuleBasedStateMachine):
     def the_system_clock_is_set(self, years: int) -> None:
         self.wall_ns += years * 31_536_000 * 1_000_000_000
 
-    def one_message(self, kind: SourceKind, waits: float, jump_s: float) -> None:
+    def one_message(self, spec: SourceSpec[Any], waits: float, jump_s: float) -> None:
         emptied_at_s = self.now_s
         self.pass_time(PASS_S - waits)
         arrived_s, stamp_ns = self.now_s, self.wall_ns
@@ -90,10 +90,10 @@ class Life(RuleBasedStateMachine):
         self.pass_time(waits)
         at_s = received_at(stamp_ns, Instant(self.now_s, self.wall_ns), emptied_at_s)
         self.sent += 1
-        setattr(self.board, kind.value, Received(value_of(kind, self.sent), at_s))
-        self.model.numbers[kind] = self.sent
-        self.model.arrived_s[kind] = arrived_s
-        self.model.slack_s[kind] = PASS_S if jump_s else 0.0
+        self.board[spec] = Received(value_of(spec, self.sent), at_s)
+        self.model.numbers[spec] = self.sent
+        self.model.arrived_s[spec] = arrived_s
+        self.model.slack_s[spec] = PASS_S if jump_s else 0.0
 
     def pass_time(self, seconds: float) -> None:
         """Time passes; the gateway's own timer looks often enough meanwhile."""
@@ -109,19 +109,19 @@ class Life(RuleBasedStateMachine):
         for news in self.observer.observe(now):
             told = news.sentence or ""
             self.raised += told.startswith(("error: ", "warning: "))
-            self.cleared += told.startswith("over: ")
+            self.cleared += told.startswith("cleared: ")
         return now
 
     def snapshot(self) -> Snapshot:
         return take(
             identity=Identity("t", "0", insecure=False),
             rules=Rules(
-                {kind: SourceRule(limit, kind in REQUIRED) for kind, limit in LIMITS_MS.items()}, 3000
+                {spec: SourceRule(limit, spec in REQUIRED) for spec, limit in LIMITS_MS.items()}, 3000
             ),
             board=self.board,
             preview=OFF,
             events=(),
-            faults=self.book.faults,
+            faults=self.tracker.faults,
             now_s=self.now_s,
         )
 
@@ -129,35 +129,35 @@ class Life(RuleBasedStateMachine):
     def every_value_is_the_newest_and_its_age_is_true(self) -> None:
         now = self.snapshot()
         for source in now.sources:
-            kind, seen = source.kind, source.freshness
-            age_s = self.model.age_s(kind, self.now_s)
-            assert getattr(now, kind.value).freshness == seen
+            spec, seen = source.spec, source.freshness
+            age_s = self.model.age_s(spec, self.now_s)
+            assert now[spec].freshness == seen
             if age_s is None:
                 assert (seen.available, seen.stale, seen.age_ms) == (False, False, 0)
-                assert getattr(now, kind.value).value is None
+                assert now[spec].value is None
                 assert source.state is SourceState.WAITING
                 continue
-            assert getattr(now, kind.value).value == value_of(kind, self.model.numbers[kind])
-            assert abs(seen.age_ms - age_s * 1000) <= self.model.slack_s[kind] * 1000 + 1.01
-            assert seen.stale == (seen.age_ms > LIMITS_MS[kind])
+            assert now[spec].value == value_of(spec, self.model.numbers[spec])
+            assert abs(seen.age_ms - age_s * 1000) <= self.model.slack_s[spec] * 1000 + 1.01
+            assert seen.stale == (seen.age_ms > LIMITS_MS[spec])
             assert source.state is (SourceState.STALE if seen.stale else SourceState.RECEIVING)
 
     @invariant()
     def health_names_the_first_thing_that_is_wrong(self) -> None:
         now = self.snapshot()
         expected = "robot healthy"
-        for kind in (SourceKind.VISION, SourceKind.ODOMETRY):
-            seen = getattr(now, kind.value).freshness
+        for spec in (VISION, ODOMETRY):
+            seen = now[spec].freshness
             if not seen.available:
-                expected = f"waiting for {WORDS[kind]}"
+                expected = f"waiting for {WORDS[spec]}"
             elif seen.stale:
-                expected = f"{WORDS[kind]} stale"
+                expected = f"{WORDS[spec]} stale"
         assert (now.health.summary, now.health.ready) == (expected, expected == "robot healthy")
 
     @invariant()
     def what_is_wrong_is_a_fault_and_what_is_well_is_none_for_long(self) -> None:
         now = self.look()
-        active = {fault.condition.fault_id: fault for fault in self.book.faults if fault.active}
+        active = {fault.condition.fault_id: fault for fault in self.tracker.faults if fault.active}
         for source in now.sources:
             if source.state is SourceState.STALE:
                 assert f"{source.name}.stale" in active

@@ -54,5 +54,5 @@ def test_a_robot_that_refuses_is_not_called_unreachable(error: GatewayError, mar
 
 def test_who_is_refused_learns_what_would_help_and_that_the_robot_was_not_silent() -> None:
     text = link_text(lost(NotAllowed("the token of anna was revoked"), 117), TARGET, 112)
-    assert text.banner.startswith("The token of anna was revoked. Ask whoever keeps this robot")
+    assert text.banner.startswith("The token of anna was revoked. Ask this robot's administrator")
     assert text.retry == "No access for 12.0 s. Attempt 4 in 5 s, or as soon as another login is stored."

@@ -78,7 +78,7 @@ def test_delays_begin_again(calming: str) -> None:
     if calming == "steady":
         lifecycle.handle(Event.RETRY)
         lifecycle.handle(Event.FIRST_FRAME)
-        lifecycle.note_steady()
+        lifecycle.reset_backoff()
     else:
         lifecycle.handle(Event.DISABLE)
         lifecycle.handle(Event.ENABLE)
@@ -98,7 +98,7 @@ def test_a_first_picture_alone_does_not_shorten_the_delay() -> None:
 def test_counters() -> None:
     lifecycle = in_state(State.RUNNING)
     lifecycle.handle(Event.FAILURE)
-    lifecycle.note_fallback()
+    lifecycle.count_fallback()
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)
     lifecycle.handle(Event.DISABLE)

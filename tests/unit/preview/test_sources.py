@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
-from preview import sources
 from preview.config import FileSource, GstSource, TestSource, V4l2Source
+from preview.pipeline import sources
 
 
 def cards(directory: Path, **names: str) -> Path:

@@ -185,7 +185,7 @@ async def test_a_service_that_comes_late_gets_the_desired_state(ground: Ground, 
     assert link.health.last_error
     service = await ground.start()
     await until(link, lambda: link.health.reachable and service.applied)
-    assert await link.settles(desired, WITHIN_S)
+    assert await link.wait_until_settled(desired, WITHIN_S)
     assert link.health.failures == 0
     assert ground.sent() == [ground.some]
 
@@ -193,7 +193,7 @@ async def test_a_service_that_comes_late_gets_the_desired_state(ground: Ground, 
 async def test_a_new_process_gets_the_desired_state_again(ground: Ground, link: Any) -> None:
     first = await ground.start()
     await connected(link)
-    assert await link.settles(link.request(ground.some), WITHIN_S)
+    assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     await ground.stop()
     await until(link, lambda: not link.health.reachable)
     second = await ground.start()
@@ -207,7 +207,7 @@ async def test_a_frozen_service_is_noticed_and_the_same_process_is_sent_nothing_
 ) -> None:
     service = await ground.start()
     await connected(link)
-    assert await link.settles(link.request(ground.some), WITHIN_S)
+    assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     service.thawed.clear()
     await until(link, lambda: not link.health.reachable)
     assert link.health.last_error == "no report for 1 s"
@@ -221,18 +221,18 @@ async def test_a_request_that_is_not_answered_is_a_lost_service(ground: Ground, 
     await connected(link)
     service.thawed.clear()
     desired = link.request(ground.some)
-    assert await link.settles(desired, WITHIN_S)
+    assert await link.wait_until_settled(desired, WITHIN_S)
     assert link.health.last_error == "no answer to a request for 0.3 s"
     service.thawed.set()
     await until(link, lambda: service.applied and link.health.reachable)
-    assert await link.settles(desired, WITHIN_S)
+    assert await link.wait_until_settled(desired, WITHIN_S)
 
 
 async def test_a_refused_request_is_not_repeated(ground: Ground, link: Any) -> None:
     service = await ground.start()
     ground.refuse()
     await connected(link)
-    assert await link.settles(link.request(ground.refused), WITHIN_S)
+    assert await link.wait_until_settled(link.request(ground.refused), WITHIN_S)
     view = link.view
     assert ground.refusal in repr(view)
     assert link.health.reachable
@@ -255,7 +255,7 @@ async def test_a_revision_of_another_gateway_is_overruled(ground: Ground, link: 
     service = await ground.start()
     await connected(link)
     desired = link.request(ground.some)
-    assert await link.settles(desired, WITHIN_S)
+    assert await link.wait_until_settled(desired, WITHIN_S)
     ground.applied_by_another_gateway()
     await until(link, lambda: len(service.applied) == 2)
     assert ground.sent() == [ground.some, ground.some]
@@ -266,7 +266,7 @@ async def test_a_restarted_gateway_adopts_and_applies_nothing(ground: Ground) ->
     service = await ground.start()
     async with running(ground.new_link()) as link:
         await connected(link)
-        assert await link.settles(link.request(ground.some), WITHIN_S)
+        assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     async with running(ground.new_link()) as link:
         await connected(link)
         assert link.desired.spec == ground.some
@@ -277,7 +277,7 @@ async def test_the_newest_of_many_requests_counts(ground: Ground, link: Any) -> 
     service = await ground.start()
     await connected(link)
     requests = [link.request(spec) for spec in (ground.some, ground.other) * 50]
-    assert all(await asyncio.gather(*(link.settles(each, WITHIN_S) for each in requests)))
+    assert all(await asyncio.gather(*(link.wait_until_settled(each, WITHIN_S) for each in requests)))
     assert ground.sent()[-1] == ground.other
     assert service.applied[-1].revision == requests[-1].revision
 
@@ -285,7 +285,7 @@ async def test_the_newest_of_many_requests_counts(ground: Ground, link: Any) -> 
 async def test_a_request_cuts_a_pause_short(ground: Ground, link: Any) -> None:
     await until(link, lambda: link.health.failures == 6)
     # The pause that has begun now is 1 s long.
-    assert await link.settles(link.request(ground.some), 0.8)
+    assert await link.wait_until_settled(link.request(ground.some), 0.8)
     assert link.health.failures >= 7
 
 

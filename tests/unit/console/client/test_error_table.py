@@ -56,7 +56,7 @@ def test_the_table_is_total_in_both_directions() -> None:
     ("details", "words"),
     [
         ("SSL_ERROR_SSL: CERTIFICATE_VERIFY_FAILED: unable to get local issuer certificate", "not signed by"),
-        ("CERTIFICATE_VERIFY_FAILED: certificate has expired", "has ended"),
+        ("CERTIFICATE_VERIFY_FAILED: certificate has expired", "has expired"),
         ("CERTIFICATE_VERIFY_FAILED: certificate is not yet valid", "this computer's clock"),
         ("Hostname Verification Check failed.", "other names"),
     ],

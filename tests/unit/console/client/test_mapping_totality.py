@@ -545,7 +545,7 @@ def test_a_number_from_a_newer_gateway_reads_unknown(name: str) -> None:
 
 
 def test_every_profile_can_be_asked_for() -> None:
-    numbers = {profile: enums.profile_number(profile) for profile in PreviewProfile}
+    numbers = {profile: enums.preview_profile.number(profile) for profile in PreviewProfile}
     assert {number: enums.preview_profile(number) for number in numbers.values()} == {
         number: profile for profile, number in numbers.items()
     }

@@ -107,7 +107,7 @@ async def test_only_an_unreachable_robot_is_asked_again(error: GatewayError) -> 
 
 
 async def test_what_must_not_happen_twice_is_not_asked_twice() -> None:
-    once: Method[None, str] = Method("DriveOneMetre", lambda _: b"", lambda _: "", idempotent=False)
+    once = replace(GET_SYSTEM_STATUS, idempotent=False)
     stage = Stage()
     with pytest.raises(Unreachable):
         await stage.play(stage.calls.call(once, None, 2.0))

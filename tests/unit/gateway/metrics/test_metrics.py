@@ -18,8 +18,8 @@ from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.interceptors.stats import MethodStats, Stats
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.status_stream import StatusStream
-from gateway.status.board import Board, SourceKind
-from gateway.status.faults.fault import Condition, Fault, Severity
+from gateway.status.board import Board
+from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -33,6 +33,7 @@ from gateway.status.preview import (
 )
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Odometry, Received
 from tests.support.eventually import eventually
 
@@ -56,10 +57,8 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
     """Odometry 0.25 s old, vision never seen."""
     return take(
         identity=Identity('lab "7"', "1.2.3", insecure=False),
-        rules=Rules(
-            {SourceKind.ODOMETRY: SourceRule(1000, True), SourceKind.VISION: SourceRule(2000, True)}, 3000
-        ),
-        board=Board(odometry=Received(Odometry(0.3, 0.4, -0.5), NOW_S - 0.25)),
+        rules=Rules({ODOMETRY: SourceRule(1000, True), VISION: SourceRule(2000, True)}, 3000),
+        board=Board({ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), NOW_S - 0.25)}),
         preview=preview,
         events=(),
         now_s=NOW_S,

@@ -8,14 +8,14 @@ import pytest
 from common.errors import InvalidRequestError, NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
-from gateway.access.attempts import FREE, Attempts
 from gateway.access.credential import Principal
+from gateway.access.refusal_limiter import BURST, RefusalLimiter
 from gateway.access.role import Role
 from gateway.rpc.call import CallContext
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, News
-from gateway.status.faults.fault import Severity
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
 from tests.support.calls import serve
@@ -55,7 +55,7 @@ class Ground:
 
     def __init__(self) -> None:
         self.records = Records()
-        self.audit = Audit(self.records, self.records, Attempts())
+        self.audit = Audit(self.records, self.records, RefusalLimiter())
 
     async def call(
         self,
@@ -159,10 +159,10 @@ async def test_a_request_that_breaks_the_rules_is_recorded() -> None:
 )
 async def test_what_auth_refuses_is_recorded_until_there_are_too_many(error: Exception) -> None:
     ground = Ground()
-    for _ in range(FREE + 5):
+    for _ in range(BURST + 5):
         with pytest.raises(type(error)):
             await ground.call(SetPreviewModeResponse(), auth=Authenticated(None, error))
-    assert len(ground.records.trail) == len(ground.records.events) == FREE
+    assert len(ground.records.trail) == len(ground.records.events) == BURST
     assert {each.result for each in ground.records.trail} == {ControlResult.REFUSED}
     assert ground.records.events[0].severity is Severity.WARNING
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from common.errors import NotAuthenticatedError
+from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
-from gateway.access.keyring import Keyring
 from gateway.access.lockout import Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
@@ -24,13 +24,13 @@ class Ground:
     def __init__(self) -> None:
         self.tokens = {name: new_token(name[0] * 12) for name in ("anna", "ben", "carla")}
         self.credentials = {name: _credential(name, token) for name, token in self.tokens.items()}
-        self.keyring = Keyring(Store(MappingProxyType({})))
+        self.authenticator = Authenticator(Store(MappingProxyType({})))
         self.reload()
         self.renewals = 0
         self.looks = 0
-        self.auth = Auth(self.keyring, Lockout(), self, self, certificates=False)
+        self.auth = Auth(self.authenticator, Lockout(), self, self, certificates=False)
 
-    async def look_for_unknown(self) -> None:
+    async def reload_for_unknown(self) -> None:
         self.looks += 1
         self.reload()
 
@@ -40,7 +40,7 @@ class Ground:
     def reload(self) -> None:
         """As when the gateway has read its files again."""
         listed = {each.credential_id: each for each in self.credentials.values()}
-        self.keyring.use(Store(MappingProxyType(listed)))
+        self.authenticator.use(Store(MappingProxyType(listed)))
 
     def revoke(self, *names: str) -> None:
         for name in names:

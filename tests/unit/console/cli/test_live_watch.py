@@ -1,0 +1,147 @@
+"""The parts of robotctl watch on a terminal that need no terminal: keys, requests, the view's height."""
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+from rich.text import Text
+
+from console.cli.keyboard import Key, keys_in
+from console.cli.live_screen import Fitted
+from console.cli.preview_keys import PreviewKeys
+from console.client import (
+    PreviewChange,
+    PreviewProfile,
+    PreviewRequest,
+    PreviewState,
+    PreviewStatus,
+    Unreachable,
+)
+from console.client.mapping.methods import GET_SYSTEM_STATUS
+from console.presentation.severity_style import SeverityStyle
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+
+PREVIEW = GET_SYSTEM_STATUS.decode(SystemStatus().SerializeToString()).preview
+
+
+class Clock:
+    """Moves by hand."""
+
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def asking(clock: Callable[[], float]) -> PreviewKeys:
+    return PreviewKeys(clock)
+
+
+def preview(state: PreviewState, profile: PreviewProfile = PreviewProfile.BALANCED) -> PreviewStatus:
+    return replace(PREVIEW, state=state, profile=profile)
+
+
+def shown(asking: PreviewKeys) -> str:
+    message = asking.message()
+    return message.text if message else ""
+
+
+@pytest.mark.parametrize(
+    ("typed", "keys"),
+    [
+        ("p", [Key.TOGGLE]),
+        ("123q", [Key.LOW_BW, Key.BALANCED, Key.HIGH_QUALITY, Key.QUIT]),
+        ("P Q", [Key.TOGGLE, Key.QUIT]),
+        ("xyz 456\n\t", []),
+        ("\x1b[A\x1b[1~\x1b[1;5C\x1bOP\x1bp\x1b", []),
+        ("\x1b[1~1", [Key.LOW_BW]),
+        ("\ufffdp", [Key.TOGGLE]),
+    ],
+)
+def test_what_is_typed(typed: str, keys: list[Key]) -> None:
+    assert list(keys_in(typed)) == keys
+
+
+@pytest.mark.parametrize(
+    ("state", "request_"),
+    [
+        (PreviewState.DISABLED, PreviewRequest(True)),
+        (PreviewState.STOPPING, PreviewRequest(True)),
+        (PreviewState.UNKNOWN, PreviewRequest(True)),
+        (PreviewState.STARTING, PreviewRequest(False)),
+        (PreviewState.RUNNING, PreviewRequest(False)),
+        (PreviewState.FAULTED, PreviewRequest(False)),
+    ],
+)
+def test_p_requests_the_opposite(asking: PreviewKeys, state: PreviewState, request_: PreviewRequest) -> None:
+    assert asking.press(Key.TOGGLE, preview(state)) == request_
+    offered = {key: does for key, does, _ in PreviewKeys().help(preview(state))}
+    assert offered[Key.TOGGLE] == ("preview on" if request_.enabled else "preview off")
+
+
+def test_a_profile_is_switched_while_it_runs_and_marked_while_it_does_not(asking: PreviewKeys) -> None:
+    assert asking.press(Key.LOW_BW, preview(PreviewState.DISABLED)) is None
+    assert [key for key, _, is_so in asking.help(preview(PreviewState.DISABLED)) if is_so] == [Key.LOW_BW]
+    assert asking.press(Key.TOGGLE, preview(PreviewState.DISABLED)) == PreviewRequest(
+        True, PreviewProfile.LOW_BW
+    )
+    running = preview(PreviewState.RUNNING, PreviewProfile.LOW_BW)
+    asking.done(PreviewChange(accepted=True, message="preview is running", preview=running))
+    assert asking.press(Key.HIGH_QUALITY, running) == PreviewRequest(True, PreviewProfile.HIGH_QUALITY)
+
+
+def test_one_thing_at_a_time(asking: PreviewKeys) -> None:
+    off = preview(PreviewState.DISABLED)
+    assert asking.press(Key.TOGGLE, off)
+    assert asking.press(Key.TOGGLE, off) is None
+    assert shown(asking) == "preview on: request sent ..."
+    asking.done(PreviewChange(accepted=True, message="preview is on its way", preview=off))
+    assert asking.press(Key.TOGGLE, off)
+
+
+def test_a_success_expires_soon_and_a_failure_later(asking: PreviewKeys, clock: Clock) -> None:
+    off = preview(PreviewState.DISABLED)
+    asking.press(Key.TOGGLE, off)
+    asking.done(PreviewChange(accepted=True, message="preview is running", preview=off))
+    assert shown(asking) == "preview is running"
+    clock.now_s += 6
+    assert shown(asking) == ""
+    asking.press(Key.TOGGLE, off)
+    asking.done(PreviewChange(accepted=False, message="being serviced", preview=off))
+    clock.now_s += 6
+    message = asking.message()
+    assert message
+    assert (message.text, message.style) == (
+        "preview on: the robot refused: being serviced",
+        SeverityStyle.BAD,
+    )
+    clock.now_s += 20
+    assert asking.message() is None
+
+
+def test_a_failed_request_says_what_to_do(asking: PreviewKeys) -> None:
+    asking.press(Key.TOGGLE, preview(PreviewState.RUNNING))
+    asking.done(Unreachable("the link went silent", "Walk closer"))
+    assert shown(asking) == "preview off failed: the link went silent. Walk closer"
+
+
+@pytest.mark.parametrize(("height", "middle"), [(20, 10), (14, 10), (13, 9), (8, 4), (2, 1)])
+def test_the_body_is_cut(height: int, middle: int) -> None:
+    console = Console(file=io.StringIO(), width=60, height=height)
+    body = Text("\n".join(f"row {number}" for number in range(10)))
+    console.print(Fitted(Text("head\n"), body, Text("foot\nkeys")))
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert (lines[0], lines[-1]) == ("head", "keys")
+    assert len(lines) == 4 + middle
+    if middle < 10:
+        assert lines[-3].startswith("... ")
+        assert f"{11 - middle} more lines" in lines[-3]
