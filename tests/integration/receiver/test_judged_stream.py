@@ -31,7 +31,7 @@ def test_the_judges_have_nothing_to_say(
 ) -> None:
     settings = {"encoders": {"order": [encoder], "key_frame_interval_s": 1}}
     with RunningPreview(tmp_path, settings) as preview:
-        preview.wish(profile)
+        preview.enable(profile)
         preview.running()
         recording = record(preview.port, SECONDS)
     stream = analyse(recording)
