@@ -17,7 +17,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from bench.loop_delay import LoopDelay
-from console.window.monitor_program import monitor
+from console.window.programs import monitor
 
 _PICTURES_FIRST = 60
 """Pictures painted before it counts: the window is laid out, the decoder has settled."""

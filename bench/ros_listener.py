@@ -24,12 +24,12 @@ from gateway.ros.lifetime import ros_node
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import Sampler
 from gateway.ros.source import Source
-from gateway.ros.subscribing import subscribe
-from gateway.status.board import Board, SourceKind
+from gateway.ros.subscription import subscribe
+from gateway.status.board import Board
 from gateway.status.values import Received
 
 SOURCES = tuple(
-    SourceSettings(kind=SourceKind.ODOMETRY, topic=topic, type="nav_msgs/msg/Odometry", stale_after_ms=1000)
+    SourceSettings(kind="odometry", topic=topic, type="nav_msgs/msg/Odometry", stale_after_ms=1000)
     for topic in TOPICS
 )
 
@@ -52,7 +52,7 @@ def call_back() -> int:
 
     def on_message(message: Any, source: SourceSettings) -> None:
         value = reader_for(source)(message, source)
-        setattr(board, source.kind.value, Received(value, time.monotonic()))
+        board[source.spec] = Received(value, time.monotonic())
         kept[source.topic] += 1
 
     for source in SOURCES:

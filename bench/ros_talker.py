@@ -10,7 +10,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from simrobot.beat import beat
+from simrobot.rates import call_at_rate
 
 TOPICS = tuple(f"/bench/odometry_{number}" for number in range(4))
 
@@ -20,10 +20,12 @@ async def talk(rate_hz: float) -> None:
     context.init(args=[], initialize_logging=False)
     node = Node("bench_talker", context=context, enable_rosout=False)
     publishers = [node.create_publisher(Odometry, topic, QoSProfile(depth=10)) for topic in TOPICS]
-    beats = [asyncio.create_task(beat(rate_hz, partial(publish, each, Odometry()))) for each in publishers]
+    tasks = [
+        asyncio.create_task(call_at_rate(rate_hz, partial(publish, each, Odometry()))) for each in publishers
+    ]
     print("ready", flush=True)
     await asyncio.to_thread(sys.stdin.read)
-    for task in beats:
+    for task in tasks:
         task.cancel()
     node.destroy_node()
     context.shutdown()

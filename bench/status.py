@@ -20,9 +20,9 @@ import uvloop
 from bench.rows import Row
 from bench.stack import running_stack
 from bench.status_server import EMPTY_METHOD
-from gateway.access.bundle import Bundle
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keeping import Keeper, Wanted
+from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
@@ -81,10 +81,12 @@ def _against_an_empty_method() -> list[Row]:
 def _guarded_against_open() -> Row:
     with tempfile.TemporaryDirectory() as directory:
         where = CredentialDirectory(Path(directory) / "credentials")
-        keeper = Keeper(where, "bench")
-        keeper.begin(("127.0.0.1",))
+        admin = CredentialAdmin(where, "bench")
+        admin.initialize(("127.0.0.1",))
         # As many as a laboratory may have: the one that is shown is found among them.
-        bundles = [keeper.add(Wanted(f"person-{number}", Role.VIEWER))[1] for number in range(_PEOPLE)]
+        bundles = [
+            admin.add(CredentialRequest(f"person-{number}", Role.VIEWER))[1] for number in range(_PEOPLE)
+        ]
         with running_stack() as plain, running_stack("guarded", str(where.path)) as guarded:
             open_rounds, guarded_rounds = uvloop.run(
                 _measure_guarded(plain.port, guarded.port, bundles[_PEOPLE // 2])
@@ -101,9 +103,9 @@ def _guarded_against_open() -> Row:
 
 
 async def _measure_guarded(
-    plain_port: int, guarded_port: int, bundle: Bundle
+    plain_port: int, guarded_port: int, bundle: LoginBundle
 ) -> tuple[list[Round], list[Round]]:
-    credentials = grpc.ssl_channel_credentials(bundle.authority)
+    credentials = grpc.ssl_channel_credentials(bundle.ca_certificate)
     plain = _channels(plain_port)
     guarded = [
         grpc.aio.secure_channel(f"127.0.0.1:{guarded_port}", credentials, options=_OWN_CONNECTION)

@@ -1,44 +1,38 @@
-"""The server that bench.status measures: the gateway's own stack with everything filled, and an empty method.
+"""The server that bench.status measures: the whole gateway with everything filled, and an empty method.
 
-Run as a program it prints its port, serves until its standard input ends and uses no ROS. Callers may ask as
-often as they like, unless the word "limited" follows. After "guarded" comes the directory of the credentials
-that callers need.
+Run as a program it prints its port, serves until its standard input ends and uses no ROS. Callers may call
+as often as they like, unless the word "limited" follows. After "guarded" comes the directory of the
+credentials that callers need.
 """
 
 import asyncio
 import itertools
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
+from typing import Final
 
 import grpc
 import uvloop
 
-from common.bind import bind_tcp
-from common.rpc import Context, new_server
-from gateway.config import SecuritySettings
-from gateway.door import Door
-from gateway.preview_link.actual import Actual
-from gateway.preview_link.control import PreviewControl
-from gateway.preview_link.link import PreviewLink
-from gateway.preview_link.reconciler import Reconciler
-from gateway.rpc.answers import Answers
-from gateway.rpc.caller import Callers
-from gateway.rpc.controls import Controls
-from gateway.rpc.counting import CountingInterceptor
-from gateway.rpc.limiting import LimitInterceptor
-from gateway.rpc.limits import Admission, Limits
-from gateway.rpc.server import SERVICE, method_handlers
-from gateway.rpc.servicer import RobotGateway, Streams
-from gateway.rpc.staying import Staying
-from gateway.rpc.subscribing import EventStreams
-from gateway.rpc.tally import Tally
-from gateway.rpc.watching import StatusWatch
-from gateway.status.board import Board, SourceKind
-from gateway.status.event import ModeChanged, News
-from gateway.status.events import EventLog
-from gateway.status.faults.fault import Condition, Fault, Severity
+from common.interceptors import RpcContext
+from gateway.app import running
+from gateway.assembly import Gateway, build
+from gateway.config import (
+    DEFAULT_SOURCES,
+    GatewaySettings,
+    GrpcSettings,
+    LimitSettings,
+    SecuritySettings,
+    SourceSettings,
+)
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.reconciler import Desired
+from gateway.status.board import Board
+from gateway.status.event import Event, ModeChanged
+from gateway.status.fault import Severity
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -49,8 +43,18 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import (
+    BATTERY,
+    COMPUTE,
+    DIAGNOSTICS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    MUX_INPUTS,
+    NETWORK,
+    ODOMETRY,
+    ONBOARD_BATTERY,
+    VISION,
+)
 from gateway.status.values import (
     Battery,
     CommandSource,
@@ -70,12 +74,16 @@ EMPTY_METHOD = "/bench.Reference/Empty"
 CONSTANT_METHOD = "/bench.Reference/Constant"
 RAISE_METHOD = "/bench.Reference/Raise"
 CONSTANT_EVERY_S = 0.1
-_UNLIMITED = Limits(requests_per_s=1e9, burst=1_000_000_000)
-"""The same code runs; nobody is refused."""
-_TOO_HOT = Condition("platform.temperature", Severity.WARNING, "computer", "it is too hot", "let it cool")
-FAULTS = (Fault(_TOO_HOT, onset_s=0.0, seen_s=1.0, cleared_s=None, times_raised=1),) * 5
-_ALL_WELL = Diagnostics((DiagnosticItem("lidar", DiagnosticLevel.OK, ""),) * 20)
-_NEWS_EVERY_S = 0.05
+_UNLIMITED: Final = LimitSettings(requests_per_s=1e9, burst=1_000_000_000)
+"""The same code runs; no caller is refused."""
+_MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
+_FIVE_FAULTS: Final = Diagnostics(
+    tuple(
+        DiagnosticItem(f"lidar {number}", DiagnosticLevel.ERROR if number < 5 else DiagnosticLevel.OK, "")
+        for number in range(20)
+    )
+)
+_UPDATE_EVERY_S: Final = 0.05
 """The gateway reads its sources 20 times a second."""
 
 
@@ -86,113 +94,103 @@ def main() -> None:
 
 
 async def _serve(unlimited: bool, credentials: Path | None) -> None:
-    board, events = Board(), EventLog("bench")
-    reconciler, tally = Reconciler(1), Tally()
-    link = PreviewLink(Path("/nonexistent"), reconciler)
-    for number in range(8):
-        events.add(_mode(f"odometry received, for the {number}th time"), time.monotonic())
-
-    def snapshot() -> Snapshot:
-        return take(
-            identity=Identity("bench", "0.0.0", insecure=False),
-            rules=_RULES,
-            board=board,
-            preview=link.view,
-            events=events.newest(),
-            faults=FAULTS,
-            gateway=Runtime("a" * 40, "b" * 36, 1, tally.client_count(), tally.served, tally.refused),
-            now_s=time.monotonic(),
-        )
-
-    streams = Streams(StatusWatch(snapshot, time.monotonic), EventStreams(events), Staying(lambda _: None))
-    gateway = RobotGateway(
-        snapshot,
-        Answers(snapshot, lambda: link.view, time.monotonic),
-        PreviewControl(link, 1.0),
-        Callers(None),
-        streams,
-        tally=tally,
-        controls=Controls(lambda _: None),
-        configuration_json="{}",
+    settings = GatewaySettings(
+        grpc=GrpcSettings(port=0),
+        security=SecuritySettings(credentials=credentials),
+        limits=_UNLIMITED if unlimited else LimitSettings(),
+        sources=(*DEFAULT_SOURCES, _MODE),
     )
+    gateway = build(settings, _BenchRobot())
+    for number in range(8):
+        gateway.state.note(_event(f"odometry received, for the {number}th time"))
+    async with running(gateway, extra=[_reference(gateway)]) as port:
+        print(port, flush=True)
+        await asyncio.to_thread(sys.stdin.read)
 
-    async def raise_event(_request: bytes, _context: Context) -> bytes:
-        events.add(_mode("an event"), time.monotonic())
+
+class _BenchRobot:
+    """A robot that moves: something changes all the time."""
+
+    @contextmanager
+    def feeding(self, board: Board) -> Iterator[None]:
+        task = asyncio.create_task(_drive(board), name="robot")
+        try:
+            yield
+        finally:
+            task.cancel()
+
+    def preview(self) -> "_PreviewInMemory":
+        return _PreviewInMemory()
+
+
+class _PreviewInMemory:
+    """A preview service without a process: it runs, and reports as often as the sources do."""
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator["_PreviewInMemory"]:
+        yield self
+
+    async def reports(self) -> AsyncIterator[PreviewReport]:
+        while True:
+            yield _RUNNING
+            await asyncio.sleep(_UPDATE_EVERY_S)
+
+    async def apply(self, _desired: Desired[PreviewSpec]) -> PreviewReport:
+        return _RUNNING
+
+
+def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
+    """What the gateway's methods are compared with."""
+
+    async def raise_event(_request: bytes, _context: RpcContext) -> bytes:
+        gateway.state.note(_event("an event"))
         return b""
 
-    door = Door(SecuritySettings(credentials=credentials), lambda _news: None, lambda: None)
-    guards = [door.guard] if door.guard else []
-    handlers = method_handlers(gateway)
-    counting = CountingInterceptor(gateway.tally, SERVICE, handlers)
-    limiting = LimitInterceptor(Admission(_UNLIMITED if unlimited else Limits()))
-    server = new_server([counting, limiting, *guards])
-    server.add_generic_rpc_handlers(
-        (
-            grpc.method_handlers_generic_handler(SERVICE, handlers),
-            grpc.method_handlers_generic_handler(
-                "bench.Reference",
-                {
-                    "Empty": grpc.unary_unary_rpc_method_handler(_empty),
-                    "Constant": grpc.unary_stream_rpc_method_handler(_constant),
-                    "Raise": grpc.unary_unary_rpc_method_handler(raise_event),
-                },
-            ),
-        )
+    return grpc.method_handlers_generic_handler(
+        "bench.Reference",
+        {
+            "Empty": grpc.unary_unary_rpc_method_handler(_empty),
+            "Constant": grpc.unary_stream_rpc_method_handler(_constant),
+            "Raise": grpc.unary_unary_rpc_method_handler(raise_event),
+        },
     )
-    port = bind_tcp(server, "127.0.0.1", 0, door.credentials())
-    await server.start()
-    background = [
-        asyncio.create_task(_bring_news(board, reconciler)),
-        asyncio.create_task(streams.watch.run()),
-    ]
-    print(port, flush=True)
-    await asyncio.to_thread(sys.stdin.read)
-    for task in background:
-        task.cancel()
-    await server.stop(None)
 
 
-def _mode(words: str) -> News:
-    return News(Severity.INFO, "mission", words, ModeChanged(words), words)
+def _event(words: str) -> Event:
+    return Event(Severity.INFO, "mission", words, ModeChanged(words), words)
 
 
-async def _empty(_request: bytes, _context: Context) -> bytes:
+async def _empty(_request: bytes, _context: RpcContext) -> bytes:
     return b""
 
 
-async def _constant(request: bytes, _context: Context) -> AsyncIterator[bytes]:
+async def _constant(request: bytes, _context: RpcContext) -> AsyncIterator[bytes]:
     """The request again, ten times a second."""
     while True:
         yield request
         await asyncio.sleep(CONSTANT_EVERY_S)
 
 
-async def _bring_news(board: Board, reconciler: Reconciler) -> None:
+async def _drive(board: Board) -> None:
     for number in itertools.count():
         now = time.monotonic()
-        # A robot that moves: something changes all the time.
         speed_mps = 0.5 + number % 100 / 1000
-        board.odometry = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
-        board.mode = Received(Mode("exploring"), now)
-        board.effective_command = Received(Velocity(0.5, 0.0, 0.1), now)
-        board.mux_inputs = {CommandSource.KEYBOARD: board.effective_command}
-        board.diagnostics = Received(_ALL_WELL, now)
-        board.vision = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
-        board.battery = Received(
-            Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now
-        )
-        board.compute = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
-        board.network = Received(
+        board[ODOMETRY] = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board[MODE] = Received(Mode("exploring"), now)
+        command = Received(Velocity(0.5, 0.0, 0.1), now)
+        board[EFFECTIVE_COMMAND] = board[MUX_INPUTS[CommandSource.KEYBOARD]] = command
+        board[DIAGNOSTICS] = Received(_FIVE_FAULTS, now)
+        board[VISION] = Received(Vision(29.9, 29.7, 11.5, 3, 1), now)
+        battery = Received(Battery(present=True, voltage_v=15.1, charge_percent=81.0, charging=False), now)
+        board[BATTERY] = board[ONBOARD_BATTERY] = battery
+        board[COMPUTE] = Received(Compute(41.0, 61.5, False, 2_000_000_000, 8_000_000_000, 47.0), now)
+        board[NETWORK] = Received(
             Network("wlan0", connected=True, wifi_signal_dbm=-61, link_quality_percent=70), now
         )
-        board.onboard_battery = board.battery
-        reconciler.heard(_RUNNING, now)
-        await asyncio.sleep(_NEWS_EVERY_S)
+        await asyncio.sleep(_UPDATE_EVERY_S)
 
 
-_RULE = SourceRule(1000, required=True)
-_RULES = Rules(dict.fromkeys(SourceKind, _RULE), 3000, dict.fromkeys(CommandSource, _RULE))
-_RUNNING = Actual(
+_RUNNING = PreviewReport(
     instance_id="bench",
     applied_revision=1,
     state=PreviewState.RUNNING,

@@ -1,1 +1,1 @@
-"""What every program of the project shares: configuration files, errors for people, logging, exit codes."""
+"""Code shared by all programs: configuration files, user-facing errors, logging, exit codes, gRPC servers."""

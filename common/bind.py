@@ -1,7 +1,7 @@
-"""Binding a gRPC server to a TCP port or a Unix socket; what can go wrong becomes a sentence for a person.
+"""Binds gRPC servers to TCP ports and Unix sockets, and turns failures into user-facing errors.
 
-gRPC itself only says "failed to bind". So a plain socket tries first and tells the reason, and gRPC
-follows; should another program slip in between, the error is the general one.
+gRPC itself only reports "failed to bind". A plain socket therefore binds first, to learn the errno, and gRPC
+follows. If another program takes the address in between, the general error remains.
 """
 
 import errno
@@ -15,7 +15,7 @@ import grpc
 from common.errors import UserError
 
 _MAX_SOCKET_PATH: Final = 107
-"""Bytes in a Unix socket's path that Linux takes."""
+"""Longest path of a Unix socket in bytes: Linux's sun_path holds 108, with the final NUL (unix(7))."""
 _SOCKET_MODE: Final = 0o660
 _CONNECT_TIMEOUT_S: Final = 0.5
 
@@ -23,13 +23,13 @@ _CONNECT_TIMEOUT_S: Final = 0.5
 def bind_tcp(
     server: grpc.aio.Server, host: str, port: int, credentials: grpc.ServerCredentials | None = None
 ) -> int:
-    """Binds to `host` and `port` (0: any free one); plaintext without `credentials`.
+    """Binds the server to `host` and `port`; without `credentials` it serves plaintext.
 
     Returns:
-        The port.
+        The bound port, which the kernel chooses if `port` is 0.
 
     Raises:
-        UserError: the port is taken or not allowed, or the address is not one of this machine.
+        UserError: the port is taken or not permitted, or the address does not belong to this machine.
     """
     _try_tcp(host, port)
     address = f"{bracketed(host)}:{port}"
@@ -42,10 +42,10 @@ def bind_tcp(
 
 
 def bind_unix(server: grpc.aio.Server, path: Path) -> None:
-    """Binds to a Unix socket that this user and group may use, replacing what a dead server left behind.
+    """Binds the server to a Unix socket with mode 0660; replaces the stale socket of a server that died.
 
     Raises:
-        UserError: another program serves there, or the path can't be used.
+        UserError: another program serves at this path, or the path can't be used.
     """
     _try_unix(path)
     try:
@@ -56,7 +56,7 @@ def bind_unix(server: grpc.aio.Server, path: Path) -> None:
 
 
 def bracketed(host: str) -> str:
-    """The host as it is written before a colon and a port: IPv6 addresses in brackets."""
+    """Returns the host as it precedes ":PORT": an IPv6 address in brackets (RFC 3986 3.2.2)."""
     return f"[{host}]" if ":" in host and not host.startswith("[") else host
 
 
@@ -68,7 +68,7 @@ def _try_tcp(host: str, port: int) -> None:
         with socket.socket(family, kind, protocol) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
-            # Two sockets may share an address while neither listens.
+            # With SO_REUSEADDR, two sockets may bind one address as long as neither listens (socket(7)).
             probe.listen()
     except OSError as error:
         raise UserError(*_why_not(error, host, port)) from error
@@ -76,17 +76,17 @@ def _try_tcp(host: str, port: int) -> None:
 
 def _why_not(error: OSError, host: str, port: int) -> tuple[str, str]:
     if isinstance(error, socket.gaierror):
-        return f"'{host}' is not an address or a known name", "Name one of this machine's addresses"
+        return f"'{host}' is not an address or a known host name", "Use one of this machine's addresses"
     match error.errno:
         case errno.EADDRINUSE:
             return (
                 f"port {port} on {host} is taken by another program",
-                f"Stop that one (ss -ltnp 'sport = :{port}' names it) or choose another port",
+                f"Stop it (ss -ltnp 'sport = :{port}' shows its name) or choose another port",
             )
         case errno.EADDRNOTAVAIL:
-            return f"{host} is not an address of this machine", "'ip address' lists those that are"
+            return f"{host} is not an address of this machine", "'ip address' lists its addresses"
         case errno.EACCES:
-            return f"port {port} is not allowed for this user", "Choose one from 1024 up"
+            return f"this user may not use port {port}", "Choose port 1024 or higher"
         case _:
             return (
                 f"{bracketed(host)}:{port} can't be bound: {error.strerror}",
@@ -97,7 +97,7 @@ def _why_not(error: OSError, host: str, port: int) -> tuple[str, str]:
 def _try_unix(path: Path) -> None:
     if len(bytes(path)) > _MAX_SOCKET_PATH:
         raise UserError(
-            f"socket {path} has a path of {len(bytes(path))} bytes, Linux takes {_MAX_SOCKET_PATH}",
+            f"the path of socket {path} has {len(bytes(path))} bytes; Linux takes {_MAX_SOCKET_PATH}",
             "Choose a shorter path",
         )
     try:
@@ -108,7 +108,7 @@ def _try_unix(path: Path) -> None:
         path.unlink()
     except OSError as error:
         raise UserError(
-            f"socket {path} can't be made: {error.strerror}",
+            f"socket {path} can't be created: {error.strerror}",
             f"{path.parent} must be a directory that this user may write to",
         ) from error
 
@@ -124,5 +124,5 @@ def _remove_dead(path: Path) -> None:
             path.unlink()
             return
         except TimeoutError:
-            pass  # Somebody listens there and is slow: as good as an answer.
-    raise UserError(f"socket {path} is served by another program", "Stop that one or choose another path")
+            pass  # A full accept queue: a live server that is slow.
+    raise UserError(f"socket {path} is served by another program", "Stop it or choose another path")

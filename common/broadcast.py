@@ -1,22 +1,27 @@
-"""Waking everybody who waits for a change, without a queue: who was busy reads the newest state anyway."""
+"""Notifies all waiting tasks of a change, without a queue: a slow task reads the newest state anyway."""
 
 import asyncio
 from collections.abc import Callable
 
 
 class Broadcast:
-    """Belongs to one event loop."""
+    """A condition variable for the tasks of one event loop, without its lock."""
 
     def __init__(self) -> None:
         self._event = asyncio.Event()
 
-    def wake_all(self) -> None:
-        """Something has changed."""
+    def notify_all(self) -> None:
+        """Wakes every task in `wait_until`, to check its condition again."""
         self._event.set()
+        # The tasks that wait hold the old event; later ones must not be woken by it.
         self._event = asyncio.Event()
 
     async def wait_until(self, condition: Callable[[], bool], timeout_s: float | None = None) -> bool:
-        """Waits until `condition()` holds after a change; False when `timeout_s` went by before it did."""
+        """Waits until `condition()` holds, evaluated now and after each notification.
+
+        Returns:
+            False if `timeout_s` seconds passed first.
+        """
         try:
             async with asyncio.timeout(timeout_s):
                 while not condition():

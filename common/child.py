@@ -1,4 +1,4 @@
-"""A helper process that never outlives its use, however its code, or a driver it calls, hangs."""
+"""Limits the lifetime of a helper process, even while it hangs in native code such as a driver."""
 
 import ctypes
 import os
@@ -9,10 +9,13 @@ _PR_SET_PDEATHSIG: Final = 1
 
 
 def end_with_parent(at_most_s: int) -> None:
-    """Has the kernel end this process when the thread that started it ends, and after `at_most_s` seconds.
+    """Makes the kernel kill this process when the thread that started it ends, or after `at_most_s` seconds.
 
-    Both work while Python itself is stuck in a driver: prctl(2) PR_SET_PDEATHSIG sends SIGKILL, alarm(2) the
-    default SIGALRM. To be called first.
+    Must be called first. Both limits work while the interpreter is stuck in native code: prctl(2)
+    PR_SET_PDEATHSIG sends SIGKILL, and alarm(2) SIGALRM, whose default action ends the process.
+
+    Raises:
+        OSError: the kernel refuses the parent-death signal.
     """
     parent = os.getppid()
     signal.alarm(at_most_s)
@@ -20,5 +23,5 @@ def end_with_parent(at_most_s: int) -> None:
     if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL):
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG)")
     if os.getppid() != parent:
-        # It ended before the kernel knew.
+        # The parent ended before prctl; no signal will come.
         os._exit(os.EX_UNAVAILABLE)

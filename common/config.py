@@ -1,4 +1,4 @@
-"""One YAML file per program, checked before anything starts; environment variables override it."""
+"""Loads and validates a program's YAML configuration file; environment variables override it."""
 
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -11,15 +11,15 @@ from common.errors import ExitCode, UserError
 
 
 class Section(BaseModel):
-    """A part of a configuration file: unknown keys are errors, values don't change after the start."""
+    """One section of a configuration file. Unknown keys are errors; values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Settings(BaseSettings):
-    """A whole configuration file.
+    """Base class of a program's whole configuration.
 
-    A program's settings derive from this and set `env_prefix` in their own `model_config`; with the prefix
+    A program's settings derive from this and set `env_prefix` in their own `model_config`. With the prefix
     `GATEWAY__`, the variable `GATEWAY__GRPC__PORT` overrides the key `port` under `grpc`.
     """
 
@@ -36,7 +36,7 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """The environment first, then the file: the one place where the order is decided."""
+        """Returns the sources in order of precedence: the environment, then the file."""
         return env_settings, init_settings
 
 
@@ -44,21 +44,20 @@ SettingsT = TypeVar("SettingsT", bound=Settings)
 
 
 def load(settings_type: type[SettingsT], path: Path | None) -> SettingsT:
-    """Reads and checks a configuration file; without a path the defaults and the environment count.
+    """Reads and validates a configuration file; without a path, defaults and environment apply alone.
 
     Raises:
-        UserError: the file can't be read, is not YAML, or has an unknown key or a bad value. The one line
-            names the file, the key, the value and what is allowed.
+        UserError: the file can't be read, is not YAML, or has an unknown key or an invalid value. The text
+            names the file, the key, the value and the values allowed.
     """
     values = _read(path) if path else {}
     try:
         return settings_type(**values)
     except ValidationError as error:
         prefix = settings_type.model_config.get("env_prefix", "")
-        raise UserError(
-            f"configuration {path or 'from the environment'}: {_first_problem(error)}",
+        raise _error(
+            f"{path or 'from the environment'}: {_first_problem(error)}",
             f"Correct it in the file or in the {prefix}* environment variable",
-            exit_code=ExitCode.USAGE,
         ) from error
 
 
@@ -66,30 +65,21 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(
-            f"configuration {path} can't be read: {error}",
-            "Name a readable file with --config",
-            exit_code=ExitCode.USAGE,
-        ) from error
-    # Beside its own errors, the parser lets through what dates that don't exist and endless nesting raise.
+        raise _error(f"{path} can't be read: {error}", "Name a readable file with --config") from error
+    # PyYAML raises ValueError for a date that does not exist and RecursionError for deep nesting.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UserError(f"configuration {path} is not YAML: {error}", exit_code=ExitCode.USAGE) from error
+        raise _error(f"{path} is not YAML: {error}") from error
     if values is None:
         return {}
     if not isinstance(values, dict):
-        raise UserError(
-            f"configuration {path} holds a {type(values).__name__} at its top",
-            "Write keys and values, 'grpc:' for example",
-            exit_code=ExitCode.USAGE,
-        )
-    for key in values:
-        if not isinstance(key, str):
-            raise UserError(
-                f"configuration {path}: unknown key {key!r}",
-                "Keys are words, 'grpc:' for example",
-                exit_code=ExitCode.USAGE,
-            )
-    return values
+        kind = type(values).__name__
+        raise _error(f"{path} holds a {kind} at the top level", "Write keys and values, 'grpc:' for example")
+    # YAML keys may be numbers or dates; as text, they are reported as unknown keys like any other.
+    return {str(key): value for key, value in values.items()}
+
+
+def _error(problem: str, remedy: str = "") -> UserError:
+    return UserError(f"configuration {problem}", remedy, exit_code=ExitCode.USAGE)
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -1,4 +1,4 @@
-"""Errors for people: what happened, what it means, what to type."""
+"""Errors: those a program ends with, for people, and those an RPC is refused with, for callers."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -7,24 +7,24 @@ from common.reasons import Reason
 
 
 class ExitCode(IntEnum):
-    """How our programs end."""
+    """Exit codes of all programs."""
 
     DONE = 0
     FAILED = 1
-    """Refused, or did not work."""
+    """Refused, or an error occurred."""
     USAGE = 2
-    """The command line or the configuration is wrong."""
+    """The command line or the configuration is invalid."""
     UNREACHABLE = 3
-    """The other side does not answer."""
+    """The other side does not respond."""
 
 
 class UserError(Exception):
-    """Something a person can mend. Programs print it as one line and end; they never show a traceback.
+    """An error that the user can fix. Programs print it as one line, without a traceback, and exit.
 
     Args:
-        what: what happened, naming the thing it happened to.
-        remedy: what to do or to type. Empty only where `what` says it already.
-        exit_code: how the program ends.
+        what: what happened, naming the file, address or value concerned.
+        remedy: what to do or to type. Empty only where `what` implies it.
+        exit_code: of the program.
     """
 
     def __init__(self, what: str, remedy: str = "", *, exit_code: ExitCode = ExitCode.FAILED) -> None:
@@ -34,34 +34,34 @@ class UserError(Exception):
         self.exit_code = exit_code
 
     def __str__(self) -> str:
-        """One printable line, whatever the parts quote."""
+        """Returns both parts as one line; unprintable characters, which either may quote, become spaces."""
         text = f"{self.what}. {self.remedy}" if self.remedy else self.what
         return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 @dataclass(frozen=True, slots=True)
 class FieldViolation:
-    """What is wrong with one field of a request; `field` is empty when only the whole is."""
+    """A rule that one field of a request breaks; `field` is empty for a rule of the whole message."""
 
     field: str
     description: str
 
 
 class DomainError(Exception):
-    """What a caller asked for can't be done. Knows no transport; common.rpc tells it to gRPC callers.
+    """A request that can't be fulfilled. Knows no transport; common.rpc maps it to a gRPC status.
 
-    The text is for the caller to read and says what to do; the rest is the same for programs.
+    Its text is shown to the caller and says what to do; the attributes are for programs.
     """
 
     reason: Reason
-    """A stable word; each kind of error has its own, or takes one when it is made."""
+    """Machine-readable cause: of the class, or given to the constructor."""
     violations: tuple[FieldViolation, ...] = ()
     retry_after_s: float | None = None
-    """When it may work; None when nobody knows."""
+    """Seconds after which a retry may succeed; None if unknown."""
 
 
 class InvalidRequestError(DomainError):
-    """The request makes no sense as it stands; sending it again won't help. Nothing was changed."""
+    """The request is invalid and will remain so. Nothing was changed."""
 
     reason = Reason.INVALID_REQUEST
 
@@ -70,25 +70,19 @@ class InvalidRequestError(DomainError):
         self.violations = violations
 
 
-class NotNowError(DomainError):
-    """The request is in order, but the state of things forbids it; it may work later."""
-
-    reason = Reason.NOT_NOW
-
-
 class UnknownServiceError(DomainError):
-    """Nobody here has that name."""
+    """The health service knows no service of the requested name."""
 
     reason = Reason.UNKNOWN_SERVICE
 
 
 class TooMuchError(DomainError):
-    """The caller wants more than its share, or more than there is.
+    """The caller exceeds a limit, or a resource is exhausted.
 
     Args:
-        text: of what, and what to do.
-        reason: of what, for programs.
-        retry_after_s: when there may be room again.
+        text: which limit, and what to do.
+        reason: which limit, for programs.
+        retry_after_s: seconds after which a retry may succeed.
     """
 
     def __init__(self, text: str, reason: Reason, retry_after_s: float | None = None) -> None:
@@ -98,7 +92,7 @@ class TooMuchError(DomainError):
 
 
 class NotAuthenticatedError(DomainError):
-    """Nobody knows who asks.
+    """The caller is not authenticated: no credential, or one that is not valid.
 
     Args:
         text: why, and what to do.
@@ -111,6 +105,6 @@ class NotAuthenticatedError(DomainError):
 
 
 class NotAllowedError(DomainError):
-    """The caller is known and may not do this."""
+    """The caller is authenticated, but their role does not permit the request."""
 
     reason = Reason.ROLE_TOO_LOW

@@ -1,4 +1,4 @@
-"""What a doctor found: what is so, why it matters, what to type. One shape for every doctor."""
+"""Findings of the doctor commands: one data type, one table and one JSON document for all of them."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -14,24 +14,24 @@ from common.errors import ExitCode
 
 
 class Verdict(Enum):
-    """How a check ended."""
+    """Outcome of a check."""
 
     GOOD = "good"
     NOTE = "note"
-    """Worth knowing, and not wrong; or it could not be looked at, and the finding says how it can."""
+    """Noteworthy but not an error, or not checkable now; then the remedy says how it becomes checkable."""
     WRONG = "wrong"
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at.
+    """Result of one check.
 
     Args:
-        check: what was looked at, short and stable, for programs: "tcp", "source.odometry".
-        verdict: how it ended.
+        check: short, stable name of the check, for programs: "tcp", "source.odometry".
+        verdict: its outcome.
         what: what was found.
-        why: why it matters. Empty where all is good.
-        remedy: what to do or to type. Empty where there is nothing to do.
+        why: why it matters; empty for a good outcome.
+        remedy: what to do or to type; empty if nothing is to be done.
     """
 
     check: str
@@ -42,27 +42,27 @@ class Finding:
 
 
 def good(check: str, what: str) -> Finding:
-    """Nothing to do."""
+    """Returns a finding that needs no action."""
     return Finding(check, Verdict.GOOD, what)
 
 
 def note(check: str, what: str, why: str = "", remedy: str = "") -> Finding:
-    """Worth knowing."""
+    """Returns a finding that is noteworthy but not an error."""
     return Finding(check, Verdict.NOTE, what, why, remedy)
 
 
 def wrong(check: str, what: str, why: str, remedy: str) -> Finding:
-    """Something to mend."""
+    """Returns an error finding, with its consequence and remedy."""
     return Finding(check, Verdict.WRONG, what, why, remedy)
 
 
 def exit_code(findings: Iterable[Finding]) -> ExitCode:
-    """DONE when nothing is wrong, else FAILED."""
+    """Returns FAILED if any verdict is WRONG, else DONE."""
     return ExitCode.FAILED if any(each.verdict is Verdict.WRONG for each in findings) else ExitCode.DONE
 
 
 def findings_json(findings: Sequence[Finding]) -> dict[str, Any]:
-    """As scripts read it."""
+    """Returns the JSON document that `--json` prints."""
     return {
         "ok": exit_code(findings) is ExitCode.DONE,
         "findings": [asdict(each) | {"verdict": each.verdict.value} for each in findings],
@@ -70,13 +70,13 @@ def findings_json(findings: Sequence[Finding]) -> dict[str, Any]:
 
 
 def print_findings(findings: Sequence[Finding], *, as_json: bool, out: Console) -> None:
-    """On standard output: a JSON document, or a line per finding with why and what to type below it."""
+    """Prints a JSON document, or a row per finding with consequence and remedy below it."""
     if as_json:
         print(json.dumps(findings_json(findings), indent=2, ensure_ascii=False), file=out.file)
         return
     out.print(_table(findings))
     count = sum(each.verdict is Verdict.WRONG for each in findings)
-    out.print(Text("nothing is wrong" if count == 0 else f"{count} to mend", style="bold"))
+    out.print(Text("nothing is wrong" if count == 0 else f"{count} to fix", style="bold"))
 
 
 _STYLES: Final = {Verdict.GOOD: "green", Verdict.NOTE: "yellow", Verdict.WRONG: "bold red"}

@@ -1,8 +1,8 @@
-"""Ports and ROS domains that are free on this machine.
+"""Finds free ports and ROS domains on this machine.
 
-Programs that start at the same time (two demos, the workers of a test run) must not choose the same one.
-Each claims what it takes: a name in the abstract namespace of Unix sockets (unix(7)), which has one owner per
-network namespace, as ports have, ends with its process and leaves no file behind.
+Programs that start at the same time (two demos, the workers of a test run) must not choose the same one. Each
+therefore claims its choice by binding a name in the abstract namespace of Unix sockets (unix(7)). Such a name
+has one owner per network namespace, as a port has, and disappears with its process.
 """
 
 import errno
@@ -10,30 +10,31 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Final
 
 from common.errors import UserError
 
 _PORT_BLOCKS: Final = tuple(range(61_000, 65_500, 125))
-"""First port of each block, above the ephemeral ports of Linux (net.ipv4.ip_local_port_range, usually 32768
-to 60999): the kernel gives none of them to an outgoing connection between our look and the program's bind."""
+"""First port of each block. All lie above the ephemeral ports (net.ipv4.ip_local_port_range, by default 32768
+to 60999), so that no outgoing connection takes a port between our check and the program's bind."""
 _BLOCK_SIZE: Final = 125
 _DOMAINS: Final = range(1, 102)
-"""The ports of a domain beyond 101 reach into the ephemeral ports (DDSI-RTPS 9.6: 7400 + 250 x domain)."""
+"""Ports of higher domains reach into the ephemeral ports (DDSI-RTPS 9.6: 7400 + 250 x domain)."""
 _LOOPBACK: Final = "127.0.0.1"
 _ANY_ADDRESS: Final = ""
 
 _ports: Iterator[int] | None = None
-"""This process's block of ports, one after the other and round again; None before the first one is needed."""
+"""This process's block of ports, endlessly repeated; None until the first port is needed."""
 
 
 def free_port(kind: socket.SocketKind) -> int:
-    """Returns a port that is free on every local address, from this process's own block of ports.
+    """Returns a port of this process's block that is free on every local address.
 
     Raises:
         UserError: every block is claimed, or no port of this process's block is free.
     """
-    global _ports  # noqa: PLW0603 - one block per process, however many callers it has
+    global _ports  # noqa: PLW0603 - one block per process, shared by all callers
     if _ports is None:
         _ports = _claimed_block()
     for _ in range(_BLOCK_SIZE):
@@ -41,33 +42,23 @@ def free_port(kind: socket.SocketKind) -> int:
         if _can_bind(kind, _ANY_ADDRESS, port):
             return port
     raise UserError(
-        "none of the ports set aside for this program is free", "Stop what listens on them: ss -tulnp"
+        "none of the ports reserved for this program is free", "Stop the programs that use them (ss -tulnp)"
     )
 
 
 def port_is_free(kind: socket.SocketKind, port: int) -> bool:
-    """Whether a program could listen on this port of 127.0.0.1 now."""
+    """Returns whether this port of 127.0.0.1 can be bound now."""
     return _can_bind(kind, _LOOPBACK, port)
 
 
-def free_tcp_port() -> int:
-    """Returns a free TCP port; see `free_port`."""
-    return free_port(socket.SOCK_STREAM)
-
-
-def free_udp_port() -> int:
-    """Returns a free UDP port; see `free_port`."""
-    return free_port(socket.SOCK_DGRAM)
-
-
-def udp_port_is_free(port: int) -> bool:
-    """Whether a program could listen on this UDP port of 127.0.0.1 now."""
-    return port_is_free(socket.SOCK_DGRAM, port)
+free_tcp_port = partial(free_port, socket.SOCK_STREAM)
+free_udp_port = partial(free_port, socket.SOCK_DGRAM)
+udp_port_is_free = partial(port_is_free, socket.SOCK_DGRAM)
 
 
 @contextmanager
 def free_domain() -> Iterator[int]:
-    """Yields a ROS domain without a participant on this machine, claimed until the block ends.
+    """Yields a ROS domain without participants on this machine, claimed until the block ends.
 
     Raises:
         UserError: every domain is in use.
@@ -78,11 +69,11 @@ def free_domain() -> Iterator[int]:
         if claim is None:
             continue
         with claim:
-            # The discovery port of the domain, which its participants share.
+            # The domain's multicast discovery port, which all its participants share.
             if _can_bind(socket.SOCK_DGRAM, _ANY_ADDRESS, 7400 + 250 * domain):
                 yield domain
                 return
-    raise UserError("all ROS domains are in use", "Stop what nobody needs any more, or choose one yourself")
+    raise UserError("all ROS domains are in use", "Stop unused ROS programs, or choose a domain yourself")
 
 
 def _claimed_block() -> Iterator[int]:
@@ -95,14 +86,14 @@ def _claimed_block() -> Iterator[int]:
 
 
 def _round_robin(first: int, claim: socket.socket) -> Iterator[int]:
-    # Round again rather than from the start: a socket may close late. The iterator holds the claim.
+    # Repeats the whole block before any port, because sockets may close late. The iterator holds the claim.
     with claim:
         while True:
             yield from range(first, first + _BLOCK_SIZE)
 
 
 def _claim(name: str) -> socket.socket | None:
-    """Returns what holds the claim until it is closed; None where another program has it."""
+    """Returns a socket that holds the claim until it is closed; None if another program holds it."""
     holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         holder.bind(f"\0robot-gateway-{name}")

@@ -1,7 +1,7 @@
-"""The only import of `gi` in the project: whoever needs GStreamer gets it here.
+"""The only import of `gi` in the project; all users of GStreamer import it from here.
 
-Importing this module fails with a `UserError` that says what to install, where GStreamer or PyGObject is
-missing; so it is imported late, by the part that is about to build a pipeline.
+Without GStreamer or PyGObject, importing this module raises a `UserError` that says what to install. It is
+therefore imported late, by code that is about to build a pipeline.
 """
 
 import ctypes
@@ -13,7 +13,7 @@ from common.errors import UserError
 # GStreamer's core brings libunwind, which defines the same _Unwind_* symbols as libgcc_s. In a process that
 # loaded the C++ runtime before GStreamer (importing grpc does), libsrt would throw its exceptions with one
 # of the two and catch them with the other, which aborts the process when an SRT element stops. With
-# libgcc_s in the global scope everybody finds the same one, whatever was imported first.
+# libgcc_s in the global scope, every library resolves to the same one in any order of imports.
 with suppress(OSError):
     ctypes.CDLL("libgcc_s.so.1", mode=ctypes.RTLD_GLOBAL)
 
@@ -33,12 +33,12 @@ except (ImportError, ValueError) as error:
         "Type: scripts/setup, or install gir1.2-gstreamer-1.0, gir1.2-gst-plugins-base-1.0 and PyGObject",
     ) from error
 
-# gi builds these at run time from typelibs; no stub describes them well enough to be worth having.
+# gi builds these at run time from typelibs; no stub describes them well enough.
 Gst: Final[Any] = _Gst
 GstVideo: Final[Any] = _GstVideo
 GLib: Final[Any] = _GLib
 GObject: Final[Any] = _GObject
-# Needed for reading socket addresses out of srtsink's statistics.
+# srtsink's statistics hold socket addresses as Gio objects.
 Gio: Final[Any] = _Gio
 
 Gst.init(None)

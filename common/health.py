@@ -1,6 +1,10 @@
-"""The standard health service (grpc.health.v1), as every server of the project offers it."""
+"""The standard health service (grpc.health.v1), offered by every server of the project.
 
-import asyncio
+The asyncio servicer of grpc_health (1.85) is not used. Its Check of an unknown service has no error details.
+Its Watch is a coroutine that writes to the context, which interceptors of response iterators can't wrap; and
+it writes while it holds the lock that `set` needs, so one watcher that does not read blocks `set` and others.
+"""
+
 from collections.abc import AsyncIterator
 from typing import Literal, TypeAlias
 
@@ -8,59 +12,58 @@ import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthServicer, add_HealthServicer_to_server
 
+from common.broadcast import Broadcast
 from common.errors import UnknownServiceError
-from common.rpc import Context
+from common.interceptors import RpcContext
 
-_State: TypeAlias = Literal[0, 1, 2, 3]
-_SERVING = HealthCheckResponse.SERVING
-_NOT_SERVING = HealthCheckResponse.NOT_SERVING
-_UNKNOWN = HealthCheckResponse.SERVICE_UNKNOWN
+_Status: TypeAlias = Literal[0, 1, 2, 3]
 
 
 class Health(HealthServicer):
-    """The server as a whole (the empty name) serves as long as it answers; `set_serving` tells of its parts.
+    """Serving status by service name; the empty name is the server itself, SERVING as long as it responds.
 
     Used on the server's event loop alone.
 
     Args:
-        services: full names of services that serve as long as the server does.
+        services: full names of further services that are SERVING as long as the server is.
     """
 
     def __init__(self, *services: str) -> None:
-        self._states: dict[str, _State] = dict.fromkeys(("", *services), _SERVING)
-        self._changed = asyncio.Event()
+        self._statuses: dict[str, _Status] = dict.fromkeys(("", *services), HealthCheckResponse.SERVING)
+        self._changes = Broadcast()
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the service to a server that has not been started."""
         add_HealthServicer_to_server(self, server)
 
     def set_serving(self, service: str, *, serving: bool) -> None:
-        """Tells how a part is; those who watch learn it when it is news."""
-        state = _SERVING if serving else _NOT_SERVING
-        if self._states.get(service) == state:
-            return
-        self._states[service] = state
-        self._changed.set()
-        self._changed = asyncio.Event()
+        """Sets the status of a service to SERVING or NOT_SERVING; watchers are sent each change."""
+        self._statuses[service] = HealthCheckResponse.SERVING if serving else HealthCheckResponse.NOT_SERVING
+        self._changes.notify_all()
 
     async def Check(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: Context
+        self, request: HealthCheckRequest, context: RpcContext
     ) -> HealthCheckResponse:
-        """The state now."""
-        state = self._states.get(request.service)
-        if state is None:
-            raise UnknownServiceError(f"no service '{request.service}' is known here")
-        return HealthCheckResponse(status=state)
+        """Returns the current status.
+
+        Raises:
+            UnknownServiceError: no status was ever set for this service.
+        """
+        status = self._statuses.get(request.service)
+        if status is None:
+            raise UnknownServiceError(f"the service '{request.service}' is unknown here")
+        return HealthCheckResponse(status=status)
 
     async def Watch(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: Context
+        self, request: HealthCheckRequest, context: RpcContext
     ) -> AsyncIterator[HealthCheckResponse]:
-        """The state now and whenever it changes, until the caller leaves."""
-        last = None
+        """Yields the current status, then each change; SERVICE_UNKNOWN until the first `set_serving`."""
+        sent: _Status | None = None
+
+        def changed() -> bool:
+            return self._statuses.get(request.service, HealthCheckResponse.SERVICE_UNKNOWN) != sent
+
         while True:
-            changed = self._changed
-            state = self._states.get(request.service, _UNKNOWN)
-            if state != last:
-                last = state
-                yield HealthCheckResponse(status=state)
-            await changed.wait()
+            await self._changes.wait_until(changed)
+            sent = self._statuses.get(request.service, HealthCheckResponse.SERVICE_UNKNOWN)
+            yield HealthCheckResponse(status=sent)

@@ -1,40 +1,38 @@
-"""Asks a server of ours whether it serves, for the containers' health checks: ends 0 (yes) or 1 (no).
+"""Health check for containers: exits 0 if a gRPC server reports SERVING, else 1.
 
-`python -m common.healthcheck [TARGET [SERVICE]]`; without a target the environment's HEALTH_TARGET counts,
-without a service the server as a whole.
+`python -m common.healthcheck [TARGET [SERVICE]]`. TARGET defaults to the environment variable HEALTH_TARGET,
+SERVICE to the server as a whole.
 """
 
 import os
 import sys
-from typing import Final
+from typing import Any, Final
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
-_METHOD: Final = "/grpc.health.v1.Health/Check"
-_ANSWER_WITHIN_S: Final = 3.0
+_TIMEOUT_S: Final = 3.0
 
 
 def state_of(target: str, service: str = "") -> str:
-    """SERVING, NOT_SERVING, SERVICE_UNKNOWN, or why there is no answer.
+    """Returns the serving status by name, or "CODE: details" of the gRPC error.
 
     Args:
         target: "HOST:PORT" or "unix:PATH".
-        service: its full name, or a name the server made up for a part of it.
+        service: full name of a service, or another name that the server reports a status for.
     """
     with grpc.insecure_channel(target) as channel:
-        check = channel.unary_unary(
-            _METHOD, HealthCheckRequest.SerializeToString, HealthCheckResponse.FromString
-        )
+        stub: Any = HealthStub(channel)
         try:
-            answer = check(HealthCheckRequest(service=service), timeout=_ANSWER_WITHIN_S)
+            response = stub.Check(HealthCheckRequest(service=service), timeout=_TIMEOUT_S)
         except grpc.RpcError as error:
             return f"{error.code().name}: {error.details()}"
-    return HealthCheckResponse.ServingStatus.Name(answer.status)
+    return HealthCheckResponse.ServingStatus.Name(response.status)
 
 
 def main() -> None:
-    """The program."""
+    """Runs the check and exits."""
     target = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("HEALTH_TARGET", "")
     if not target:
         raise SystemExit("error: no target. Name one, 127.0.0.1:50051 for example, or set HEALTH_TARGET")

@@ -1,4 +1,4 @@
-"""Logging for all programs: one line per event, on standard error, for people or for programs."""
+"""Logging of all programs: one line per record on standard error, as text or as JSON."""
 
 import json
 import logging
@@ -14,25 +14,25 @@ _HUMAN: Final = "%(asctime)s %(levelname)-7s %(name)s: %(message)s%(of_request)s
 
 
 def configure(level: str, form: Format = "human") -> None:
-    """Sends all log records from `level` ("debug", "info", "warning", "error") up to standard error."""
+    """Sends records of at least `level` ("debug", "info", "warning", "error") to standard error."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Json() if form == "json" else logging.Formatter(_HUMAN))
-    handler.addFilter(_tell_request)
+    handler.addFilter(_add_request_id)
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
-    # The debug chatter of asyncio and gRPC says nothing about the robot.
+    # Debug records of asyncio and gRPC are frequent and say nothing about the robot.
     for name in ("asyncio", "grpc"):
         logging.getLogger(name).setLevel(logging.WARNING)
 
 
-def _tell_request(record: logging.LogRecord) -> bool:
-    """Notes which request a record belongs to; lets every record pass."""
+def _add_request_id(record: logging.LogRecord) -> bool:
+    """Adds the id of the current request to the record; never drops one."""
     of = request_id.current()
     record.__dict__.update(request_id=of, of_request=f" [request {of}]" if of else "")
     return True
 
 
 class _Json(logging.Formatter):
-    """One object a line: time (UTC), level, logger, message; request_id and exception where there is one."""
+    """Formats a record as JSON: time (UTC), level, logger, message; request_id and exception if any."""
 
     def format(self, record: logging.LogRecord) -> str:
         line = {

@@ -1,4 +1,4 @@
-"""Files that nobody else may read, written at once or not at all, by one program at a time."""
+"""Files readable by their owner alone: atomic replacement, and an advisory lock on their directory."""
 
 import fcntl
 import os
@@ -13,21 +13,21 @@ from common.errors import UserError
 
 PRIVATE_FILE: Final = 0o600
 PRIVATE_DIRECTORY: Final = 0o700
-_LOCKED_WITHIN_S: Final = 5.0
-_LOOK_EVERY_S: Final = 0.02
+_LOCK_TIMEOUT_S: Final = 5.0
+_LOCK_RETRY_S: Final = 0.02
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Writes a file at once or not at all; only its owner may read it, at no moment anybody else.
+    """Replaces a file atomically (rename(2)) by one with mode 0600; creates missing directories with 0700.
 
-    Directories that are missing are made for the owner alone.
+    After a crash, the file holds either the old or the new content.
 
     Raises:
-        UserError: it can't be written there.
+        UserError: it can't be written.
     """
     try:
         _make_directory(path.parent)
-        # A link stays a link: what it points to is replaced. Temporary files are made with mode 0600.
+        # A symbolic link stays one: its target is replaced. mkstemp creates files with mode 0600.
         path = path.resolve()
         handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     except OSError as error:
@@ -38,20 +38,19 @@ def write_private(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         Path(temporary).replace(path)
-    except OSError as error:
+    except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
-        raise _unwritable(path, error) from error
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise _unwritable(path, error) from error
         raise
 
 
 @contextmanager
-def alone_in(directory: Path) -> Iterator[None]:
-    """Nobody else who asks here changes the directory's files meanwhile; it is made when it is missing.
+def directory_lock(directory: Path) -> Iterator[None]:
+    """Holds the exclusive advisory lock (flock(2)) of a directory, which is created if missing.
 
     Raises:
-        UserError: it can't be made, or somebody is still at it after 5 s.
+        UserError: it can't be created, or another program holds the lock for more than 5 s.
     """
     try:
         _make_directory(directory)
@@ -62,7 +61,7 @@ def alone_in(directory: Path) -> Iterator[None]:
         _lock(handle, directory)
         yield
     finally:
-        # Closing gives the lock back.
+        # Closing the descriptor releases the lock.
         os.close(handle)
 
 
@@ -73,22 +72,21 @@ def _make_directory(directory: Path) -> None:
 
 
 def _lock(handle: int, directory: Path) -> None:
-    give_up_s = time.monotonic() + _LOCKED_WITHIN_S
+    give_up_s = time.monotonic() + _LOCK_TIMEOUT_S
     while True:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             if time.monotonic() > give_up_s:
                 raise UserError(
-                    f"another program has been changing {directory} for {_LOCKED_WITHIN_S:g} s",
-                    "Try again when it has ended",
+                    f"another program has been changing {directory} for {_LOCK_TIMEOUT_S:g} s",
+                    "Try again when it has finished",
                 ) from error
-            time.sleep(_LOOK_EVERY_S)
+            time.sleep(_LOCK_RETRY_S)
         else:
             return
 
 
 def _unwritable(path: Path, error: OSError) -> UserError:
-    return UserError(
-        f"{path} can't be written: {error.strerror}", "Look at the directory's rights and at the disk"
-    )
+    what = f"{path} can't be written: {error.strerror}"
+    return UserError(what, "Check the permissions of the directory and the free disk space")

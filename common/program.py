@@ -1,4 +1,4 @@
-"""How a program of ours runs: one asyncio loop until SIGINT or SIGTERM, and one line on an error."""
+"""Entry points of programs: an asyncio loop that SIGINT and SIGTERM stop, and errors as one line."""
 
 import asyncio
 import signal
@@ -12,7 +12,7 @@ from common.errors import UserError
 
 
 def run_to_exit(work: Callable[[], None]) -> None:
-    """Calls `work`; a `UserError` out of it becomes one line on standard error and the exit code it names."""
+    """Calls `work`; if it raises a `UserError`, prints it as one line and exits with its exit code."""
     try:
         work()
     except UserError as error:
@@ -20,15 +20,15 @@ def run_to_exit(work: Callable[[], None]) -> None:
 
 
 def end_with(error: UserError) -> NoReturn:
-    """Ends the program with one line and the exit code that the error names."""
+    """Prints the error as one line on standard error and exits with its exit code."""
     print(f"error: {error}", file=sys.stderr)
     raise SystemExit(int(error.exit_code))
 
 
 def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
-    """Runs `main(stop)` on a fresh uvloop; `stop` is set by the first SIGINT or SIGTERM.
+    """Runs `main(stop)` on a new uvloop; the first SIGINT or SIGTERM sets `stop`, a second cancels `main`.
 
-    `main` is expected to return soon after `stop` is set. A second signal while it is still at it cancels it.
+    `main` is expected to return soon after `stop` is set.
     """
     uvloop.run(_with_signals(main))
 

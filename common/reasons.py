@@ -1,41 +1,39 @@
-"""Why a call was refused: stable words for programs, sent as google.rpc.ErrorInfo with every refusal."""
+"""Machine-readable reasons of refused calls, sent as google.rpc.ErrorInfo with every refusal."""
 
 from enum import StrEnum
 
 
 class Reason(StrEnum):
-    """The whole table; docs/errors.md gives each a sentence, and a test holds it to that.
+    """All reasons; docs/errors.md documents each, which a test verifies.
 
-    A word is never given another meaning. Clients must expect words that they don't know.
+    A reason never changes its meaning. Clients must expect unknown reasons.
     """
 
     INVALID_REQUEST = "INVALID_REQUEST"
-    """The request makes no sense as it stands; google.rpc.BadRequest names the fields."""
-    NOT_NOW = "NOT_NOW"
-    """The state of things forbids it."""
+    """The request is invalid; google.rpc.BadRequest names the fields."""
     UNKNOWN_SERVICE = "UNKNOWN_SERVICE"
     """The health service knows no service of that name."""
     MESSAGE_TOO_LARGE = "MESSAGE_TOO_LARGE"
-    """The request is longer than this gateway takes."""
+    """The request exceeds the gateway's size limit."""
     TOO_MANY_CONNECTIONS = "TOO_MANY_CONNECTIONS"
-    """Others have taken all connections that this gateway serves."""
+    """Other clients use all connections that the gateway, or the caller's address, may have."""
     TOO_MANY_STREAMS = "TOO_MANY_STREAMS"
-    """This connection has as many streams open as one may have."""
+    """The connection has as many streams open as permitted."""
     TOO_MANY_REQUESTS = "TOO_MANY_REQUESTS"
-    """This connection asks more often than one may; google.rpc.RetryInfo says when it may again."""
+    """The connection exceeds its request rate; google.rpc.RetryInfo says when to retry."""
     CREDENTIAL_MISSING = "CREDENTIAL_MISSING"
-    """Nothing in the request says who asks."""
+    """The call carries no credential."""
     CREDENTIAL_UNKNOWN = "CREDENTIAL_UNKNOWN"
-    """What was shown is none of this robot's credentials."""
+    """The credential is not one of this robot's."""
     CREDENTIAL_REVOKED = "CREDENTIAL_REVOKED"
-    """It was one, until it was revoked."""
+    """The credential was revoked."""
     CREDENTIAL_EXPIRED = "CREDENTIAL_EXPIRED"
-    """It was one, until its time was over."""
+    """The credential has expired."""
     CREDENTIAL_NOT_YET_VALID = "CREDENTIAL_NOT_YET_VALID"
-    """It will be one later, by the robot's clock."""
+    """The credential is not valid yet, by the robot's clock."""
     ROLE_TOO_LOW = "ROLE_TOO_LOW"
-    """The caller is known and may not do this."""
+    """The caller is authenticated, but the method needs a higher role."""
     LOCKED_OUT = "LOCKED_OUT"
-    """Too many wrong credentials came from this address; google.rpc.RetryInfo says when it may try again."""
+    """Too many wrong credentials came from this address; google.rpc.RetryInfo says when to retry."""
     INTERNAL = "INTERNAL"
-    """A defect of the gateway. Its log says more."""
+    """A defect of the gateway; its log has the details."""

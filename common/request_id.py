@@ -1,7 +1,7 @@
-"""One id per request: in every log line that it causes, in both containers, and in what a caller may quote.
+"""The id of the current request: in its log lines in both containers, and in error reports of callers.
 
-A caller may bring its own in the metadata. Most requests cause no log line, so the id is made when somebody
-asks for it first.
+A caller may send its own id in the metadata. Otherwise one is generated on first use, because most requests
+write no log line.
 """
 
 import re
@@ -14,15 +14,15 @@ from typing import Any, Final, Protocol
 HEADER: Final = "x-request-id"
 """The metadata key."""
 _FIT_TO_LOG: Final = re.compile(r"[A-Za-z0-9._:-]{1,64}")
-"""Anything else might be made to look like a log line of its own."""
+"""Rejects ids that could forge log lines."""
 _NEW_BYTES: Final = 8
 
 
 class Call(Protocol):
-    """What is needed of gRPC's context."""
+    """The part of grpc.ServicerContext that is used."""
 
     def invocation_metadata(self) -> Any:
-        """Pairs of key and value, or None."""
+        """Returns pairs of key and value, or None."""
 
 
 class _Request:
@@ -34,7 +34,7 @@ class _Request:
 
     def id(self) -> str:
         if not self._id:
-            self._id = _brought(self._call) or secrets.token_hex(_NEW_BYTES)
+            self._id = _sent_by(self._call) or secrets.token_hex(_NEW_BYTES)
         return self._id
 
 
@@ -42,19 +42,19 @@ _request: ContextVar[_Request | None] = ContextVar("request", default=None)
 
 
 def begin(call: Call) -> None:
-    """The task that runs now serves this call, until it ends."""
+    """Associates the current task with this call, until the task ends."""
     _request.set(_Request(call))
 
 
 def current() -> str:
-    """The id of the request that is served, empty when none is."""
+    """Returns the id of the current request; empty outside of requests."""
     request = _request.get()
     return request.id() if request else ""
 
 
 @contextmanager
 def continuing(request_id: str) -> Iterator[None]:
-    """What is done in the block is done for this request; with an empty id, for none."""
+    """Runs the block on behalf of the given request; of none if the id is empty."""
     token = _request.set(_Request(None, request_id) if request_id else None)
     try:
         yield
@@ -62,7 +62,7 @@ def continuing(request_id: str) -> Iterator[None]:
         _request.reset(token)
 
 
-def _brought(call: Call | None) -> str:
+def _sent_by(call: Call | None) -> str:
     for key, value in (call.invocation_metadata() or ()) if call else ():
         if key == HEADER and isinstance(value, str) and _FIT_TO_LOG.fullmatch(value):
             return value

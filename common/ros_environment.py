@@ -1,4 +1,4 @@
-"""What the environment tells ROS 2, checked before ROS 2 reads it: its own answer is to end the process."""
+"""Validates the environment variables of ROS 2, because ROS 2 itself aborts the process on invalid ones."""
 
 import ctypes
 import os
@@ -6,15 +6,15 @@ from typing import Final
 
 from common.errors import ExitCode, UserError
 
-# Beyond it, the ports that DDS computes from the domain do not exist, and Fast DDS ends the process.
 _LAST_DOMAIN: Final = 232
+"""The ports of higher domains exceed 65535 (DDSI-RTPS 9.6: 7400 + 250 x domain); Fast DDS then aborts."""
 
 
 def check_domain() -> None:
-    """Refuses a domain that can't be.
+    """Validates ROS_DOMAIN_ID.
 
     Raises:
-        UserError: ROS_DOMAIN_ID is no number of a domain.
+        UserError: it is not a number from 0 to 232.
     """
     domain = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not (domain.isascii() and domain.isdigit() and int(domain) <= _LAST_DOMAIN):
@@ -26,10 +26,10 @@ def check_domain() -> None:
 
 
 def check_middleware() -> None:
-    """Refuses a middleware that is not installed; to be called before anything imports rclpy.
+    """Validates RMW_IMPLEMENTATION; must be called before rclpy is imported.
 
     Raises:
-        UserError: RMW_IMPLEMENTATION names none that can be loaded.
+        UserError: it names a middleware that can't be loaded.
     """
     name = os.environ.get("RMW_IMPLEMENTATION", "")
     if not name:

@@ -1,4 +1,8 @@
-"""The version of what is installed, and the revision it was built from."""
+"""Version and git revision of the running program.
+
+The version has one home, pyproject.toml, and is read from the installed distribution's metadata. The
+revision names the exact commit (docs/decisions/0010-version-in-pyproject.md).
+"""
 
 import os
 import re
@@ -7,12 +11,12 @@ from pathlib import Path
 from typing import Final
 
 REVISION_VARIABLE: Final = "ROBOT_GATEWAY_REVISION"
-"""Set by whoever builds an image, which holds no repository."""
+"""Environment variable that holds the revision; set in container images, which contain no repository."""
 _REVISION: Final = re.compile(r"[0-9a-f]{40}")
 
 
 def project_version() -> str:
-    """MAJOR.MINOR.PATCH of the installed project, "0.0.0" in a tree that was never installed."""
+    """Returns MAJOR.MINOR.PATCH of the installed distribution; "0.0.0" if there is none."""
     try:
         return version("robot-gateway")
     except PackageNotFoundError:
@@ -20,14 +24,16 @@ def project_version() -> str:
 
 
 def project_revision(repository: Path = Path(__file__).parents[1] / ".git") -> str:
-    """The git revision (40 digits): from the environment, else of the tree; empty when unknown."""
-    told = os.environ.get(REVISION_VARIABLE, "").strip().lower()
-    found = told or _checked_out(repository)
-    return found if _REVISION.fullmatch(found) else ""
+    """Returns the git commit as 40 hexadecimal digits, or "" if unknown.
+
+    The environment variable takes precedence over the checked-out commit of `repository`.
+    """
+    revision = os.environ.get(REVISION_VARIABLE, "").strip().lower() or _head_commit(repository)
+    return revision if _REVISION.fullmatch(revision) else ""
 
 
-def _checked_out(repository: Path) -> str:
-    """What HEAD stands for; read from the files, because a robot has no git."""
+def _head_commit(repository: Path) -> str:
+    """Resolves HEAD as in gitrepository-layout(5): from files, because git is not installed on a robot."""
     try:
         head = (repository / "HEAD").read_text(encoding="ascii").strip()
         reference = head.removeprefix("ref: ")

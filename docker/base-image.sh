@@ -19,6 +19,7 @@ sources() {
   if [ -n "${DEBIAN_MIRROR:-}" ]; then
     echo "$DEBIAN_MIRROR $suite main"
   else
+    # shellcheck disable=SC2016  # apt expands these, not the shell
     apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
       awk -v suite=$suite '$2 ~ "^" suite "(-updates|-security)?$" && $3 == "main"' | sort -u
   fi
@@ -37,7 +38,7 @@ say "making $image from packages"
 as_root debootstrap --variant=minbase "$suite" "$root/system" "$mirror" > .cache/base-image.log 2>&1 ||
   { tail -n 10 .cache/base-image.log >&2; fail "debootstrap failed; the lines above say why"; }
 sources | sed 's/^/deb /' | as_root tee "$root/system/etc/apt/sources.list" > /dev/null
-# What the official slim image leaves out, too: nobody reads manual pages in a container.
+# The official slim image leaves these out as well: a container needs no manual pages.
 as_root rm -rf "$root/system/var/cache/apt/archives" "$root/system"/usr/share/{doc,man,info,locale}/* \
   "$root/system"/var/lib/apt/lists/*
 printf 'path-exclude /usr/share/%s/*\n' doc man info locale |

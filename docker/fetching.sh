@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # To be sourced in a build step that downloads Python packages. Two optional build secrets: "ca", certificates of a
 # proxy that inspects TLS, and "index", the address of the package index where it is not the public one (it may hold
 # a password, so it is no build argument).
@@ -10,5 +11,5 @@ else
 fi
 if [ -s /run/secrets/index ]; then
   PIP_INDEX_URL=$(cat /run/secrets/index)
-  export PIP_INDEX_URL UV_DEFAULT_INDEX=$PIP_INDEX_URL
+  export PIP_INDEX_URL UV_DEFAULT_INDEX="$PIP_INDEX_URL"
 fi

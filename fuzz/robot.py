@@ -6,27 +6,24 @@ from typing import Any, Final
 from rclpy.serialization import deserialize_message
 
 from gateway.config import DEFAULT_SOURCES, SourceSettings
-from gateway.ros.cutting import cut
-from gateway.ros.decoding import longest_list
-from gateway.ros.placing import place
+from gateway.ros.decoding import max_list_items
+from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import reader_for
-from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.status import overlay_snapshot
-from gateway.status.board import Board, SourceKind
+from gateway.rpc.recipient import Recipient
+from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, SourceRule, take
 from gateway.status.values import Received
 
-MODE: Final = SourceSettings(
-    kind=SourceKind.MODE, topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000
-)
+MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
 OTHER_DETECTIONS: Final = SourceSettings(
-    kind=SourceKind.DETECTIONS, topic="/d", type="vision_msgs/msg/Detection2DArray", stale_after_ms=500
+    kind="detections", topic="/d", type="vision_msgs/msg/Detection2DArray", stale_after_ms=500
 )
 SOURCES: Final = (*DEFAULT_SOURCES, MODE, OTHER_DETECTIONS)
 """One of each type that has a reader."""
 _RULES: Final = Rules(
-    {source.kind: SourceRule(source.stale_after_ms, source.required) for source in SOURCES}, 3000
+    {source.spec: SourceRule(source.stale_after_ms, source.required) for source in SOURCES}, 3000
 )
 _PREVIEW: Final = PreviewView(PreviewState.DISABLED, None, "", False, None, None, None, None, Counters())
 
@@ -46,9 +43,9 @@ def robots_message(data: bytes) -> None:
         return
     index = data[0] % len(SOURCES)
     source, raw = SOURCES[index], data[1:]
-    longest = longest_list(source)
-    if longest:
-        raw, _ = cut(raw, longest)
+    max_items = max_list_items(source)
+    if max_items:
+        raw, _ = truncate_list(raw, max_items)
     try:
         message = deserialize_message(raw, _TYPES[index])
     except Exception:  # noqa: BLE001  # the foreign decoder's word on foreign bytes; the sampler counts it
@@ -60,8 +57,8 @@ def robots_message(data: bytes) -> None:
 
 def _serve(source: SourceSettings, value: Any) -> None:
     board = Board()
-    place(board, source, Received(value, 1.0))
-    place(board, source, Received(value, 1.5))
+    board[source.spec] = Received(value, 1.0)
+    board[source.spec] = Received(value, 1.5)
     now = take(
         identity=Identity("fuzz", "0", insecure=False),
         rules=_RULES,
@@ -70,5 +67,5 @@ def _serve(source: SourceSettings, value: Any) -> None:
         events=(),
         now_s=2.0,
     )
-    answer = overlay_snapshot(now, Caller("127.0.0.1", may_watch=True)).SerializeToString()
+    answer = overlay_snapshot(now, Recipient("127.0.0.1", sees_passphrase=True)).SerializeToString()
     assert len(answer) < 1_000_000

@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from types import MappingProxyType
-from typing import Final
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
-from google.protobuf.message_factory import GetMessageClass
 
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
@@ -22,30 +21,29 @@ from console.robots.robots_file import parse_robots_file
 from fuzz.robot import robots_message
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
-from gateway.config import load_settings
-from gateway.metrics.endpoint import answer
-from gateway.preview_link.wire import UnknownSpeechError, from_wire
-from gateway.ros.cutting import cut
-from gateway.rpc.limits import MOST_REQUEST_BYTES
-from gateway.rpc.requests import Requests, hold_to_rules
-from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
+from gateway.config import GatewaySettings, load_settings
+from gateway.links.link import LinkLostError
+from gateway.links.preview.wire import from_wire
+from gateway.metrics.endpoint import respond
+from gateway.ros.list_truncation import truncate_list
+from gateway.rpc.interceptors.validation import Validation
+from gateway.rpc.methods import CONTRACT, method_at
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
-from preview.rpc.mapping import wish
+from preview.rpc.mapping import desired_state
 
 Target = Callable[[bytes], None]
 
-_REQUESTS: Final = [
-    Requests(GetMessageClass(method.input_type), MOST_REQUEST_BYTES)
-    for method in DESCRIPTOR.services_by_name["RobotGateway"].methods
-]
+_VALIDATION: Final = Validation(GatewaySettings().limits.request_bytes)
+_METHODS: Final = [method_at(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
 
 
 def operators_request(data: bytes) -> None:
-    """The request of every method, as the gateway reads it and holds it to the schema's rules."""
-    for requests in _REQUESTS:
+    """The request of every method, parsed and checked against the schema's rules."""
+    for method in _METHODS:
+        call: Any = SimpleNamespace(method=method, request=None)
         with suppress(DomainError):
-            hold_to_rules(requests.read(data))
+            _VALIDATION.on_request(call, data)
 
 
 def gateways_wish(data: bytes) -> None:
@@ -53,14 +51,14 @@ def gateways_wish(data: bytes) -> None:
     request = preview_pb.ApplyDesiredStateRequest()
     if _parses(request, data):
         with suppress(InvalidRequestError):
-            wish(request.desired)
+            desired_state(request.desired)
 
 
 def previews_truth(data: bytes) -> None:
     """What the preview service reports, as the gateway takes it in."""
     state = preview_pb.ActualState()
     if _parses(state, data):
-        with suppress(UnknownSpeechError):
+        with suppress(LinkLostError):
             from_wire(state)
 
 
@@ -85,7 +83,7 @@ def configuration(data: bytes) -> None:
 
 def metrics_request(data: bytes) -> None:
     """An HTTP request to the metrics' port: always a whole answer."""
-    assert answer(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
+    assert respond(data, lambda: b"x 1\n").startswith(b"HTTP/1.1 ")
 
 
 def request_id(data: bytes) -> None:
@@ -126,10 +124,10 @@ def known_robots(data: bytes) -> None:
 
 
 def long_list(data: bytes) -> None:
-    """A list that is cut before it is decoded: the message keeps its length, nothing is added."""
-    shorter, left_out = cut(data, longest=100)
+    """A list that is truncated before decoding: the message keeps its length, nothing is added."""
+    shorter, truncated = truncate_list(data, max_items=100)
     assert len(shorter) == len(data)
-    assert left_out >= 0
+    assert truncated >= 0
 
 
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(

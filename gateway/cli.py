@@ -9,11 +9,11 @@ from rich.console import Console
 from common import logs
 from common.findings import exit_code, print_findings
 from common.program import run, run_to_exit
+from gateway.access_control import read_access
 from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, load_settings
 from gateway.credentials_cli import app as credentials_app
 from gateway.doctor.examination import examine
-from gateway.door import read_access
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 app.add_typer(credentials_app, name="credentials")

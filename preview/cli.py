@@ -1,4 +1,4 @@
-"""`robot-preview`: the program that makes the video."""
+"""`robot-preview`: the command line of the preview service."""
 
 import asyncio
 import json
@@ -11,10 +11,11 @@ import typer
 from common import config, logs, program
 from preview.config import PreviewSettings
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, help="Makes the robot's live video.")
+app = typer.Typer(no_args_is_help=True, add_completion=False, help="Serves the robot's live video.")
 
 _Config = Annotated[
-    Path | None, typer.Option("--config", help="YAML file; without it the defaults and PREVIEW__... count.")
+    Path | None,
+    typer.Option("--config", help="YAML file; default: built-in values and PREVIEW__... variables."),
 ]
 
 
@@ -26,30 +27,37 @@ def serve(config_file: _Config = None) -> None:
 
 @app.command()
 def check(config_file: _Config = None) -> None:
-    """Checks the configuration and ends."""
+    """Checks the configuration and exits."""
     program.run_to_exit(lambda: _check(config_file))
 
 
 @app.command()
 def encoders(
     config_file: _Config = None,
-    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
 ) -> None:
-    """Tries every encoder and lists what came of it."""
+    """Tries every encoder and lists the results."""
     program.run_to_exit(lambda: _encoders(config_file, as_json=as_json))
 
 
 def main() -> None:
-    """The entry point."""
+    """Entry point."""
     app()
 
 
-def _serve(config_file: Path | None) -> None:
+def _load(config_file: Path | None) -> PreviewSettings:
     settings = config.load(PreviewSettings, config_file)
     logs.configure(settings.log_level, settings.log_format)
-    # Trials are started by fork and exec; gRPC's own handlers for a bare fork only get in their way.
+    return settings
+
+
+# GStreamer is imported late: without it, checking the configuration still works.
+
+
+def _serve(config_file: Path | None) -> None:
+    settings = _load(config_file)
+    # Trials are started by fork and exec; gRPC's handlers for a bare fork would only get in their way.
     os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
-    # Imported late: without GStreamer a check of the configuration still works.
     from preview.app import serve as serve_app  # noqa: PLC0415
 
     program.run(lambda stop: serve_app(settings, stop))
@@ -61,11 +69,13 @@ def _check(config_file: Path | None) -> None:
 
 
 def _encoders(config_file: Path | None, *, as_json: bool) -> None:
-    settings = config.load(PreviewSettings, config_file)
-    logs.configure(settings.log_level, settings.log_format)
-    from preview.encoders import listing  # noqa: PLC0415  # as above
+    settings = _load(config_file)
+    from preview.encoders import listing  # noqa: PLC0415
+    from preview.encoders.probe import TrialProber  # noqa: PLC0415
 
-    rows = asyncio.run(listing.try_all(settings))
+    encoders = settings.encoders
+    prober = TrialProber(settings.profiles.largest, encoders.probe_timeout_s)
+    rows = asyncio.run(listing.rows(prober, encoders.preference, encoders.allowed))
     print(json.dumps(rows, indent=2) if as_json else listing.table(rows))
 
 

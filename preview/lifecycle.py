@@ -1,47 +1,47 @@
-"""The life of the preview: every transition in one table, when to try again, what was counted.
+"""Lifecycle of the preview: one table of transitions, retry backoff, counters.
 
-Nothing here knows a pipeline, an encoder or a clock. The manager tells what happened, the table says what
-follows. An event that the table doesn't list is a defect of the caller: it is an error that names the state
-and the event, and changes nothing.
+Pure: knows no pipeline, encoder or clock. The supervisor reports events, the table gives the next state. An
+event that the table does not list for the current state is a defect of the caller: it raises an error that
+names both and changes nothing.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
 
 class State(Enum):
-    """Where the preview is in its life."""
+    """State of the preview."""
 
     DISABLED = "disabled"
-    """No pipeline, no port, no CPU."""
+    """No pipeline, no bound port, no CPU time."""
     STARTING = "starting"
-    """A pipeline is built or being built; no encoded frame yet."""
+    """A pipeline is being built or started; no encoded frame yet."""
     RUNNING = "running"
-    """Encoded frames leave."""
+    """Encoded frames reach the listener."""
     STOPPING = "stopping"
-    """The pipeline is being torn down because nobody wants it."""
+    """The pipeline is being torn down because the preview was disabled."""
     FAULTED = "faulted"
-    """Wanted but not delivering; a retry is scheduled."""
+    """Enabled but not delivering; a retry is scheduled."""
 
 
 class Event(Enum):
-    """What can happen."""
+    """Event that may change the state."""
 
     ENABLE = "enable"
-    """It is wanted: for the first time, or once more by a new request."""
+    """The preview was enabled, or enabled again by a new request."""
     DISABLE = "disable"
-    """It is not wanted any more."""
+    """The preview was disabled."""
     FIRST_FRAME = "first frame"
     """The first encoded frame reached the listener."""
     FAILURE = "failure"
     """Building, starting or running the pipeline failed."""
     RETRY = "retry"
-    """The time until the next attempt is over."""
+    """The retry delay has expired."""
     STOPPED = "stopped"
-    """The teardown that STOPPING waits for is done."""
+    """The teardown that STOPPING waits for has finished."""
 
 
 _D, _S, _R, _X, _F = State.DISABLED, State.STARTING, State.RUNNING, State.STOPPING, State.FAULTED
@@ -50,10 +50,10 @@ TRANSITIONS: Final[Mapping[State, Mapping[Event, State]]] = MappingProxyType(
     {
         _D: {Event.ENABLE: _S, Event.DISABLE: _D},
         _S: {Event.ENABLE: _S, Event.DISABLE: _X, Event.FIRST_FRAME: _R, Event.FAILURE: _F},
-        # Another profile is no transition: the same pipeline goes on with other figures.
+        # Switching the profile is no transition: the same pipeline goes on with other parameters.
         _R: {Event.ENABLE: _R, Event.DISABLE: _X, Event.FAILURE: _F},
-        # Wanted again while stopping: the stop is finished first, then a new life begins. A frame that was
-        # on its way, or a failure of what is being torn down anyway, means nothing any more.
+        # Enabled again while stopping: the teardown is finished before the next start. A first frame or a
+        # failure of the pipeline being torn down has no effect.
         _X: {
             Event.ENABLE: _X,
             Event.DISABLE: _X,
@@ -66,11 +66,11 @@ TRANSITIONS: Final[Mapping[State, Mapping[Event, State]]] = MappingProxyType(
 )
 
 RETRY_DELAYS_S: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
-"""Seconds before the first, second ... attempt after a fault; the last one repeats."""
+"""Exponential backoff in seconds before the first, second ... retry; the last one repeats."""
 
 
 class IllegalEventError(Exception):
-    """An event that has no place in the current state: a defect of the caller."""
+    """Event without a transition from the current state."""
 
     def __init__(self, state: State, event: Event) -> None:
         super().__init__(f"'{event.value}' can't happen while {state.value}")
@@ -80,13 +80,13 @@ class IllegalEventError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """What happened since the process started.
+    """Counts since the process started.
 
     Args:
         starts: pipelines started.
-        restarts: those of them that followed a fault.
-        faults: times the state became FAULTED.
-        fallbacks: times an encoder was passed over for the next one.
+        restarts: pipelines started after a fault; included in `starts`.
+        faults: transitions to FAULTED.
+        fallbacks: encoders replaced by the next one after a failure.
     """
 
     starts: int = 0
@@ -96,71 +96,53 @@ class Counters:
 
 
 class Lifecycle:
-    """The current state, the retries since it last worked, and the counters."""
+    """Current state, retry backoff and counters.
+
+    Args:
+        retry_delays_s: backoff in seconds; the last delay repeats.
+    """
 
     def __init__(self, retry_delays_s: Sequence[float] = RETRY_DELAYS_S) -> None:
-        self._state = State.DISABLED
+        self.state = State.DISABLED
+        self.counters = Counters()
         self._retry_delays_s = tuple(retry_delays_s)
-        self._attempts_failed = 0
-        self._counters = Counters()
-
-    @property
-    def state(self) -> State:
-        """Where the preview is."""
-        return self._state
-
-    @property
-    def counters(self) -> Counters:
-        """What was counted so far."""
-        return self._counters
+        self._failed_attempts = 0
 
     @property
     def retry_delay_s(self) -> float:
-        """How long to wait, from the moment of the newest fault, before RETRY."""
-        index = min(max(self._attempts_failed - 1, 0), len(self._retry_delays_s) - 1)
+        """Seconds from the newest fault to its retry."""
+        index = min(max(self._failed_attempts - 1, 0), len(self._retry_delays_s) - 1)
         return self._retry_delays_s[index]
 
     def handle(self, event: Event) -> State:
-        """Moves on.
-
-        Returns:
-            The new state.
+        """Applies an event and returns the new state.
 
         Raises:
-            IllegalEventError: the table has no such event in the current state; nothing was changed.
+            IllegalEventError: no transition for this event; nothing was changed.
         """
-        before = self._state
+        before = self.state
         after = TRANSITIONS[before].get(event)
         if after is None:
             raise IllegalEventError(before, event)
         self._count(before, event, after)
-        self._state = after
+        self.state = after
         return after
 
-    def note_fallback(self) -> None:
-        """Counts an encoder that was passed over for the next one."""
-        self._counters = _raised(self._counters, fallbacks=1)
+    def count_fallback(self) -> None:
+        """Counts an encoder that was replaced by the next one."""
+        self.counters = replace(self.counters, fallbacks=self.counters.fallbacks + 1)
 
-    def note_steady(self) -> None:
-        """The pipeline has run long enough to call its last fault over: delays begin at the first again."""
-        self._attempts_failed = 0
+    def reset_backoff(self) -> None:
+        """Starts the backoff again: the pipeline has run steadily since its last fault."""
+        self._failed_attempts = 0
 
     def _count(self, before: State, event: Event, after: State) -> None:
+        count = self.counters
         if after is State.STARTING and before is not State.STARTING:
-            self._counters = _raised(self._counters, starts=1, restarts=int(before is State.FAULTED))
+            restarts = count.restarts + (before is State.FAULTED)
+            self.counters = replace(count, starts=count.starts + 1, restarts=restarts)
         if after is State.FAULTED:
-            self._attempts_failed += 1
-            self._counters = _raised(self._counters, faults=1)
+            self._failed_attempts += 1
+            self.counters = replace(count, faults=count.faults + 1)
         if event is Event.DISABLE:
-            self._attempts_failed = 0
-
-
-def _raised(
-    counters: Counters, *, starts: int = 0, restarts: int = 0, faults: int = 0, fallbacks: int = 0
-) -> Counters:
-    return Counters(
-        counters.starts + starts,
-        counters.restarts + restarts,
-        counters.faults + faults,
-        counters.fallbacks + fallbacks,
-    )
+            self.reset_backoff()

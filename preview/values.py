@@ -1,11 +1,13 @@
-"""The words of the video side: what is wished, what is served, what is measured. Pure and immutable."""
+"""Immutable values of the preview service: desired state, actual state, stream parameters. Pure."""
 
 from dataclasses import dataclass, field
 from enum import Enum
 
+from preview.lifecycle import Counters, State
+
 
 class Profile(Enum):
-    """How much bandwidth the preview may take; the values are the keys of the configuration."""
+    """Bandwidth profile; the values are the keys of the configuration."""
 
     LOW_BW = "low_bw"
     BALANCED = "balanced"
@@ -13,21 +15,21 @@ class Profile(Enum):
 
 
 class Codec(Enum):
-    """How the pictures are compressed."""
+    """Video coding standard: ITU-T H.264 or H.265."""
 
     H264 = "h264"
     H265 = "h265"
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What the gateway wants.
+class DesiredState:
+    """State that the gateway requests.
 
     Args:
-        revision: two wishes with the same revision are the same wish; 0 means that there was none yet.
-        enabled: whether there shall be a preview.
-        profile: which one; kept while disabled.
-        passphrase: SRT passphrase, empty for none. Left out of every textual form.
+        revision: identifies the request; the same revision again is the same request. 0: none yet.
+        enabled: whether the preview is to run.
+        profile: bandwidth profile; kept while disabled.
+        passphrase: SRT passphrase (SRTO_PASSPHRASE), empty for none. Excluded from repr.
     """
 
     revision: int = 0
@@ -38,14 +40,14 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a profile means: the pictures, and what the encoder may spend on them.
+    """Stream parameters of a profile.
 
     Args:
-        width_px: picture width in pixels.
-        height_px: picture height in pixels.
-        fps: pictures per second at most; a slower source is not made faster.
-        bitrate_kbps: kbit/s of the compressed video.
-        floor_kbps: what the adaptive bit rate never goes below.
+        width_px: frame width in pixels.
+        height_px: frame height in pixels.
+        fps: upper limit in frames per second; a slower source is not sped up.
+        bitrate_kbps: kbit/s of the elementary stream.
+        floor_kbps: lower limit of the adaptive bit rate.
     """
 
     width_px: int
@@ -57,34 +59,51 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class EncoderChoice:
-    """The encoder in use and whether it is the one that was wanted; names are the catalogue's.
+    """Encoder in use and the one preferred by the configuration, by their names in the catalogue.
 
     Args:
-        name: what runs.
-        codec: how it compresses.
-        hardware: whether dedicated hardware does it.
-        wanted: the first choice of the configuration.
-        fallback_reason: why the first choice does not run, empty when it does.
+        name: encoder in use.
+        hardware: whether it is dedicated hardware.
+        wanted: first choice of the configuration.
+        fallback_reason: why the first choice is not in use; empty when it is.
     """
 
     name: str
-    codec: Codec
     hardware: bool
     wanted: str
     fallback_reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Measurement:
-    """Figures of the running stream over the last window.
+class StreamState:
+    """Parameters of the stream being served.
 
     Args:
-        fps: encoded pictures per second.
-        bitrate_kbps: of the transport stream.
+        target: frame size, frame rate and the profile's own bit rate.
+        bitrate_kbps: bit rate that the encoder is set to.
+        bitrate_reason: why it differs from the profile's own; empty when it does not.
+        codec: video coding standard.
+        encrypted: whether the listener requires a passphrase.
+    """
+
+    target: Target
+    bitrate_kbps: int
+    bitrate_reason: str
+    codec: Codec
+    encrypted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """Statistics of the stream over the last window.
+
+    Args:
+        fps: encoded frames per second.
+        bitrate_kbps: bit rate of the transport stream.
         viewer_count: connected viewers.
-        last_frame_age_ms: age of the newest encoded picture.
-        worst_rtt_ms: longest round trip of any viewer, None without viewers.
-        worst_loss_percent: largest share of packets that any viewer reported lost, None without viewers.
+        last_frame_age_ms: age of the newest encoded frame.
+        worst_rtt_ms: longest round-trip time of any viewer; None without viewers.
+        worst_loss_percent: largest share of packets reported lost by any viewer; None without viewers.
     """
 
     fps: float
@@ -93,3 +112,34 @@ class Measurement:
     last_frame_age_ms: int
     worst_rtt_ms: float | None = None
     worst_loss_percent: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ActualState:
+    """State of the service at one moment.
+
+    Args:
+        instance_id: random per process.
+        applied_revision: newest desired state applied; 0 for none.
+        state: state of the lifecycle.
+        profile: profile of the pipeline, or of the newest desired state.
+        last_error: last error since the preview was enabled; empty for none.
+        counters: counts since the process started.
+        port: UDP port of the listener.
+        latency_ms: SRT latency of the listener (SRTO_LATENCY).
+        stream: None while no pipeline exists.
+        encoder: None while no pipeline exists.
+        measurement: None before the end of the first window.
+    """
+
+    instance_id: str
+    applied_revision: int
+    state: State
+    profile: Profile
+    last_error: str
+    counters: Counters
+    port: int
+    latency_ms: int
+    stream: StreamState | None = None
+    encoder: EncoderChoice | None = None
+    measurement: Measurement | None = None

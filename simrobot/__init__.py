@@ -1,1 +1,1 @@
-"""A simulated robot: real rclpy publishers at realistic rates, with faults on demand."""
+"""A simulated robot for development, tests and demos, with faults on request."""

@@ -1,4 +1,4 @@
-"""What the simulated robot does, and what is wrong with it: a frozen value that control requests replace."""
+"""Behaviour and faults of the simulated robot: an immutable value that control requests replace."""
 
 from enum import Enum
 from typing import Any
@@ -9,7 +9,7 @@ from common.errors import ExitCode, UserError
 
 
 class Topic(Enum):
-    """What the robot publishes."""
+    """A topic that the robot publishes."""
 
     ODOMETRY = "odometry"
     VISION = "vision"
@@ -29,23 +29,23 @@ COMMANDS = (
     Topic.NAVIGATION_COMMANDS,
     Topic.EFFECTIVE_COMMAND,
 )
-"""The inputs of the command mux, and what it lets through."""
+"""The inputs of the command mux, and its output."""
 
 
 class Commander(Enum):
-    """Who drives."""
+    """The source of the velocity commands that the mux selects."""
 
     KEYBOARD = "keyboard"
     AUTONOMY = "autonomy"
     NAVIGATION = "navigation"
     UNSEEN = "unseen"
-    """The mux emits commands that none of its inputs gave: a joystick wired to it, for example."""
+    """The mux emits commands that are on none of its inputs, of a joystick wired to it for example."""
     NOBODY = "nobody"
-    """No input speaks, and the mux emits nothing."""
+    """No input has commands, and the mux emits none."""
 
 
 class Component(Enum):
-    """What reports in the diagnostics."""
+    """A component that appears in the diagnostics."""
 
     DRIVE = "drive"
     BATTERY = "battery"
@@ -54,7 +54,7 @@ class Component(Enum):
 
 
 class Level(Enum):
-    """What a component reports of itself."""
+    """The diagnostic level of a component."""
 
     OK = "ok"
     WARNING = "warning"
@@ -63,41 +63,41 @@ class Level(Enum):
 
 
 class Behaviour(BaseModel):
-    """How the robot behaves from now on. The defaults are a healthy robot driving in a circle."""
+    """Behaviour of the robot. The defaults are a healthy robot driving in a circle."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     silent: frozenset[Topic] = frozenset()
-    """Topics that publish nothing; their publishers stay in the graph."""
+    """Topics without messages; their publishers stay in the graph."""
     not_a_number: frozenset[Topic] = frozenset()
     """Topics whose measured values are NaN."""
     speed_mps: float = 0.5
     """Forward speed."""
     turn_rad_s: float = 0.25
-    """Rate of turn, to the left."""
+    """Yaw rate, positive to the left (REP 103)."""
     infer_errors_per_s: float = Field(default=0.0, ge=0)
-    """Failed inferences that the vision process counts per second."""
+    """Failed inferences per second, as counted by the vision process."""
     detection_count: int = Field(default=3, ge=0, le=100_000)
-    """Objects in each picture."""
+    """Objects in each frame."""
     battery_percent: float = Field(default=87.0, ge=0, le=100)
-    """Charge at the moment this is set; it drains from there."""
+    """Charge at the moment of the change; it drains from there."""
     battery_drain_percent_per_s: float = 0.01
-    """How fast the charge falls; negative while charging."""
+    """Rate at which the charge falls; negative while charging."""
     commander: Commander = Commander.AUTONOMY
-    """Whose commands the mux lets through."""
+    """The input that the mux selects."""
     mode: str = Field(default="exploring", max_length=1000)
-    """What the robot is about; told when it changes."""
+    """Mission mode; published on change."""
     components: dict[Component, Level] = Field(default_factory=dict)
-    """Levels that components report whatever their true state is."""
+    """Levels that override the actual state of components."""
 
-    def changed(self, wish: dict[str, Any]) -> "Behaviour":
-        """This behaviour with some fields replaced, from JSON values.
+    def changed(self, fields: dict[str, Any]) -> "Behaviour":
+        """Returns this behaviour with `fields` replaced, given as JSON values.
 
         Raises:
-            UserError: an unknown field or a value that is not allowed.
+            UserError: a field is unknown or a value is not allowed.
         """
         try:
-            return Behaviour.model_validate(self.model_dump(mode="json") | wish)
+            return Behaviour.model_validate(self.model_dump(mode="json") | fields)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             field = ".".join(str(part) for part in first["loc"])

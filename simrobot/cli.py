@@ -1,4 +1,4 @@
-"""The command line of the simulated robot: `simrobot run`, and `simrobot control` for a running one."""
+"""The simulated robot: `simrobot run` starts one, `simrobot control` changes a running one."""
 
 import json
 from enum import Enum
@@ -22,7 +22,7 @@ ControlPath = Annotated[
 
 
 def _rate(what: str) -> Any:
-    return typer.Option(min=0.0, max=2000.0, help=f"How often {what} published; 0: not at all.")
+    return typer.Option(min=0.0, max=2000.0, help=f"How often {what} published; 0: never.")
 
 
 @app.command()
@@ -35,17 +35,17 @@ def run(  # noqa: PLR0917 - typer makes the command line from the signature
     commands_hz: Annotated[float, _rate("commands, of the driving mux input and the mux, are")] = COMMANDS_HZ,
     mode_hz: Annotated[
         float,
-        typer.Option(min=0.0, max=100.0, help="How often it is looked for a new mode; 0: none is told."),
+        typer.Option(min=0.0, max=100.0, help="How often a change of the mode is checked for; 0: never."),
     ] = DEFAULT_RATES_HZ[Topic.MODE],
     behaviour: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[FIELD=VALUE]...", help="How it behaves; 'simrobot control' lists the fields."
+            metavar="[FIELD=VALUE]...", help="Behaviour; 'simrobot control --help' lists the fields."
         ),
     ] = None,
     control: ControlPath = None,
 ) -> None:
-    """Publishes what a robot does, all the topics of the first one, until SIGINT or SIGTERM."""
+    """Publishes the topics of a robot until SIGINT or SIGTERM."""
     rates_hz = {
         Topic.ODOMETRY: odometry_hz,
         Topic.VISION: vision_hz,
@@ -68,8 +68,8 @@ def run(  # noqa: PLR0917 - typer makes the command line from the signature
     program.run_to_exit(work)
 
 
-class Fault(Enum):
-    """What `simrobot control` does with the words that follow."""
+class Action(Enum):
+    """What `simrobot control` does with its further arguments."""
 
     SHOW = "show"
     SILENCE = "silence"
@@ -79,11 +79,11 @@ class Fault(Enum):
 
 @app.command("control")
 def change(
-    what: Annotated[Fault, typer.Argument(help="silence and resume take topics, set takes FIELD=VALUE.")],
-    words: Annotated[list[str] | None, typer.Argument(metavar="[TOPIC | FIELD=VALUE]...")] = None,
+    action: Annotated[Action, typer.Argument(help="silence and resume take topics, set takes FIELD=VALUE.")],
+    arguments: Annotated[list[str] | None, typer.Argument(metavar="[TOPIC | FIELD=VALUE]...")] = None,
     control: ControlPath = None,
 ) -> None:
-    """Changes a running robot and prints how it now behaves, as JSON.
+    """Changes a running robot and prints its behaviour as JSON.
 
     Fields: silent, not_a_number (topics, separated by commas), speed_mps, turn_rad_s, infer_errors_per_s,
     detection_count, battery_percent, battery_drain_percent_per_s, commander (keyboard, autonomy, navigation,
@@ -92,27 +92,29 @@ def change(
 
     def work() -> None:
         path = control or control_socket.default_path()
-        print(json.dumps(control_socket.ask(path, _wish(what, words or [], path)), indent=2))
+        print(json.dumps(control_socket.ask(path, _request(action, arguments or [], path)), indent=2))
 
     program.run_to_exit(work)
 
 
-def _wish(what: Fault, words: list[str], path: Path) -> dict[str, Any]:
-    if what is Fault.SHOW:
+def _request(action: Action, arguments: list[str], path: Path) -> dict[str, Any]:
+    if action is Action.SHOW:
         return {}
-    if what is Fault.SET:
-        return _fields(words)
+    if action is Action.SET:
+        return _fields(arguments)
     silent = set(control_socket.ask(path, {})["silent"])
-    return {"silent": sorted(silent | set(words) if what is Fault.SILENCE else silent - set(words))}
+    return {
+        "silent": sorted(silent | set(arguments) if action is Action.SILENCE else silent - set(arguments))
+    }
 
 
-def _fields(words: list[str]) -> dict[str, Any]:
-    """FIELD=VALUE pairs as JSON values; pydantic turns texts into numbers and refuses what is wrong."""
+def _fields(pairs: list[str]) -> dict[str, Any]:
+    """Parses FIELD=VALUE pairs into JSON values; pydantic converts numbers, which stay text here."""
     fields: dict[str, Any] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
         if not equals:
-            raise typer.BadParameter(f"'{word}' is not FIELD=VALUE")
+            raise typer.BadParameter(f"'{pair}' is not FIELD=VALUE")
         fields[name] = _json_value(name, value)
     return fields
 
@@ -127,5 +129,5 @@ def _json_value(name: str, text: str) -> Any:
 
 
 def main() -> None:
-    """The entry point."""
+    """Runs the command line."""
     app()

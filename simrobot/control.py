@@ -1,7 +1,7 @@
-"""Changes a running robot's behaviour: one JSON object per line over a Unix socket, one per line back.
+"""Control socket of a running robot: requests and responses are JSON objects, one per line.
 
-A request holds the fields of `Behaviour` that shall change ({} only asks). The answer is {"behaviour": {...}}
-or {"error": "..."}. Only this user can connect: the socket's mode is 0600.
+A request holds the fields of `Behaviour` to change; {} only reads. The response is {"behaviour": {...}} or
+{"error": "..."}. Only the same user can connect: the mode of the Unix socket is 0600.
 """
 
 import asyncio
@@ -17,14 +17,14 @@ from typing import Any
 from common.errors import ExitCode, UserError
 
 _LONGEST_LINE = 64 * 1024
-_ANSWER_WITHIN_S = 5.0
+_TIMEOUT_S = 5.0
 
 Change = Callable[[dict[str, Any]], dict[str, Any]]
-"""Takes the wish, gives the behaviour in force; raises UserError."""
+"""Applies the given fields and returns the resulting behaviour; raises UserError."""
 
 
 def default_path() -> Path:
-    """Where a robot of this user listens: one place per ROS domain, so that robots do not meet."""
+    """Returns the default path of the socket, one per user and ROS domain."""
     base = os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()
     return Path(base) / f"simrobot-{os.getuid()}-{os.environ.get('ROS_DOMAIN_ID') or '0'}.sock"
 
@@ -34,20 +34,20 @@ async def listening(path: Path, change: Change) -> AsyncIterator[None]:
     """Serves requests until the block ends.
 
     Raises:
-        UserError: another robot listens there, or the path can't be used.
+        UserError: another robot serves at this path, or it can't be used.
     """
-    _make_way(path)
+    _remove_stale(path)
     try:
         mask = os.umask(0o177)
         try:
             server = await asyncio.start_unix_server(
-                lambda reader, writer: _converse(reader, writer, change), path, limit=_LONGEST_LINE
+                lambda reader, writer: _serve(reader, writer, change), path, limit=_LONGEST_LINE
             )
         finally:
             os.umask(mask)
     except OSError as error:
         raise UserError(
-            f"control socket {path} can't be made: {error}", "Choose another with --control"
+            f"control socket {path} can't be created: {error}", "Choose another with --control"
         ) from error
     try:
         yield
@@ -56,23 +56,23 @@ async def listening(path: Path, change: Change) -> AsyncIterator[None]:
         _remove(path)
 
 
-def ask(path: Path, wish: dict[str, Any]) -> dict[str, Any]:
-    """Sends one request and gives the behaviour that is then in force.
+def ask(path: Path, fields: dict[str, Any]) -> dict[str, Any]:
+    """Sends one request and returns the resulting behaviour.
 
     Raises:
-        UserError: nobody listens (exit code 3), or the robot refuses.
+        UserError: no robot responds (exit code 3), or it refuses.
     """
     try:
         with socket.socket(socket.AF_UNIX) as connection:
-            connection.settimeout(_ANSWER_WITHIN_S)
+            connection.settimeout(_TIMEOUT_S)
             connection.connect(str(path))
-            connection.sendall(json.dumps(wish).encode() + b"\n")
+            connection.sendall(json.dumps(fields).encode() + b"\n")
             with connection.makefile("rb") as lines:
                 answer = json.loads(lines.readline())
     except (OSError, ValueError) as error:
         raise UserError(
             f"no simulated robot answers at {path}: {error}",
-            "Start one with: simrobot run; or name its socket with --control",
+            "Start one with: simrobot run; or give its socket with --control",
             exit_code=ExitCode.UNREACHABLE,
         ) from error
     if "error" in answer:
@@ -81,8 +81,8 @@ def ask(path: Path, wish: dict[str, Any]) -> dict[str, Any]:
     return behaviour
 
 
-def _make_way(path: Path) -> None:
-    """Removes the socket of a robot that was killed; one that still answers stays."""
+def _remove_stale(path: Path) -> None:
+    """Removes the stale socket of a robot that was killed."""
     if not path.is_socket():
         return
     with socket.socket(socket.AF_UNIX) as probe:
@@ -94,30 +94,30 @@ def _make_way(path: Path) -> None:
             return
         except OSError as error:
             raise UserError(f"control socket {path} can't be used: {error}") from error
-    raise UserError(f"another simulated robot listens at {path}", "End it, or choose another with --control")
+    raise UserError(f"another simulated robot listens at {path}", "Stop it, or choose another with --control")
 
 
 def _remove(path: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-async def _converse(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Change) -> None:
+async def _serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, change: Change) -> None:
     try:
         while line := await reader.readline():
             writer.write(json.dumps(_answer(line, change)).encode() + b"\n")
             await writer.drain()
     except (ConnectionError, ValueError):
-        pass  # gone, or a line beyond the limit: this conversation ends, the robot goes on
+        pass  # The client has gone, or sent a line beyond the limit: only this connection ends.
     finally:
         writer.close()
 
 
 def _answer(line: bytes, change: Change) -> dict[str, Any]:
     try:
-        wish = json.loads(line)
-        if not isinstance(wish, dict):
+        fields = json.loads(line)
+        if not isinstance(fields, dict):
             return {"error": "a request is a JSON object"}
-        return {"behaviour": change(wish)}
+        return {"behaviour": change(fields)}
     except ValueError as error:
         return {"error": f"a request is one line of JSON: {error}"}
     except UserError as error:

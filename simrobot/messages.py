@@ -1,9 +1,8 @@
-"""The simulated robot's messages, as the real one would send them."""
+"""Builds the simulated robot's messages, as the real one would send them."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from common.errors import UserError
@@ -24,7 +23,7 @@ except ImportError as error:
         f"the simulated robot lacks a ROS 2 message package ({error})", "Type: scripts/setup"
     ) from error
 
-_PICTURES_PER_S = 30.0
+_FRAMES_PER_S = 30.0
 _LOW_PERCENT = 15.0
 _NAMES = {
     Component.DRIVE: "drive: motor controller",
@@ -38,43 +37,45 @@ _LEVELS = {
     Level.ERROR: DiagnosticStatus.ERROR,
     Level.STALE: DiagnosticStatus.STALE,
 }
-_SAYINGS = {
+_TEXTS = {
     Level.OK: "running",
-    Level.WARNING: "not as it should be",
+    Level.WARNING: "out of tolerance",
     Level.ERROR: "failed",
     Level.STALE: "no data received",
 }
 
-Build = Callable[[Robot, float, Any], Any]
-"""Makes the message of this moment: the robot, the monotonic time in seconds, the ROS stamp.
-
-None when there is nothing to tell."""
+Build = Callable[[Robot, float], Any]
+"""Builds the message of a monotonic time in seconds, without its stamp; None if there is none to send."""
 
 
-def odometry(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """nav_msgs/Odometry: the pose in "odom", the twist in "base_link"."""
+def _nan_if_lost(robot: Robot, topic: Topic) -> float:
+    """Returns NaN if the measured values of this topic are to be NaN, else 0; added to each of them."""
+    return math.nan if topic in robot.behaviour.not_a_number else 0.0
+
+
+def odometry(robot: Robot, now_s: float) -> Any:
+    """Builds nav_msgs/Odometry: the pose in frame "odom", the twist in "base_link"."""
     robot.advance(now_s)
     message = Odometry(child_frame_id="base_link")
-    message.header.stamp = stamp
     message.header.frame_id = "odom"
     pose, twist = message.pose.pose, message.twist.twist
     pose.position.x, pose.position.y = robot.pose.x_m, robot.pose.y_m
     pose.orientation.z = math.sin(robot.pose.heading_rad / 2)
     pose.orientation.w = math.cos(robot.pose.heading_rad / 2)
-    lost = math.nan if Topic.ODOMETRY in robot.behaviour.not_a_number else 0.0
+    lost = _nan_if_lost(robot, Topic.ODOMETRY)
     twist.linear.x = robot.behaviour.speed_mps + lost
     twist.angular.z = robot.behaviour.turn_rad_s + lost
     return message
 
 
-def vision(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """omniseer_msgs/VisionPerfSummary of a process that captures and evaluates 30 pictures a second."""
-    counts = robot.vision_counts(now_s, _PICTURES_PER_S)
-    lost = math.nan if Topic.VISION in robot.behaviour.not_a_number else 0.0
+def vision(robot: Robot, now_s: float) -> Any:
+    """Builds omniseer_msgs/VisionPerfSummary of a process with 30 frames per second."""
+    counts = robot.vision_counts(now_s, _FRAMES_PER_S)
+    lost = _nan_if_lost(robot, Topic.VISION)
     wave = math.sin(now_s)
-    message = VisionPerfSummary(
-        producer_fps=_PICTURES_PER_S + 0.3 * wave + lost,
-        consumer_fps=_PICTURES_PER_S - 0.5 + 0.3 * wave + lost,
+    return VisionPerfSummary(
+        producer_fps=_FRAMES_PER_S + 0.3 * wave + lost,
+        consumer_fps=_FRAMES_PER_S - 0.5 + 0.3 * wave + lost,
         last_preprocess_ms=2.1 + lost,
         last_infer_ms=18.0 + 2 * wave + lost,
         last_postprocess_ms=1.4 + lost,
@@ -87,15 +88,12 @@ def vision(robot: Robot, now_s: float, stamp: Any) -> Any:
         consumed_count=max(0, counts.produced - counts.infer_errors),
         infer_error_count=counts.infer_errors,
     )
-    message.header.stamp = stamp
-    return message
 
 
-def detections(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """yolo_msgs/DetectionArray of a 1280x720 picture."""
-    lost = math.nan if Topic.DETECTIONS in robot.behaviour.not_a_number else 0.0
+def detections(robot: Robot, now_s: float) -> Any:
+    """Builds yolo_msgs/DetectionArray of a frame of 1280x720 pixels."""
+    lost = _nan_if_lost(robot, Topic.DETECTIONS)
     message = DetectionArray(detections=[_detection(box, lost) for box in robot.boxes(now_s)])
-    message.header.stamp = stamp
     message.header.frame_id = "camera"
     return message
 
@@ -109,12 +107,12 @@ def _detection(box: Box, lost: float) -> Any:
     return message
 
 
-def battery(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """sensor_msgs/BatteryState of a four-cell lithium pack."""
+def battery(robot: Robot, now_s: float) -> Any:
+    """Builds sensor_msgs/BatteryState of a four-cell lithium pack."""
     percent = robot.battery_percent(now_s)
-    lost = math.nan if Topic.BATTERY in robot.behaviour.not_a_number else 0.0
+    lost = _nan_if_lost(robot, Topic.BATTERY)
     charging = robot.behaviour.battery_drain_percent_per_s < 0
-    message = BatteryState(
+    return BatteryState(
         present=True,
         voltage=pack_voltage(percent) + lost,
         percentage=percent / 100 + lost,
@@ -123,22 +121,18 @@ def battery(robot: Robot, now_s: float, stamp: Any) -> Any:
         else BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
     )
-    message.header.stamp = stamp
-    return message
 
 
-def diagnostics(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """diagnostic_msgs/DiagnosticArray: every component with its level."""
-    message = DiagnosticArray(status=[_status(robot, each, now_s) for each in Component])
-    message.header.stamp = stamp
-    return message
+def diagnostics(robot: Robot, now_s: float) -> Any:
+    """Builds diagnostic_msgs/DiagnosticArray: the level of every component."""
+    return DiagnosticArray(status=[_status(robot, each, now_s) for each in Component])
 
 
 def _status(robot: Robot, component: Component, now_s: float) -> Any:
-    level, text = _true_state(robot, component, now_s)
+    level, text = _actual_state(robot, component, now_s)
     if component in robot.behaviour.components:
         level = robot.behaviour.components[component]
-        text = _SAYINGS[level]
+        text = _TEXTS[level]
     return DiagnosticStatus(
         name=_NAMES[component],
         level=_LEVELS[level],
@@ -148,34 +142,28 @@ def _status(robot: Robot, component: Component, now_s: float) -> Any:
     )
 
 
-def _true_state(robot: Robot, component: Component, now_s: float) -> tuple[Level, str]:
+def _actual_state(robot: Robot, component: Component, now_s: float) -> tuple[Level, str]:
     percent = robot.battery_percent(now_s)
     if component is Component.BATTERY and percent < _LOW_PERCENT:
         return Level.ERROR, f"battery low: {percent:.0f} %"
     if component is Component.VISION and robot.behaviour.infer_errors_per_s > 0:
         return Level.ERROR, "inference fails"
-    return Level.OK, _SAYINGS[Level.OK]
+    return Level.OK, _TEXTS[Level.OK]
 
 
-def mode(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """std_msgs/String, when the mode is another than the one told last."""
-    return String(data=robot.behaviour.mode) if robot.news_of_mode() else None
+def mode(robot: Robot, now_s: float) -> Any:
+    """Builds std_msgs/String after a change of the mode."""
+    return String(data=robot.behaviour.mode) if robot.mode_changed() else None
 
 
-def command_of(commander: Commander, robot: Robot, now_s: float, stamp: Any) -> Any:
-    """geometry_msgs/TwistStamped: what one of the mux's inputs asks for, while it is the one that drives."""
-    return _command(robot, stamp) if robot.behaviour.commander is commander else None
+def effective_command(robot: Robot, now_s: float) -> Any:
+    """Builds geometry_msgs/TwistStamped of the mux's output."""
+    return None if robot.behaviour.commander is Commander.NOBODY else _command(robot)
 
 
-def effective_command(robot: Robot, now_s: float, stamp: Any) -> Any:
-    """geometry_msgs/TwistStamped: what the mux lets through."""
-    return None if robot.behaviour.commander is Commander.NOBODY else _command(robot, stamp)
-
-
-def _command(robot: Robot, stamp: Any) -> Any:
-    lost = math.nan if Topic.EFFECTIVE_COMMAND in robot.behaviour.not_a_number else 0.0
+def _command(robot: Robot) -> Any:
+    lost = _nan_if_lost(robot, Topic.EFFECTIVE_COMMAND)
     message = TwistStamped()
-    message.header.stamp = stamp
     message.header.frame_id = "base_link"
     message.twist.linear.x = robot.behaviour.speed_mps + lost
     message.twist.angular.z = robot.behaviour.turn_rad_s + lost
@@ -184,12 +172,21 @@ def _command(robot: Robot, stamp: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """What is published where. `latched`: whoever comes later hears the last message, too."""
+    """Name, type and builder of a topic. `latched`: late subscribers get the last message, too."""
 
     topic: str
     message_type: Any
     build: Build
     latched: bool = False
+
+
+def _mux_input(topic: str, commander: Commander) -> Publication:
+    """Returns a publication of geometry_msgs/TwistStamped on one input, silent unless the mux selects it."""
+
+    def build(robot: Robot, now_s: float) -> Any:
+        return _command(robot) if robot.behaviour.commander is commander else None
+
+    return Publication(topic, TwistStamped, build)
 
 
 PUBLICATIONS: dict[Topic, Publication] = {
@@ -199,17 +196,11 @@ PUBLICATIONS: dict[Topic, Publication] = {
     Topic.BATTERY: Publication("/battery", BatteryState, battery),
     Topic.DIAGNOSTICS: Publication("/diagnostics", DiagnosticArray, diagnostics),
     Topic.MODE: Publication("/mission/mode", String, mode, latched=True),
-    Topic.KEYBOARD_COMMANDS: Publication(
-        "/cmd_vel_keyboard", TwistStamped, partial(command_of, Commander.KEYBOARD)
-    ),
-    Topic.AUTONOMY_COMMANDS: Publication(
-        "/cmd_vel_autonomy", TwistStamped, partial(command_of, Commander.AUTONOMY)
-    ),
-    Topic.NAVIGATION_COMMANDS: Publication(
-        "/cmd_vel_nav", TwistStamped, partial(command_of, Commander.NAVIGATION)
-    ),
+    Topic.KEYBOARD_COMMANDS: _mux_input("/cmd_vel_keyboard", Commander.KEYBOARD),
+    Topic.AUTONOMY_COMMANDS: _mux_input("/cmd_vel_autonomy", Commander.AUTONOMY),
+    Topic.NAVIGATION_COMMANDS: _mux_input("/cmd_vel_nav", Commander.NAVIGATION),
     Topic.EFFECTIVE_COMMAND: Publication(
         "/mecanum_drive_controller/reference", TwistStamped, effective_command
     ),
 }
-"""The gateway's default sources read these, all but the mode."""
+"""The gateway's default sources subscribe to all of these but the mode."""

@@ -1,10 +1,10 @@
-"""Where the simulated things are at a given time. Pure: time in, numbers out."""
+"""Motion of the robot and of the objects that it sees, as pure functions of time."""
 
 import math
 from dataclasses import dataclass
 
-PICTURE_WIDTH_PX = 1280
-PICTURE_HEIGHT_PX = 720
+FRAME_WIDTH_PX = 1280
+FRAME_HEIGHT_PX = 720
 
 _CLASSES = ((0, "person"), (2, "car"), (16, "dog"), (39, "bottle"))
 _LIPO_EMPTY_V, _LIPO_FULL_V = 13.2, 16.8
@@ -12,14 +12,14 @@ _LIPO_EMPTY_V, _LIPO_FULL_V = 13.2, 16.8
 
 @dataclass(slots=True)
 class Pose:
-    """Where the robot stands: metres and radians in the odometry frame."""
+    """Pose in the odometry frame, in metres and radians."""
 
     x_m: float = 0.0
     y_m: float = 0.0
     heading_rad: float = 0.0
 
     def drive(self, speed_mps: float, turn_rad_s: float, duration_s: float) -> None:
-        """Moves along the arc that both rates describe in `duration_s`."""
+        """Moves by `duration_s` at both rates: the midpoint rule, with the heading of half the time."""
         middle = self.heading_rad + turn_rad_s * duration_s / 2
         self.x_m += speed_mps * math.cos(middle) * duration_s
         self.y_m += speed_mps * math.sin(middle) * duration_s
@@ -28,7 +28,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """One object in the picture, in pixels."""
+    """Bounding box of one object, in pixels."""
 
     track_id: str
     class_id: int
@@ -41,7 +41,7 @@ class Box:
 
 
 def boxes_at(time_s: float, count: int) -> list[Box]:
-    """`count` boxes that drift over the picture, each on its own path and always wholly inside."""
+    """Returns `count` boxes that drift over the frame, each on its own path and always entirely inside."""
     return [_box(time_s, number) for number in range(count)]
 
 
@@ -53,21 +53,19 @@ def _box(time_s: float, number: int) -> Box:
         class_id=class_id,
         class_name=class_name,
         score=0.75 + 0.2 * math.sin(time_s + number),
-        center_x_px=_to_and_fro(time_s * (40 + 11 * (number % 9)) + 97 * number, width / 2, PICTURE_WIDTH_PX),
-        center_y_px=_to_and_fro(
-            time_s * (25 + 7 * (number % 6)) + 61 * number, height / 2, PICTURE_HEIGHT_PX
-        ),
+        center_x_px=_to_and_fro(time_s * (40 + 11 * (number % 9)) + 97 * number, width / 2, FRAME_WIDTH_PX),
+        center_y_px=_to_and_fro(time_s * (25 + 7 * (number % 6)) + 61 * number, height / 2, FRAME_HEIGHT_PX),
         width_px=width,
         height_px=height,
     )
 
 
 def _to_and_fro(way: float, margin: float, size: float) -> float:
-    """A point that has gone `way` pixels between two walls, `margin` off the picture's edges."""
+    """Returns the position after `way` pixels of travel between two walls, `margin` inside the edges."""
     room = size - 2 * margin
     return margin + room - abs(way % (2 * room) - room)
 
 
 def pack_voltage(percent: float) -> float:
-    """Terminal voltage of a four-cell lithium pack, in volts; linear is close enough to look at."""
+    """Returns the terminal voltage of a four-cell lithium pack in volts; a linear approximation."""
     return _LIPO_EMPTY_V + (_LIPO_FULL_V - _LIPO_EMPTY_V) * percent / 100

@@ -1,4 +1,4 @@
-"""The simulated robot in the ROS 2 graph: one node, one publisher per topic."""
+"""The simulated robot's ROS 2 node, with one publisher per topic."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +24,7 @@ _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 @contextmanager
 def publishing(robot: Robot, topics: frozenset[Topic]) -> Iterator[Mapping[Topic, Callable[[], None]]]:
-    """Gives a function per topic that publishes the message of this moment, or nothing while it is silent.
+    """Yields a function per topic that builds and publishes one message, or none while the topic is silent.
 
     Raises:
         UserError: the middleware can't start.
@@ -48,15 +48,18 @@ def publishing(robot: Robot, topics: frozenset[Topic]) -> Iterator[Mapping[Topic
 
 
 def _publisher(node: Any, robot: Robot, topic: Topic) -> Callable[[], None]:
-    what = PUBLICATIONS[topic]
-    qos = _LATCHED if what.latched else QoSProfile(depth=_DEPTH)
-    publisher = node.create_publisher(what.message_type, what.topic, qos)
+    publication = PUBLICATIONS[topic]
+    qos = _LATCHED if publication.latched else QoSProfile(depth=_DEPTH)
+    publisher = node.create_publisher(publication.message_type, publication.topic, qos)
     return partial(_publish, node.get_clock(), publisher, robot, topic)
 
 
 def _publish(clock: Any, publisher: Any, robot: Robot, topic: Topic) -> None:
     if topic in robot.behaviour.silent:
         return
-    message = PUBLICATIONS[topic].build(robot, time.monotonic(), clock.now().to_msg())
-    if message is not None:
-        publisher.publish(message)
+    message = PUBLICATIONS[topic].build(robot, time.monotonic())
+    if message is None:
+        return
+    if hasattr(message, "header"):
+        message.header.stamp = clock.now().to_msg()
+    publisher.publish(message)

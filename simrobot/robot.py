@@ -1,4 +1,4 @@
-"""The simulated robot's state: what its behaviour has led to until now. Knows no ROS."""
+"""State of the simulated robot: its behaviour integrated over time. Knows no ROS."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,18 +9,18 @@ from simrobot.motion import Box, Pose, boxes_at
 
 @dataclass(frozen=True, slots=True)
 class VisionCounts:
-    """What the vision process has counted since the start."""
+    """Counters of the vision process since the start."""
 
     produced: int
     infer_errors: int
 
 
 class Robot:
-    """Advances by `now_s`, a monotonic time that its caller reads; every question is about that time.
+    """The robot at a given time. Every `now_s` is a monotonic time in seconds that the caller reads.
 
     Args:
-        behaviour: how it starts.
-        now_s: when it starts.
+        behaviour: at the start.
+        now_s: time of the start.
     """
 
     def __init__(self, behaviour: Behaviour, now_s: float) -> None:
@@ -29,44 +29,45 @@ class Robot:
         self._started_s = self._moved_s = now_s
         self._charge_set_s = now_s
         self._infer_errors = 0.0
-        self._mode_told: str | None = None
+        self._mode_seen: str | None = None
 
-    def change(self, wish: dict[str, Any], now_s: float) -> Behaviour:
-        """Behaves differently from now on: `wish` names the fields that change.
+    def change(self, fields: dict[str, Any], now_s: float) -> Behaviour:
+        """Replaces `fields` of the behaviour and returns the result.
 
         Raises:
-            UserError: an unknown field or a value that is not allowed; nothing changes.
+            UserError: a field is unknown or a value is not allowed; nothing changes.
         """
-        changed = self.behaviour.changed({"battery_percent": self.battery_percent(now_s)} | wish)
+        # The present charge, so that a change of another field does not reset it.
+        changed = self.behaviour.changed({"battery_percent": self.battery_percent(now_s)} | fields)
         self.advance(now_s)
         self._charge_set_s = now_s
         self.behaviour = changed
         return changed
 
     def advance(self, now_s: float) -> None:
-        """Lives on until `now_s`."""
+        """Integrates pose and counters up to `now_s`."""
         passed_s = max(0.0, now_s - self._moved_s)
         self.pose.drive(self.behaviour.speed_mps, self.behaviour.turn_rad_s, passed_s)
         self._infer_errors += self.behaviour.infer_errors_per_s * passed_s
         self._moved_s += passed_s
 
     def battery_percent(self, now_s: float) -> float:
-        """The charge that is left, 0 to 100."""
+        """Returns the remaining charge, 0 to 100."""
         drained = self.behaviour.battery_drain_percent_per_s * (now_s - self._charge_set_s)
         return min(max(self.behaviour.battery_percent - drained, 0.0), 100.0)
 
     def boxes(self, now_s: float) -> list[Box]:
-        """What the camera sees."""
+        """Returns the objects that the camera sees."""
         return boxes_at(now_s - self._started_s, self.behaviour.detection_count)
 
-    def vision_counts(self, now_s: float, pictures_per_s: float) -> VisionCounts:
-        """What a vision process at this rate has counted so far."""
+    def vision_counts(self, now_s: float, frames_per_s: float) -> VisionCounts:
+        """Returns the counters of a vision process with this frame rate."""
         self.advance(now_s)
         return VisionCounts(
-            produced=int((now_s - self._started_s) * pictures_per_s), infer_errors=int(self._infer_errors)
+            produced=int((now_s - self._started_s) * frames_per_s), infer_errors=int(self._infer_errors)
         )
 
-    def news_of_mode(self) -> bool:
-        """Whether the mode is another than at the last question."""
-        told, self._mode_told = self._mode_told, self.behaviour.mode
-        return told != self.behaviour.mode
+    def mode_changed(self) -> bool:
+        """Returns whether the mode differs from the one at the previous call."""
+        seen, self._mode_seen = self._mode_seen, self.behaviour.mode
+        return seen != self.behaviour.mode

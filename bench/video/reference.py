@@ -12,7 +12,7 @@ from bench.video.camera import HEIGHT_PX, WIDTH_PX, Camera
 from common.gst import Gst
 from console.receiver.errors import StreamEndedError
 from console.receiver.frame import Frame, Plane
-from console.receiver.inbox import Inbox
+from console.receiver.frame_queue import FrameQueue
 
 PLAIN_X264 = "x264enc tune=zerolatency speed-preset=veryfast bitrate=2500 key-int-max=30"
 KEY_FRAMES_APART_S = 1.0
@@ -37,7 +37,7 @@ class PlainViewer:
     """srtsrc ! tsdemux ! h264parse ! avdec_h264, as it comes."""
 
     def __init__(self, port: int, latency_ms: int) -> None:
-        self._inbox = Inbox(4)
+        self._queue = FrameQueue(4)
         self._pipeline = Gst.parse_launch(
             f"srtsrc uri=srt://127.0.0.1:{port}?mode=caller latency={latency_ms}"
             " ! tsdemux ! h264parse ! avdec_h264 ! appsink name=out sync=false emit-signals=true"
@@ -57,16 +57,16 @@ class PlainViewer:
 
     def next_frame(self, timeout_s: float) -> Frame:
         """The next decoded picture."""
-        news = self._inbox.take(time.monotonic() + timeout_s)
-        if not isinstance(news, Frame):
+        taken = self._queue.take(time.monotonic() + timeout_s)
+        if not isinstance(taken, Frame):
             raise StreamEndedError("the reference sends nothing", "See what gst-launch-1.0 printed")
-        return news
+        return taken
 
     def _on_sample(self, sink: Any) -> Any:
         arrival_s = time.monotonic()
         buffer = sink.emit("pull-sample").get_buffer()
         luma, chroma = Plane(0, WIDTH_PX, HEIGHT_PX), Plane(0, 0, 0)
-        self._inbox.put(
+        self._queue.put(
             Frame(WIDTH_PX, HEIGHT_PX, "h264", None, arrival_s, False, (luma, chroma, chroma), buffer)
         )
         return Gst.FlowReturn.OK

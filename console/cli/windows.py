@@ -15,8 +15,8 @@ from console.cli.session import Session
 from console.cli.stopping import until_stopped
 from console.client import parse_target
 from console.receiver.recording import Recording
-from console.viewer.account import Account
 from console.viewer.headless import watch_headless
+from console.viewer.summary import ViewSummary
 
 _INSTALL_GSTREAMER: Final = (
     "Type: sudo apt-get install gir1.2-gst-plugins-base-1.0 gstreamer1.0-plugins-good"
@@ -71,20 +71,20 @@ def view(
     _require_gstreamer()
     if not headless:
         with _requiring_qt("--headless works without"):
-            from console.window.view_program import run_view  # noqa: PLC0415 - Qt is needed here only
+            from console.window.programs import run_view  # noqa: PLC0415 - Qt is needed here only
     # A login that can't be used is reported before a file is made.
     session.credentials()
     recording = Recording(record) if record else None
     if headless:
-        account = _view_headless(session, address, frames, patience_s, recording)
+        summary = _view_headless(session, address, frames, patience_s, recording)
     else:
-        account = run_view(address, recording, session.credentials)
+        summary = run_view(address, recording, session.credentials)
     if session.as_json:
-        session.print_json(json_form(account))
+        session.print_json(json_form(summary))
     elif headless or recording:
-        session.out.print(account.line(), soft_wrap=True)
-    if recording and recording.trouble:
-        raise recording.trouble
+        session.out.print(summary.line(), soft_wrap=True)
+    if recording and recording.error:
+        raise recording.error
 
 
 def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOption = None) -> None:
@@ -93,14 +93,14 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
     """
     with _requiring_qt():
-        from console.window.monitor_program import run_monitor  # noqa: PLC0415 - Qt is needed here only
+        from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
     session = session_of(context, target, False, robot)
     run_monitor(session.target, session.credentials)
 
 
 def _view_headless(
     session: Session, address: str, frames: int | None, patience_s: float, recording: Recording | None
-) -> Account:
+) -> ViewSummary:
     # The viewer looks at the event itself: nothing has to be cut off.
     with until_stopped(lambda: None) as stopped:
         return watch_headless(
@@ -109,7 +109,7 @@ def _view_headless(
             patience_s=patience_s,
             recording=recording,
             stop=stopped.event,
-            login=session.credentials,
+            load=session.credentials,
         )
 
 

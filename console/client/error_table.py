@@ -49,7 +49,6 @@ REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
     {
         Reason.INVALID_REQUEST: InvalidRequest,
         Reason.MESSAGE_TOO_LARGE: InvalidRequest,
-        Reason.NOT_NOW: Refused,
         Reason.UNKNOWN_SERVICE: Refused,
         Reason.TOO_MANY_CONNECTIONS: Overloaded,
         Reason.TOO_MANY_STREAMS: Overloaded,

@@ -1,5 +1,5 @@
-"""What the monitor window shows, worked out without Qt.
+"""Model of the monitor window, without Qt.
 
-`worker` talks to the gateway in a thread of its own and keeps the newest `state`; the other modules turn a
-state into words, tones and figures. `console.window` paints them.
+`worker` talks to the gateway in a thread of its own and keeps the latest `monitor_state`; the other modules
+format a state as texts, tones and figures. `console.window` paints them.
 """

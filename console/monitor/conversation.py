@@ -1,134 +1,223 @@
-"""What is said between the monitor and one robot: three tasks that outlive every connection."""
+"""Conversation with one robot: three tasks that outlive every connection."""
 
 import asyncio
 import time
+from collections.abc import AsyncIterator
 from dataclasses import replace
-from typing import Final
+from typing import Final, Protocol
 
-from console.client import Backoff, EventPosition, GatewayError, Outage, PreviewChange, Unsupported
-from console.monitor.event_lines import line_of
-from console.monitor.event_log import EventLog
-from console.monitor.feed import Feed, Reading, Robot, pause
-from console.monitor.link import Link, Phase
-from console.monitor.newest import Newest
-from console.monitor.pauses import Pauses
-from console.monitor.state import Wish
+from common.backoff import Backoff
+from console.client import (
+    CaughtUp,
+    Event,
+    EventGap,
+    EventPosition,
+    GatewayError,
+    NotAllowed,
+    NotTrusted,
+    Outage,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    Unsupported,
+)
+from console.monitor.event_log import EventLine, line_of
+from console.monitor.latest_value import LatestValue
+from console.monitor.link import Link, LinkState
+from console.monitor.monitor_state import DesiredPreview, MonitorState
+from console.monitor.snapshot_events import SnapshotEvents
 
-_LOOK_FOR_LOGIN_S: Final = 0.5
-"""How often it is looked, while the robot does not answer, whether another login was stored."""
+POLL_S: Final = 0.1
+"""Period of the status: boxes over the video are at most so much older than they need be."""
+_CREDENTIAL_POLL_S: Final = 0.5
+"""Period, while the robot does not answer, of checking for other stored credentials."""
+_FIRST_PAUSE_S: Final = 0.5
+_LONGEST_PAUSE_S: Final = 2.0
+_LONGEST_RETRY_AFTER_S: Final = 60.0
+"""No gateway locks a caller out for longer; a longer retry-after does not come from one."""
+_MS_PER_S: Final = 1000
+
+
+class RobotClient(Protocol):
+    """The calls of `console.client.AsyncGatewayClient` that the monitor makes."""
+
+    async def overlay(self) -> OverlaySnapshot:
+        """Returns status, detections and the newest events."""
+
+    def events(
+        self, after: EventPosition | None = ...
+    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        """Streams events, each one once."""
+
+    async def enable_preview(
+        self, profile: PreviewProfile = ..., *, settle_within_s: float = ...
+    ) -> PreviewChange:
+        """Turns the preview on, or changes its profile."""
+
+    async def disable_preview(self, *, settle_within_s: float = ...) -> PreviewChange:
+        """Turns the preview off."""
+
+
+class RobotSession(Protocol):
+    """A client and its credentials; `console.monitor.credential_refresh.RefreshingClient` is one."""
+
+    @property
+    def client(self) -> RobotClient:
+        """The client with the credentials in use."""
+
+    async def refresh(self) -> bool:
+        """Takes over other stored credentials. Returns whether there were any."""
+
+
+class RetryBackoff:
+    """Pauses between attempts: one backoff for a silent robot, a slower one for rejected credentials.
+
+    Presenting rejected credentials often looks like guessing, and locks out their owner.
+
+    Args:
+        silent: while the robot does not answer.
+        rejected: while the robot rejects the credentials, or can't prove its identity.
+    """
+
+    def __init__(self, silent: Backoff | None = None, rejected: Backoff | None = None) -> None:
+        self._silent = silent or Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        self._rejected = rejected or Backoff(first_s=5.0, longest_s=60.0)
+
+    def next_s(self, error: GatewayError) -> float:
+        """Returns the pause after this error, in seconds; at least the robot's retry-after."""
+        backoff = self._rejected if isinstance(error, NotAllowed | NotTrusted) else self._silent
+        return max(backoff.next_s(), min(error.retry_after_s or 0.0, _LONGEST_RETRY_AFTER_S))
+
+    def reset(self) -> None:
+        """Starts again from the first pauses, after an answer."""
+        self._silent.reset()
+        self._rejected.reset()
 
 
 class Conversation:
-    """Follows the status, listens to events, passes on wishes. Belongs to the loop that made it.
+    """Polls the status, streams events, sends requests. Belongs to the loop that made it.
 
     Args:
-        robot: with whom.
-        feed: where its snapshots come from.
-        newest: takes what is learnt.
-        retry: the pauses between attempts while the robot does not answer; they never end by themselves.
-        refused: the same while it refuses the login.
+        robot: the robot's client.
+        latest: takes every change of the state.
+        retry: the pauses between attempts; they never end by themselves.
     """
 
-    def __init__(self, robot: Robot, feed: Feed, newest: Newest, retry: Backoff, refused: Backoff) -> None:
+    def __init__(self, robot: RobotSession, latest: LatestValue[MonitorState], retry: RetryBackoff) -> None:
         self._robot = robot
-        self._feed = feed
-        self._newest = newest
+        self._latest = latest
         self._retry = retry
-        self._refused = refused
-        self._event_log: EventLog | None = None
+        self._snapshot_events: SnapshotEvents | None = None
         self._answering = asyncio.Event()
         self._retry_now = asyncio.Event()
-        self._wished = asyncio.Event()
+        self._requested = asyncio.Event()
+        self._poll_now = asyncio.Event()
 
     def retry_now(self) -> None:
         """Ends the pause before the next attempt."""
         self._retry_now.set()
 
-    def pass_on_wish(self) -> None:
-        """There is a new request in the state."""
-        self._wished.set()
+    def send_request(self) -> None:
+        """Sends the pending request of the state."""
+        self._requested.set()
 
-    async def follow(self) -> None:
-        """Snapshots, one after the other; while none comes, further attempts."""
-        pauses = Pauses(self._retry, self._refused)
+    async def poll_status(self) -> None:
+        """Polls snapshots; while none comes, retries after a pause."""
         while True:
             try:
-                async for reading in self._feed.readings():
-                    self._heard(reading)
-                    pauses.reset()
-            except GatewayError as trouble:
-                pause_s = pauses.after(trouble)
-                self._lost(trouble, pause_s)
-                await self._wait_for_reason(pause_s)
-                self._newest.set_link(replace(self._newest.get().link, next_try_s=None))
+                self._poll_now.clear()
+                asked_s = time.monotonic()
+                snapshot = await self._robot.client.overlay()
+                took_s = time.monotonic() - asked_s
+                self._on_snapshot(snapshot, took_s * _MS_PER_S)
+                # After a slow answer the next poll follows at once; missed ones are not made up for.
+                await _pause(POLL_S - took_s, self._poll_now)
+            except GatewayError as error:
+                pause_s = self._retry.next_s(error)
+                self._on_error(error, pause_s)
+                await self._wait_to_retry(pause_s)
+                self._latest.update(lambda state: replace(state, link=replace(state.link, next_try_s=None)))
 
-    async def listen(self) -> None:
-        """Events, each one once. A gateway that can't stream them lists the newest in its snapshots."""
+    async def stream_events(self) -> None:
+        """Logs each event once. A gateway that can't stream them lists the newest in its snapshots."""
         position: EventPosition | None = None
-        pauses = self._retry.pauses()
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while True:
             try:
-                async for item in self._robot.events(position):
+                async for item in self._robot.client.events(position):
                     if not isinstance(item, Outage):
-                        position, pauses = item.position, self._retry.pauses()
-                    line = line_of(item, time.time())
-                    if line:
-                        self._newest.add_events([line])
+                        position = item.position
+                        backoff.reset()
+                    if line := line_of(item, time.time()):
+                        self._log([line])
             except Unsupported:
-                self._event_log = EventLog()
+                self._snapshot_events = SnapshotEvents()
                 return
             except GatewayError:
-                # Why there is no connection is told by who follows the status, and one who asks is enough.
-                await asyncio.sleep(next(pauses))
+                # The status task reports why there is no connection, and one retrying task is enough.
+                await asyncio.sleep(backoff.next_s())
                 await self._answering.wait()
 
-    async def serve(self) -> None:
-        """Wishes, one at a time; what becomes of the preview is seen in the next snapshots."""
+    async def serve_requests(self) -> None:
+        """Sends requests, one at a time; their effect on the preview shows in the next snapshots."""
         while True:
-            await self._wished.wait()
-            self._wished.clear()
-            request = self._newest.get().request
+            await self._requested.wait()
+            self._requested.clear()
+            request = self._latest.get().request
             assert request is not None
             try:
-                outcome: PreviewChange | GatewayError = await self._ask(request.wish)
-            except GatewayError as trouble:
-                outcome = trouble
-            self._newest.end_request(replace(request, outcome=outcome, ended_s=time.monotonic()))
-            self._feed.hurry()
+                outcome: PreviewChange | GatewayError = await self._set_preview(request.desired)
+            except GatewayError as error:
+                outcome = error
+            done = replace(request, outcome=outcome, ended_s=time.monotonic())
+            self._latest.update(lambda state: replace(state, request=done))  # noqa: B023 - called at once
+            self._poll_now.set()
 
-    async def _wait_for_reason(self, pause_s: float) -> None:
-        """The next attempt: after the pause, when the operator wants it, or with another login."""
+    async def _set_preview(self, desired: DesiredPreview) -> PreviewChange:
+        if desired.enabled:
+            return await self._robot.client.enable_preview(desired.profile, settle_within_s=0)
+        return await self._robot.client.disable_preview(settle_within_s=0)
+
+    async def _wait_to_retry(self, pause_s: float) -> None:
+        """Waits for the end of the pause, the operator's request, or other stored credentials."""
         self._retry_now.clear()
         ends_s = time.monotonic() + pause_s
         while True:
-            await pause(min(ends_s - time.monotonic(), _LOOK_FOR_LOGIN_S), self._retry_now)
-            if await self._robot.renew() or self._retry_now.is_set() or time.monotonic() >= ends_s:
+            await _pause(min(ends_s - time.monotonic(), _CREDENTIAL_POLL_S), self._retry_now)
+            if await self._robot.refresh() or self._retry_now.is_set() or time.monotonic() >= ends_s:
                 return
 
-    async def _ask(self, wish: Wish) -> PreviewChange:
-        if wish.enabled:
-            return await self._robot.enable_preview(wish.profile, settle_within_s=0)
-        return await self._robot.disable_preview(settle_within_s=0)
-
-    def _heard(self, reading: Reading) -> None:
+    def _on_snapshot(self, snapshot: OverlaySnapshot, answer_ms: float) -> None:
         self._answering.set()
-        now_s, before = time.monotonic(), self._newest.get().link
-        since_s = before.since_s if before.phase is Phase.CONNECTED else now_s
-        link = Link(phase=Phase.CONNECTED, since_s=since_s, answer_ms=reading.answer_ms)
-        self._newest.set_snapshot(link, reading.snapshot, now_s)
-        lines = self._event_log.news(reading.snapshot) if self._event_log else []
-        if lines:
-            self._newest.add_events(lines)
+        self._retry.reset()
+        now_s, before = time.monotonic(), self._latest.get().link
+        since_s = before.since_s if before.state is LinkState.CONNECTED else now_s
+        link = Link(state=LinkState.CONNECTED, since_s=since_s, answer_ms=answer_ms)
+        self._latest.update(lambda state: replace(state, link=link, snapshot=snapshot, received_s=now_s))
+        if self._snapshot_events and (lines := self._snapshot_events.new_lines(snapshot)):
+            self._log(lines)
 
-    def _lost(self, trouble: GatewayError, pause_s: float) -> None:
+    def _on_error(self, error: GatewayError, pause_s: float) -> None:
         self._answering.clear()
-        state = self._newest.get()
+        state = self._latest.get()
         before = state.link
         link = Link(
-            phase=Phase.LOST,
-            since_s=state.received_s if before.phase is Phase.CONNECTED else before.since_s,
-            trouble=trouble,
+            state=LinkState.LOST,
+            since_s=state.received_s if before.state is LinkState.CONNECTED else before.since_s,
+            error=error,
             attempts=before.attempts + 1,
             next_try_s=time.monotonic() + pause_s,
         )
-        self._newest.set_link(link)
+        self._latest.update(lambda state: replace(state, link=link))
+
+    def _log(self, lines: list[EventLine]) -> None:
+        self._latest.update(lambda state: replace(state, events=state.events.with_lines(lines)))
+
+
+async def _pause(seconds: float, unless: asyncio.Event) -> None:
+    """Sleeps; ends early when the event is set."""
+    try:
+        async with asyncio.timeout(max(0.0, seconds)):
+            await unless.wait()
+    except TimeoutError:
+        pass

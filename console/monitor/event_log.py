@@ -1,57 +1,92 @@
-"""What is new among the events that each snapshot lists: for gateways that can't stream them."""
+"""Log of the robot's events: a bounded list of lines."""
 
-import time
-from collections.abc import Callable
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
 
-from console.client import OverlaySnapshot
-from console.client.results import OperatorEvent
-from console.monitor.event_lines import EventLine
+from console.client import CaughtUp, Event, EventGap, FaultSeverity, Outage
+from console.client.results import EventKind, GapReason
+from console.presentation.formatting import plural
+from console.presentation.severity_style import SeverityStyle
 
-_MS_PER_S = 1000
+CAPACITY: Final = 200
+"""Lines that are kept; older ones are dropped."""
+_MS_PER_S: Final = 1000
+_STYLES: Final = {FaultSeverity.WARNING: SeverityStyle.WARNING, FaultSeverity.ERROR: SeverityStyle.BAD}
 
 
-class EventLog:
-    """Tells each event once; says when events were missed, and when another gateway speaks.
+@dataclass(frozen=True, slots=True)
+class EventLine:
+    """One line of the log.
 
     Args:
-        clock: this computer's calendar clock.
+        at_s: when it happened, in seconds since 1970: by the robot's calendar clock, or by this computer's if
+        the
+            robot gives no time.
+        text: what happened.
+        style: its severity.
+        own: whether the monitor reports it, not the robot.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.time) -> None:
-        self._clock = clock
-        self._last = 0
-        self._speaker: tuple[str | None, int] | None = None
+    at_s: float
+    text: str
+    style: SeverityStyle = SeverityStyle.QUIET
+    own: bool = False
 
-    def news(self, snapshot: OverlaySnapshot) -> list[EventLine]:
-        """The lines that this snapshot adds, oldest first."""
-        lines: list[EventLine] = []
-        if self._another_gateway(snapshot):
-            self._last = 0
-            lines.append(self._own("The gateway was started again: its events begin anew"))
-        fresh = [event for event in snapshot.events if event.sequence > self._last]
-        if fresh:
-            missed = fresh[0].sequence - self._last - 1
-            # What happened before the window was opened was not missed.
-            if self._last and missed:
-                lines.append(
-                    self._own("1 event was missed" if missed == 1 else f"{missed} events were missed")
-                )
-            lines += [self._logged(event) for event in fresh]
-            self._last = fresh[-1].sequence
-        return lines
 
-    def _another_gateway(self, snapshot: OverlaySnapshot) -> bool:
-        gateway = snapshot.status.gateway
-        newest = snapshot.events[-1].sequence if snapshot.events else 0
-        before, self._speaker = self._speaker, (gateway.boot_id, gateway.uptime_ms or 0)
-        if before is None:
-            return False
-        boot_id, up_ms = before
-        # Numbers that run backwards tell it of a gateway that does not tell its uptime.
-        return boot_id != gateway.boot_id or (gateway.uptime_ms or 0) < up_ms or newest < self._last
+@dataclass(frozen=True, slots=True)
+class EventLog:
+    """The newest lines, and how many there ever were, so that a view can add the lines that it lacks.
 
-    def _own(self, message: str) -> EventLine:
-        return EventLine(self._clock(), message, own=True)
+    Args:
+        lines: at most CAPACITY of them, oldest first.
+        count: of all lines that were ever added.
+    """
 
-    def _logged(self, event: OperatorEvent) -> EventLine:
-        return EventLine(self._clock() - event.age_ms / _MS_PER_S, event.message)
+    lines: tuple[EventLine, ...] = ()
+    count: int = 0
+
+    def with_lines(self, more: Iterable[EventLine]) -> "EventLog":
+        """Returns the log with further lines at its end."""
+        added = tuple(more)
+        return EventLog((*self.lines, *added)[-CAPACITY:], self.count + len(added))
+
+    def since(self, count: int) -> tuple[EventLine, ...]:
+        """Returns the lines added after there were `count`, as far as they are kept."""
+        fresh = min(self.count - count, len(self.lines))
+        return self.lines[len(self.lines) - fresh :]
+
+
+def line_of(item: Event | EventGap | CaughtUp | Outage, now_s: float) -> EventLine | None:
+    """Returns the line of a streamed item; None for one that is not logged.
+
+    Args:
+        item: as the client's `events` yields it.
+        now_s: this computer's calendar clock.
+    """
+    match item:
+        case Event():
+            style = _STYLES.get(item.severity, SeverityStyle.QUIET)
+            return EventLine(item.wall_clock_unix_ms / _MS_PER_S, _text(item), style)
+        case EventGap():
+            return EventLine(now_s, _gap_text(item), SeverityStyle.WARNING, own=True)
+        case CaughtUp() | Outage():
+            # The window's header shows the state of the connection.
+            return None
+
+
+def _text(event: Event) -> str:
+    if event.control:
+        who = event.control.who or event.control.address
+        return f"{who} asked for {event.control.method}: {event.control.result.value}, {event.control.answer}"
+    cleared = event.kind is EventKind.FAULT_CLEARED
+    severity = "cleared" if cleared else event.severity.value if event.severity in _STYLES else ""
+    # The message may contain its own prefix.
+    prefix = [word for word in (severity, event.component) if word and word not in event.message]
+    return ": ".join([*prefix, event.message])
+
+
+def _gap_text(gap: EventGap) -> str:
+    if gap.reason is GapReason.NEW_RUN:
+        return "The gateway was restarted: its events begin anew"
+    return f"{plural(gap.missed_count, 'event')} missed: more came than the gateway keeps"

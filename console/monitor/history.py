@@ -1,4 +1,4 @@
-"""The last two minutes of a few figures, in slots of half a second."""
+"""History of a few metrics: the last two minutes, in slots of half a second."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ SLOTS: Final = int(SPAN_S / STEP_S)
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A figure worth a plot.
+    """A plotted metric.
 
     Args:
         title: its name.
-        unit: what stands behind its number.
+        unit: of its values.
         bottom: lower end of the scale.
         top: upper end of the scale; it grows when values do not fit.
         digits: after the decimal point.
@@ -39,12 +39,12 @@ METRICS: Final = (
     Metric("CPU temperature", "°C", 20, 100),
 )
 Values: TypeAlias = tuple[float | None, ...]
-"""One for each of METRICS; None where it is not known."""
+"""One for each of METRICS; None where it is unknown."""
 NOTHING: Final[Values] = (None,) * len(METRICS)
 
 
 def values_of(status: SystemStatus) -> Values:
-    """The figures of one status. What is stale is not known."""
+    """Returns the metrics of one status; stale ones are None."""
     measured, compute = status.preview.measured, status.platform.compute
     video = (measured.fps, measured.bitrate_kbps, measured.worst_rtt_ms) if _fresh(measured) else (None,) * 3
     computer = (compute.cpu_percent, compute.cpu_temperature_c) if _fresh(compute) else (None,) * 2
@@ -52,14 +52,14 @@ def values_of(status: SystemStatus) -> Values:
 
 
 class History:
-    """A ring of SLOTS slots. Time that nobody recorded is a gap, not a line between its ends."""
+    """Ring buffer of SLOTS slots. Time without a record is a gap, not a line between its ends."""
 
     def __init__(self) -> None:
         self._slots: list[Values] = [NOTHING] * SLOTS
         self._newest = -1
 
     def record(self, now_s: float, values: Values) -> None:
-        """Notes the values of this moment, on the monotonic clock. The last of a slot counts."""
+        """Records the values of this moment, on the monotonic clock. The last of a slot counts."""
         slot = int(now_s / STEP_S)
         for skipped in range(max(self._newest + 1, slot - SLOTS + 1), slot):
             self._slots[skipped % SLOTS] = NOTHING
@@ -67,13 +67,13 @@ class History:
         self._slots[slot % SLOTS] = values
 
     def series(self, index: int) -> list[float | None]:
-        """The values of METRICS[index], oldest first, the newest at the end."""
+        """Returns the values of METRICS[index], oldest first, the newest at the end."""
         first = self._newest + 1
         return [self._slots[(first + offset) % SLOTS][index] for offset in range(SLOTS)]
 
 
 def top_of_scale(metric: Metric, series: Sequence[float | None]) -> float:
-    """The upper end of the scale: the metric's own, or the next round number above what is there."""
+    """Returns the upper end of the scale: the metric's own, or a round number above the highest value."""
     highest = max((value for value in series if value is not None), default=metric.top)
     if highest <= metric.top:
         return metric.top

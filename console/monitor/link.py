@@ -1,97 +1,93 @@
-"""The connection to the gateway, as the operator should know it."""
+"""State of the connection to the gateway, and its text for the operator."""
 
 import math
 from dataclasses import dataclass
 from enum import Enum
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
-from console.tone import Tone
-from console.words import age
+from console.presentation.formatting import age
+from console.presentation.severity_style import SeverityStyle
 
 _MS_PER_S = 1000
 
 
-class Phase(Enum):
-    """Whether the robot answers."""
+class LinkState(Enum):
+    """State of the connection."""
 
     CONNECTING = "connecting"
-    """It was not heard yet, and nothing says that it won't be."""
+    """No answer yet, and no failure yet."""
     CONNECTED = "connected"
     LOST = "lost"
-    """The newest attempt brought no answer."""
+    """The latest attempt brought no answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """The connection at one moment. Moments are on this computer's monotonic clock, in seconds.
+    """The connection at one moment. Times are on this computer's monotonic clock, in seconds.
 
     Args:
-        phase: whether the robot answers.
-        since_s: when the phase began; for LOST: when the robot was heard last, or first asked.
-        answer_ms: how long the newest answer took; None where nothing was asked for it.
-        trouble: why there is no answer; None unless lost.
-        attempts: failed attempts since the robot was heard last.
-        next_try_s: when it is asked again; None while it is being asked.
+        state: whether the robot answers.
+        since_s: when the state began; for LOST: the time of the last answer, or of the first attempt.
+        answer_ms: round trip of the latest call; None without one.
+        error: why there is no answer; None unless lost.
+        attempts: failed attempts since the last answer.
+        next_try_s: time of the next attempt; None while one is under way.
     """
 
-    phase: Phase
+    state: LinkState
     since_s: float
     answer_ms: float | None = None
-    trouble: GatewayError | None = None
+    error: GatewayError | None = None
     attempts: int = 0
     next_try_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class LinkWords:
-    """A link in words.
+class LinkText:
+    """Text of a link.
 
     Args:
         mark: one or two words.
-        tone: how much they want to be noticed.
-        detail: the figure that goes with them.
-        banner: what is wrong and what to do; empty while all is well.
-        retry: how long it has been so, and what happens next; empty while all is well.
+        style: colour and shape of the mark.
+        detail: the figure that goes with it.
+        banner: the error and its remedy; empty without an error.
+        retry: how long the error has lasted, and the next attempt; empty without an error.
     """
 
     mark: str
-    tone: Tone
+    style: SeverityStyle
     detail: str
     banner: str = ""
     retry: str = ""
 
 
-def link_words(link: Link, target: str, now_s: float) -> LinkWords:
-    """What the window says of the connection."""
-    lasting = age(round((now_s - link.since_s) * _MS_PER_S))
-    match link.phase:
-        case Phase.CONNECTED:
+def link_text(link: Link, target: str, now_s: float) -> LinkText:
+    """Formats a link for the window."""
+    duration = age(round((now_s - link.since_s) * _MS_PER_S))
+    match link.state:
+        case LinkState.CONNECTED:
             answers = "" if link.answer_ms is None else f"answers in {link.answer_ms:.0f} ms"
-            return LinkWords("connected", Tone.GOOD, answers)
-        case Phase.CONNECTING:
-            return LinkWords("connecting", Tone.QUIET, f"for {lasting}")
-        case Phase.LOST:
-            trouble = str(link.trouble or f"{target} does not answer")
-            banner = trouble[:1].upper() + trouble[1:]
-            retry = f"{_lack(link.trouble)} for {lasting}. {_retry(link, now_s)}"
-            return LinkWords(_trouble_mark(link.trouble), Tone.BAD, f"for {lasting}", banner, retry)
+            return LinkText("connected", SeverityStyle.GOOD, answers)
+        case LinkState.CONNECTING:
+            return LinkText("connecting", SeverityStyle.QUIET, f"for {duration}")
+        case LinkState.LOST:
+            error = str(link.error or f"{target} does not answer")
+            rejected = isinstance(link.error, NotAllowed | NotTrusted)
+            lack = "No access" if rejected else "No answer"
+            retry = f"{lack} for {duration}. Attempt {link.attempts + 1} {_when(link, rejected, now_s)}."
+            banner = error[:1].upper() + error[1:]
+            return LinkText(_mark(link.error), SeverityStyle.BAD, f"for {duration}", banner, retry)
 
 
-def _trouble_mark(trouble: GatewayError | None) -> str:
-    if isinstance(trouble, Unreachable | DeadlineExceeded):
+def _mark(error: GatewayError | None) -> str:
+    if isinstance(error, Unreachable | DeadlineExceeded):
         return "unreachable"
-    # Somebody is there, but what comes can't be used: a refusal, an older gateway, an error of its own.
-    return "no answer" if trouble is None else trouble.kind.replace("_", " ")
+    # A gateway answers, but not with a status: a refusal, an older gateway, an error of its own.
+    return "no answer" if error is None else error.kind.replace("_", " ")
 
 
-def _lack(trouble: GatewayError | None) -> str:
-    return "No access" if isinstance(trouble, NotAllowed | NotTrusted) else "No answer"
-
-
-def _retry(link: Link, now_s: float) -> str:
+def _when(link: Link, rejected: bool, now_s: float) -> str:
     if link.next_try_s is None:
-        return f"Attempt {link.attempts + 1} is under way."
+        return "is under way"
     when = f"in {max(1, math.ceil(link.next_try_s - now_s))} s"
-    if isinstance(link.trouble, NotAllowed | NotTrusted):
-        when = f"{when}, or as soon as another login is stored"
-    return f"Attempt {link.attempts + 1} {when}."
+    return f"{when}, or as soon as another login is stored" if rejected else when

@@ -1,5 +1,5 @@
-"""The reference receiver: an SRT stream in, decoded pictures out, nothing held back on the way.
+"""The reference receiver: an SRT stream in, decoded frames out, with no frame held back on the way.
 
-`console.receiver.receiver.Receiver` is what callers use. Only `connection` and `decoding` need GStreamer;
-they are imported when the first connection is made.
+Callers use `console.receiver.receiver.Receiver`. Only `connection`, `decoding`, `file_branch` and
+`decoder_trial` need GStreamer; they are imported when the first connection is made.
 """

@@ -1,43 +1,40 @@
-"""Which hardware decoders this computer really has: each one is tried in a process of its own.
+"""Proves hardware decoders: each candidate decodes a clip in a process of its own.
 
-That an element exists says little: drivers refuse later, hang, crash, hold pictures back or paint them green.
-So a decoder counts only after it decoded a clip rightly, without holding anything back.
+That an element exists says little: drivers refuse later, hang, crash, hold frames back or paint them green.
+So a decoder counts only after it decoded a clip correctly, without holding anything back.
 """
 
 import json
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable
 from typing import Final
 
 HARDWARE: Final = {
     "h264": ("vah264dec", "nvh264dec", "v4l2slh264dec", "v4l2h264dec"),
     "h265": ("vah265dec", "nvh265dec", "v4l2slh265dec", "v4l2h265dec"),
 }
-"""GStreamer's elements, the first choice first: VA-API, NVIDIA, V4L2 without and with a state of its own."""
-TRIAL_WITHIN_S: Final = 6.0
+"""GStreamer's elements, the first choice first: VA-API, NVIDIA, V4L2 stateless and V4L2 stateful."""
+TRIAL_TIMEOUT_S: Final = 6.0
 
 
-def present(codec: str) -> list[str]:
-    """The elements for a codec that are installed here, proven or not.
+def proven_decoder(codec: str) -> str | None:
+    """Returns the first installed hardware decoder that passes its trial; None if there is none.
+
+    Takes up to TRIAL_TIMEOUT_S for each installed candidate.
 
     Raises:
         UserError: GStreamer is not installed.
     """
-    # Imported here so that a program without GStreamer fails only when it is asked for pictures.
+    # Imported here so that a program without GStreamer fails only when it decodes.
     from common.gst import Gst  # noqa: PLC0415
 
-    return [element for element in HARDWARE[codec] if Gst.ElementFactory.find(element)]
+    installed = (element for element in HARDWARE[codec] if Gst.ElementFactory.find(element))
+    return next((element for element in installed if not objection(element, codec)), None)
 
 
-def first_proven(codec: str, elements: Iterable[str]) -> str | None:
-    """The first of the elements that can be relied on; None when none can. Takes a trial's time for each."""
-    return next((element for element in elements if not objection(element, codec)), None)
-
-
-def objection(element: str, codec: str, within_s: float = TRIAL_WITHIN_S) -> str:
-    """Why a decoder can't be relied on; empty when it can."""
+def objection(element: str, codec: str, timeout_s: float = TRIAL_TIMEOUT_S) -> str:
+    """Returns why a decoder fails its trial; empty if it passes."""
     command = [sys.executable, "-m", "console.receiver.decoder_trial", element, codec]
     try:
         done = subprocess.run(
@@ -45,11 +42,11 @@ def objection(element: str, codec: str, within_s: float = TRIAL_WITHIN_S) -> str
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            timeout=within_s,
+            timeout=timeout_s,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return f"it hung: no result within {within_s:g} s"
+        return f"it hung: no result within {timeout_s:g} s"
     if done.returncode < 0:
         return f"it crashed when tried ({signal.Signals(-done.returncode).name})"
     try:

@@ -1,15 +1,14 @@
-"""One trial of one decoder, in a process that may crash or hang: `python -m console.receiver.decoder_trial`.
+"""Trial of one decoder, in a process that may crash or hang: `python -m console.receiver.decoder_trial`.
 
-The arguments are GStreamer's element and the codec. It decodes a clip, picture by picture, as they come from
-a robot, and prints one line of JSON: why the decoder can't be relied on, or nothing when it can. Whoever
-started it sets the deadline.
+The arguments are GStreamer's element and the codec. It decodes a clip, access unit by access unit, as a robot
+sends them, and prints one JSON object: {"reason": why the decoder is rejected, or empty}. The parent process
+sets the deadline.
 """
 
 import json
 import os
 import sys
 import time
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final
 
@@ -18,57 +17,35 @@ from common.errors import UserError
 from common.gst import GLib, Gst
 from console.receiver import clips
 
-_ENDS_WITHIN_S: Final = 30
-"""More than any caller waits: what is left when the caller was killed between its start and ours."""
-_FIRST_WITHIN_S: Final = 1.5
+_LIFETIME_S: Final = 30
+"""More than any parent waits: bounds an orphan whose parent was killed between its start and ours."""
+_FIRST_FRAME_TIMEOUT_S: Final = 1.5
 """A driver may have to wake up."""
-_NEXT_WITHIN_S: Final = 0.3
-_LOOK_NS: Final = 50_000_000
-_MAY_HOLD: Final = 1
-"""Pictures that may be inside while more are pushed: each one costs a picture's time of latency."""
-_PICTURE_S: Final = 1 / 30
-
-
-@dataclass
-class _Run:
-    """What came out of a decoder.
-
-    Args:
-        samples: its pictures.
-        held: how many were inside at the most before the end was said.
-        error: what it complained about; empty when it did not.
-    """
-
-    samples: list[Any] = field(default_factory=list)
-    held: int = 0
-    error: str = ""
-
-    def take(self, out: Any) -> bool:
-        """Takes one more picture, if there is one soon."""
-        sample = out.emit("try-pull-sample", _LOOK_NS)
-        if sample:
-            self.samples.append(sample)
-        return sample is not None
+_NEXT_FRAME_TIMEOUT_S: Final = 0.3
+_POLL_NS: Final = 50_000_000
+_MOST_HELD: Final = 1
+"""Frames that may be inside while more are pushed: each one adds a frame's time to the latency."""
+_FRAME_S: Final = 1 / 30
 
 
 def main() -> None:
     """Runs one trial."""
-    end_with_parent(_ENDS_WITHIN_S)
+    end_with_parent(_LIFETIME_S)
     element, codec = sys.argv[1:]
     try:
-        # Kept until the end: a pipeline that is forgotten while it plays is torn down badly.
+        # Kept until the end: a pipeline that is dropped while it plays is torn down badly.
         pipeline = build(element, codec)
         reason = trial(pipeline, clips.units(codec))
     except UserError as error:
         reason = str(error)
     sys.stdout.write(json.dumps({"reason": reason}) + "\n")
     sys.stdout.flush()
-    # Nothing is stopped: the process ends, and a driver that hangs while it closes has no say any more.
+    # Nothing is stopped: the process ends, so that a driver that hangs on closing can't delay the result.
     os._exit(0)
 
 
 def build(element: str, codec: str) -> Any:
-    """The pipeline of a trial, not yet started.
+    """Returns the pipeline of a trial, not yet started.
 
     Raises:
         UserError: it can't be built.
@@ -85,42 +62,52 @@ def build(element: str, codec: str) -> Any:
 
 
 def trial(pipeline: Any, units: list[bytes]) -> str:
-    """Why this decoder can't be relied on; empty when it can."""
+    """Returns why this decoder is rejected; empty if it passes."""
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
         return _error(pipeline) or "it can't be started"
-    run = _decode(pipeline, units)
-    if run.error:
-        return run.error
-    if not run.samples:
-        return "it makes no picture"
-    if run.held > _MAY_HOLD:
-        return f"it holds {run.held} pictures back"
-    if len(run.samples) < len(units):
-        return f"it made {len(run.samples)} pictures of {len(units)}"
-    return "" if all(_is_right(sample) for sample in run.samples) else "its pictures are wrong"
+    samples, held, error = _decode(pipeline, units)
+    if error:
+        return error
+    if not samples:
+        return "it decodes no frame"
+    if held > _MOST_HELD:
+        return f"it holds {held} frames back"
+    if len(samples) < len(units):
+        return f"it decoded {len(samples)} frames of {len(units)}"
+    return "" if all(_shows_bars(sample) for sample in samples) else "its frames are wrong"
 
 
-def _decode(pipeline: Any, units: list[bytes]) -> _Run:
-    way_in, out, run = pipeline.get_by_name("in"), pipeline.get_by_name("out"), _Run()
+def _decode(pipeline: Any, units: list[bytes]) -> tuple[list[Any], int, str]:
+    """Returns the decoded samples, the most frames held before the end of stream, and an error or ""."""
+    source, sink, held, error = pipeline.get_by_name("in"), pipeline.get_by_name("out"), 0, ""
+    samples: list[Any] = []
     for number, unit in enumerate(units):
         buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit))
-        buffer.pts = buffer.dts = round(number * _PICTURE_S * Gst.SECOND)
-        way_in.emit("push-buffer", buffer)
-        deadline_s = time.monotonic() + (_NEXT_WITHIN_S if number else _FIRST_WITHIN_S)
-        while len(run.samples) <= number and not run.error and time.monotonic() < deadline_s:
-            run.take(out)
-            run.error = _error(pipeline)
-        run.held = max(run.held, number + 1 - len(run.samples))
-        if run.error or run.held > _MAY_HOLD:
+        buffer.pts = buffer.dts = round(number * _FRAME_S * Gst.SECOND)
+        source.emit("push-buffer", buffer)
+        deadline_s = time.monotonic() + (_NEXT_FRAME_TIMEOUT_S if number else _FIRST_FRAME_TIMEOUT_S)
+        while len(samples) <= number and not error and time.monotonic() < deadline_s:
+            _pull(sink, samples)
+            error = _error(pipeline)
+        held = max(held, number + 1 - len(samples))
+        if error or held > _MOST_HELD:
             break
-    way_in.emit("end-of-stream")
-    while run.take(out):
+    source.emit("end-of-stream")
+    while _pull(sink, samples):
         pass
-    return run
+    return samples, held, error
 
 
-def _is_right(sample: Any) -> bool:
-    """Whether it shows the bars: light on the left, dark on the right."""
+def _pull(sink: Any, samples: list[Any]) -> bool:
+    """Appends one more sample if one comes within _POLL_NS."""
+    sample = sink.emit("try-pull-sample", _POLL_NS)
+    if sample:
+        samples.append(sample)
+    return sample is not None
+
+
+def _shows_bars(sample: Any) -> bool:
+    """Whether it shows the clip's colour bars: light on the left, dark on the right."""
     shape = sample.get_caps().get_structure(0)
     if (shape.get_value("width"), shape.get_value("height")) != (clips.WIDTH_PX, clips.HEIGHT_PX):
         return False

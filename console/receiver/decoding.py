@@ -1,47 +1,20 @@
-"""From one compressed stream to pictures, without waiting for the next one."""
+"""Decodes one compressed stream into frames without waiting for the next one."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from common.errors import UserError
 from common.gst import Gst, GstVideo
 from console.receiver.frame import Frame, PixelFormat, Plane
-from console.receiver.setup import Setup
+from console.receiver.frame_queue import FrameQueue
+from console.receiver.options import ReceiverOptions
 
-
-@dataclass(frozen=True, slots=True)
-class Codec:
-    """What one kind of stream needs.
-
-    Args:
-        name: "h264" or "h265".
-        caps: media type of the stream.
-        parser: element that finds the parameter sets.
-        decoder: element that makes the pictures in software.
-    """
-
-    name: str
-    caps: str
-    parser: str
-    decoder: str
-
-
-CODECS = {
-    codec.caps: codec
-    for codec in (
-        Codec("h264", "video/x-h264", "h264parse", "avdec_h264"),
-        Codec("h265", "video/x-h265", "h265parse", "avdec_h265"),
-    )
-}
-
+CODECS = {"video/x-h264": "h264", "video/x-h265": "h265"}
+"""Codec by media type of its stream; GStreamer's parser, software decoder and caps are named after it."""
+_BAD = "gstreamer1.0-plugins-bad"
 _PACKAGES = {
-    "srtsrc": "gstreamer1.0-plugins-bad",
-    "tsdemux": "gstreamer1.0-plugins-bad",
     "capssetter": "gstreamer1.0-plugins-good",
-    "h264parse": "gstreamer1.0-plugins-bad",
-    "h265parse": "gstreamer1.0-plugins-bad",
     "avdec_h264": "gstreamer1.0-libav",
     "avdec_h265": "gstreamer1.0-libav",
     "videoconvert": "gstreamer1.0-plugins-base",
@@ -50,10 +23,11 @@ _PACKAGES = {
     "queue": "libgstreamer1.0-0",
     "fdsink": "libgstreamer1.0-0",
 }
+"""Debian's package of each element; those that are missing here are in _BAD."""
 
 
 def element(factory: str, **properties: Any) -> Any:
-    """A new GStreamer element; properties that this version doesn't know are left alone.
+    """Makes a GStreamer element; properties that this version doesn't know are left alone.
 
     Texts are read as on a gst-launch-1.0 command line, so they can name flags and caps.
 
@@ -64,7 +38,7 @@ def element(factory: str, **properties: Any) -> Any:
     if made is None:
         raise UserError(
             f"GStreamer's element {factory} is missing",
-            f"Type: sudo apt-get install {_PACKAGES.get(factory, 'gstreamer1.0-plugins-bad')}",
+            f"Type: sudo apt-get install {_PACKAGES.get(factory, _BAD)}",
         )
     for name, value in properties.items():
         dashed = name.replace("_", "-")
@@ -84,12 +58,12 @@ class _Memory:
         self._buffer = buffer
 
     def extract_dup(self, offset: int, size: int, /) -> bytes:
-        """Copies a part, or all of it: that in a way that takes a quarter of the time."""
+        """Copies a part, or all of it: mapping the whole buffer takes a quarter of the time."""
         if (offset, size) != (0, self._buffer.get_size()):
             return bytes(self._buffer.extract_dup(offset, size))
         mapped, content = self._buffer.map(Gst.MapFlags.READ)
         if not mapped:
-            raise RuntimeError("a decoded picture can't be read")
+            raise RuntimeError("a decoded frame can't be read")
         try:
             return bytes(content.data)
         finally:
@@ -97,60 +71,59 @@ class _Memory:
 
 
 class DecodingBranch:
-    """Parser, decoder and the way out for one stream of the transport stream.
+    """Parser, decoder and appsink for one elementary stream of the transport stream.
 
-    Two things keep a picture from waiting for its successor. The sender writes one access unit per PES
-    packet, so the parser is told that what comes is whole; and the decoder's threads share the slices of one
-    picture instead of working at several pictures.
+    Two settings keep a frame from waiting for its successor. The sender writes one access unit per PES
+    packet, so capssetter declares the parser's input as whole access units; and the decoder's threads share
+    the slices of one frame instead of working at several frames.
 
     Args:
-        codec: of the stream.
-        deliver: called on a GStreamer thread with every picture.
-        setup: what the caller wants of the pictures.
+        codec: of the stream, "h264" or "h265".
+        queue: takes every frame, on a GStreamer thread.
+        options: pixel format and decoders.
 
     Raises:
         UserError: an element is not installed.
     """
 
-    def __init__(self, codec: Codec, deliver: Callable[[Frame], None], setup: Setup) -> None:
+    def __init__(self, codec: str, queue: FrameQueue, options: ReceiverOptions) -> None:
         self._codec = codec
-        self._deliver = deliver
-        self._pixels = setup.pixels
-        self._decoder = setup.decoders.get(codec.name, codec.decoder)
+        self._queue = queue
+        self._pixels = options.pixels
+        self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
         self._layout: Any = None
         caps = f"video/x-raw,format={self._pixels.value}"
-        sink = element("appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps=caps)
-        self._sink = sink
-        self._handler = sink.connect("new-sample", self._on_sample)
+        self._sink = element("appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps=caps)
+        self._handler = self._sink.connect("new-sample", self._on_sample)
         self._elements = [
-            element("capssetter", caps=f"{codec.caps},alignment=au"),
-            element(codec.parser),
+            element("capssetter", caps=f"video/x-{codec},alignment=au"),
+            element(f"{codec}parse"),
             element(self._decoder, thread_type="slice"),
             element("videoconvert"),
-            sink,
+            self._sink,
         ]
 
     def attach(self, pipeline: Any, pad: Any) -> None:
-        """Joins the pipeline behind `pad` and runs."""
+        """Adds the branch behind `pad` and starts it."""
         for one in self._elements:
             pipeline.add(one)
-        for upstream, downstream in zip(self._elements, self._elements[1:], strict=False):
+        for upstream, downstream in pairwise(self._elements):
             upstream.link(downstream)
         for one in reversed(self._elements):
             one.sync_state_with_parent()
         pad.link(self._elements[0].get_static_pad("sink"))
 
     def detach(self, pipeline: Any) -> None:
-        """Leaves the pipeline. Not on a GStreamer thread."""
+        """Stops and removes the branch. Not on a GStreamer thread."""
         self._sink.disconnect(self._handler)
         for one in self._elements:
             one.set_locked_state(True)
             one.set_state(Gst.State.NULL)
             pipeline.remove(one)
 
-    def is_mine(self, element: Any) -> bool:
-        """Whether an element is one of this branch; those inside a decoder count as the decoder."""
+    def owns(self, element: Any) -> bool:
+        """Whether an element belongs to this branch; those inside a decoder bin count as the decoder."""
         return any(element is one or element.has_as_ancestor(one) for one in self._elements)
 
     def _on_sample(self, sink: Any) -> Any:
@@ -158,7 +131,7 @@ class DecodingBranch:
         sample = sink.emit("pull-sample")
         if sample is None:
             return Gst.FlowReturn.EOS
-        self._deliver(self._frame(sample, arrival_s))
+        self._queue.put(self._frame(sample, arrival_s))
         return Gst.FlowReturn.OK
 
     def _frame(self, sample: Any, arrival_s: float) -> Frame:
@@ -170,7 +143,7 @@ class DecodingBranch:
         return Frame(
             width=info.width,
             height=info.height,
-            codec=self._codec.name,
+            codec=self._codec,
             pts_ns=None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts,
             arrival_s=arrival_s,
             corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
@@ -182,9 +155,6 @@ class DecodingBranch:
 
 
 def _planes(info: Any, pixels: PixelFormat) -> tuple[Plane, ...]:
-    if pixels is PixelFormat.BGRX:
-        return (Plane(info.offset[0], info.stride[0], info.height),)
     half = (info.height + 1) // 2
-    return tuple(
-        Plane(info.offset[i], info.stride[i], rows) for i, rows in enumerate((info.height, half, half))
-    )
+    rows = (info.height,) if pixels is PixelFormat.BGRX else (info.height, half, half)
+    return tuple(Plane(info.offset[i], info.stride[i], count) for i, count in enumerate(rows))

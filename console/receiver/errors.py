@@ -1,16 +1,16 @@
-"""What can go wrong with a stream, in words for a person."""
+"""Errors of a stream, with a remedy for each."""
 
 from common.errors import ExitCode, UserError
 from console.receiver.address import StreamAddress
 
 
 class StreamError(UserError):
-    """The stream does not come, or came and ended.
+    """The stream can't be received, or it ended.
 
     Args:
         what: what happened.
         remedy: what to do.
-        final: whether trying again with the same address can't help.
+        final: whether a further attempt with the same address can't help.
     """
 
     def __init__(self, what: str, remedy: str, *, final: bool = False) -> None:
@@ -18,37 +18,37 @@ class StreamError(UserError):
         self.final = final
 
 
-class NoPictureError(StreamError):
-    """No picture in the time the caller gave. The receiver goes on; asking again is fine."""
+class NoFrameError(StreamError):
+    """No frame came before the caller's timeout. The receiver goes on; asking again is fine."""
 
 
 class StreamEndedError(StreamError):
-    """The connection is over: the robot ended it, or it was lost."""
+    """The robot ended the connection, or it was lost."""
 
 
 class StreamRefusedError(StreamError):
-    """The connection never came about."""
+    """The connection was never established."""
 
 
 class UndecodableError(StreamError):
-    """The stream arrives, but this machine can't make pictures of it."""
+    """The stream arrives, but this computer can't decode it."""
 
 
 class ReceiverClosedError(StreamError):
-    """The receiver was closed while, or before, somebody waited for a picture."""
+    """The receiver was closed before or while a caller waited for a frame."""
 
 
 def closed() -> ReceiverClosedError:
-    """There will be no more pictures, because the caller wanted no more."""
+    """Returns the error of a call on a closed receiver."""
     return ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
 
 
 def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamError:
-    """What an error of the SRT source means.
+    """Translates an error of the SRT source.
 
     Args:
-        address: what was called.
-        detail: the source's own words; libsrt's reason is the part after the last line break.
+        address: listener of the connection.
+        detail: the source's own text; libsrt's reason is the part after the last line break.
         had_data: whether anything had arrived over this connection.
     """
     reason = detail.strip().rsplit("\n", maxsplit=1)[-1]
@@ -69,7 +69,7 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
 
 
 def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
-    """The stream was there and is over."""
+    """Returns the error of a stream that was received and then ended."""
     why = f" ({reason})" if reason else ""
     return StreamEndedError(
         f"the stream from {address.uri} ended{why}",
@@ -77,10 +77,9 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
-def nothing_within(address: StreamAddress, timeout_s: float, last: StreamError | None) -> NoPictureError:
-    """The caller's time is up."""
-    why = f" ({last.what})" if last else ""
-    return NoPictureError(
-        f"no picture from {address.uri} within {timeout_s:g} s{why}",
+def no_frame_within(address: StreamAddress, timeout_s: float) -> NoFrameError:
+    """Returns the error of a timeout."""
+    return NoFrameError(
+        f"no frame from {address.uri} within {timeout_s:g} s",
         "Check robotctl status: is the preview RUNNING, does it encode frames, is a passphrase needed",
     )

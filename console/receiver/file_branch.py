@@ -1,4 +1,4 @@
-"""The way of the encoded stream into a recording, beside the way to the decoder."""
+"""Writes the encoded stream into a recording, beside the decoder."""
 
 from itertools import pairwise
 from typing import Any, Final
@@ -7,41 +7,41 @@ from console.receiver.decoding import element
 from console.receiver.recording import Recording
 
 _BACKLOG_BYTES: Final = 16 * 2**20
-"""What may wait for a slow disk: some 25 s of a stream at 5 Mbit/s. Then the oldest is left out."""
+"""Bound of the queue for a slow disk: some 25 s of a stream at 5 Mbit/s. Beyond it the oldest is dropped."""
 
 
 class FileBranch:
-    """Hands what the source gives to a recording, packet by packet, without Python.
+    """Hands the source's packets to a recording, without Python per packet.
 
-    A slow disk does not reach the pictures: what can't be handed over waits in a queue of its own, and
-    `fdsink`, other than `filesink`, can be stopped while it waits.
+    A slow disk does not delay the frames: its backlog waits in a queue of its own, and `fdsink`, unlike
+    `filesink`, can be stopped while it blocks.
 
     Args:
-        recording: what keeps it, and whom to tell what was left out.
+        recording: takes the packets, and counts the gaps.
 
     Raises:
         UserError: an element is not installed.
     """
 
     def __init__(self, recording: Recording) -> None:
-        self._fork = element("tee")
+        self._tee = element("tee")
         self._queue = element(
             "queue", leaky="downstream", max_size_buffers=0, max_size_time=0, max_size_bytes=_BACKLOG_BYTES
         )
-        self._handler = self._queue.connect("overrun", lambda _queue: recording.leave_out())
+        self._handler = self._queue.connect("overrun", lambda _queue: recording.add_gap())
         self._sink = element("fdsink", fd=recording.pipe, sync=False)
-        # The pipeline shall not wait for the first packet here. `async` is a word of Python's.
+        # The pipeline must not wait for the first packet here. `async` is a keyword of Python's.
         self._sink.set_property("async", False)
 
     def attach(self, pipeline: Any, source: Any) -> Any:
-        """Joins a pipeline that does not run yet; returns the element to link the decoder's way to."""
-        chain = (source, self._fork, self._queue, self._sink)
+        """Adds the branch to a stopped pipeline; returns the element to link the decoder's branch to."""
+        chain = (source, self._tee, self._queue, self._sink)
         for one in chain[1:]:
             pipeline.add(one)
         for upstream, downstream in pairwise(chain):
             upstream.link(downstream)
-        return self._fork
+        return self._tee
 
     def detach(self) -> None:
-        """Lets go of the elements, which are stopped."""
+        """Releases the stopped elements."""
         self._queue.disconnect(self._handler)

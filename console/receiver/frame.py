@@ -1,4 +1,4 @@
-"""One decoded picture."""
+"""One decoded video frame."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -6,24 +6,24 @@ from typing import Protocol
 
 
 class PixelFormat(Enum):
-    """How the pixels of a picture lie in memory; the values are GStreamer's words."""
+    """Memory layout of a frame's pixels; the values are GStreamer's names."""
 
     I420 = "I420"
-    """A plane of luma, then two of chroma at half the size: what decoders give."""
+    """A plane of luma, then two of chroma at half the size: what decoders produce."""
     BGRX = "BGRx"
     """One plane, four bytes a pixel: what screens take."""
 
 
 class Pixels(Protocol):
-    """Memory of a picture; a Gst.Buffer is one."""
+    """Memory of a frame; a Gst.Buffer is one."""
 
     def extract_dup(self, offset: int, size: int, /) -> bytes:
-        """Copies `size` bytes from `offset` on out of the picture."""
+        """Copies `size` bytes from `offset` on."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """Where one component of a picture lies in its memory.
+    """Position of one component in a frame's memory.
 
     Args:
         offset: of the first row, in bytes.
@@ -38,21 +38,21 @@ class Plane:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A decoded picture.
+    """A decoded frame.
 
-    The pixels stay in GStreamer's memory until they are asked for, and are copied once then.
+    The pixels stay in GStreamer's memory until they are read, and are copied once then.
 
     Args:
         width: in pixels.
         height: in pixels.
-        codec: what it was compressed with, "h264" or "h265".
+        codec: of the stream, "h264" or "h265".
         pts_ns: the sender's presentation time as the demultiplexer gives it; None when it gave none.
-        arrival_s: when the decoder handed it out, on `time.monotonic()`.
-        corrupt: whether the decoder had to guess parts of it, because packets were lost.
+        arrival_s: when the decoder delivered it, on `time.monotonic()`.
+        corrupt: whether the decoder concealed parts of it, because packets were lost.
         planes: luma, Cb, Cr in I420; else one.
         pixels: the memory.
-        pixel_format: how they lie there.
-        decoder: GStreamer's element that made it.
+        pixel_format: layout of the memory.
+        decoder: GStreamer's element that decoded it.
     """
 
     width: int
@@ -67,17 +67,17 @@ class Frame:
     decoder: str = ""
 
     def plane(self, index: int) -> bytes:
-        """All rows of a plane, `planes[index].stride` bytes each (in I420 0 is luma, 1 Cb, 2 Cr)."""
+        """Returns all rows of a plane, `planes[index].stride` bytes each (in I420 0 is luma, 1 Cb, 2 Cr)."""
         return self._rows(self.planes[index], 0, self.planes[index].rows)
 
     def luma_rows(self, first: int, count: int) -> bytes:
-        """Some rows of luma of an I420 picture, `planes[0].stride` bytes each; cheaper than the whole plane.
+        """Returns rows of luma of an I420 frame, `planes[0].stride` bytes each, without copying the rest.
 
         Raises:
-            IndexError: rows outside the picture.
+            IndexError: rows outside the frame.
         """
         if first < 0 or count < 0 or first + count > self.height:
-            raise IndexError(f"rows {first} to {first + count} of a picture with {self.height}")
+            raise IndexError(f"rows {first} to {first + count} of a frame with {self.height}")
         return self._rows(self.planes[0], first, count)
 
     def _rows(self, plane: Plane, first: int, count: int) -> bytes:

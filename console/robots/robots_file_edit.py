@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from common.errors import UserError
-from common.private_files import alone_in, write_private
+from common.private_files import directory_lock, write_private
 from console.client import parse_target
 from console.robots.robots_file import (
     FILE_KEYS,
@@ -92,7 +92,7 @@ def _edit(path: Path | None, edit: Callable[[RobotsFile, "TOMLDocument"], Robots
     import tomlkit  # noqa: PLC0415 - takes 50 ms, which commands that edit nothing need not spend
 
     path = path or robots_file_path()
-    with alone_in(path.parent):
+    with directory_lock(path.parent):
         text = read_text(path)
         before = parse_robots_file(path, text)
         try:

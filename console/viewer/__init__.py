@@ -1,6 +1,6 @@
-"""Watching a robot's preview: which stream to call, when to call again, what to say when no picture comes.
+"""Viewing a robot's preview: which stream to connect to, when to redial, and the state that a screen shows.
 
-`session.VideoSession` keeps the newest picture and a state that a screen shows. Nothing here knows Qt;
-GStreamer is behind `console.receiver` and imported when the first call is made. `console.window.video_view`
-paints.
+`session.VideoSession` keeps the latest frame and its playback state; `robot_video.RobotVideo` adds the
+gateway's status. Nothing here knows Qt; GStreamer is behind `console.receiver` and imported when the first
+connection is made. `console.window.video_view` paints.
 """

@@ -1,67 +1,61 @@
-"""Who makes the pictures: hardware decoders that have proven themselves, else software."""
+"""Chooses the decoders: hardware that has passed its trial, else software."""
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Final, TypeAlias
+from typing import Final
 
 from common.errors import UserError
-from console.receiver.decoder_probe import HARDWARE, first_proven, present
+from console.receiver.decoder_probe import HARDWARE, proven_decoder
 from console.receiver.errors import StreamError, UndecodableError
 
-_WAIT_S: Final = 3.0
-"""How long the first call waits for trials; after that it begins in software."""
-
-Prove: TypeAlias = Callable[[str], str | None]
-
-
-def _prove(codec: str) -> str | None:
-    return first_proven(codec, present(codec))
+_TRIALS_TIMEOUT_S: Final = 3.0
+"""How long the first connection waits for trials; after that it begins in software."""
 
 
 class Decoders:
-    """The choice for one session. Where nothing is installed that could be tried, no process is started.
+    """The choice for one session. Where no candidate is installed, no process is started.
 
     Args:
-        prove: gives the element for a codec, or None; only tests give another one.
+        prove: returns the hardware decoder for a codec, or None; tests pass a double.
     """
 
-    def __init__(self, prove: Prove = _prove) -> None:
+    def __init__(self, prove: Callable[[str], str | None] = proven_decoder) -> None:
         self._prove = prove
         self._proven: dict[str, str] = {}
-        self._distrusted = self._waited = False
+        self._software_only = self._waited = False
         self._trials = threading.Thread(target=self._try_all, name="decoder-trials", daemon=True)
 
     def start(self) -> None:
-        """Begins the trials, beside everything else."""
+        """Starts the trials, in the background."""
         self._trials.start()
 
     def chosen(self) -> Mapping[str, str]:
-        """GStreamer's element by codec; a codec that is not named is decoded in software."""
+        """Returns GStreamer's element by codec; a codec without one is decoded in software."""
         if self._trials.ident is not None and not self._waited:
-            self._trials.join(_WAIT_S)
+            self._trials.join(_TRIALS_TIMEOUT_S)
             self._waited = True
-        return {} if self._distrusted else dict(self._proven)
+        return {} if self._software_only else dict(self._proven)
 
-    def after_undecodable(self, trouble: UndecodableError) -> StreamError:
-        """What a call ended with that met something undecodable.
+    def after_undecodable(self, error: UndecodableError) -> StreamError:
+        """Returns the error of a connection that ended with a decoding error.
 
-        Where hardware was at work this may be its own fault: software is to try, once and for all.
+        A hardware decoder may have caused it: the session falls back to software, once and for all.
         """
-        if self._distrusted or not self._proven:
-            return trouble
-        self._distrusted = True
-        return StreamError(f"hardware decoding failed: {trouble.what}", "Software takes over")
+        if self._software_only or not self._proven:
+            return error
+        self._software_only = True
+        return StreamError(f"hardware decoding failed: {error.what}", "Software takes over")
 
-    def after_nothing(self) -> None:
-        """A call brought no picture at all. A decoder that hangs looks like that, too."""
-        self._distrusted = self._distrusted or bool(self._proven)
+    def after_no_frame(self) -> None:
+        """Falls back to software after a connection without any frame: a hung decoder looks like that."""
+        self._software_only = self._software_only or bool(self._proven)
 
     def _try_all(self) -> None:
         for codec in HARDWARE:
             try:
                 element = self._prove(codec)
             except UserError:
-                # Without GStreamer nothing is decoded, and the first call says so.
+                # GStreamer is missing; the first connection reports it.
                 return
             if element:
                 self._proven = self._proven | {codec: element}

@@ -1,4 +1,4 @@
-"""Where things go: a picture in a window, and a box of the source image on that picture. Pure."""
+"""Geometry of the screen: a frame in a window, and a box of the source image on that frame. Pure."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class Box:
 
 
 def fitted(width: float, height: float, into: Box) -> Box:
-    """The largest rectangle of the shape width : height in the middle of another: what is left are bars.
+    """Returns the largest centred rectangle of the shape width : height in another one (letterboxing).
 
-    Nothing fits where a side is 0 or less: that gives a rectangle without area in the middle.
+    A side of 0 or less gives a rectangle without area in the centre.
     """
     scale = min(into.width / width, into.height / height) if width > 0 and height > 0 else 0.0
     shown_width, shown_height = width * max(scale, 0.0), height * max(scale, 0.0)
@@ -38,19 +38,19 @@ def fitted(width: float, height: float, into: Box) -> Box:
     )
 
 
-def on_picture(box: Box, source_width: float, source_height: float, picture: Box) -> Box | None:
-    """Where a box of the source image lies on the shown picture; None when nothing of it is to be seen.
+def on_frame(box: Box, source_width: float, source_height: float, frame: Box) -> Box | None:
+    """Maps a box of the source image to the shown frame, clipped; None if nothing of it is visible.
 
-    The robot scales its camera's image into the picture without distorting it: a source of another shape than
-    the picture has bars there, too.
+    The robot scales its camera's image into the frame without distorting it: a source of another shape than
+    the frame has bars there, too.
 
     Args:
         box: in pixels of the source image.
         source_width: of the source image, in its pixels.
         source_height: of the source image, in its pixels.
-        picture: where the picture is shown.
+        frame: where the frame is shown.
     """
-    content = fitted(source_width, source_height, picture)
+    content = fitted(source_width, source_height, frame)
     if content.width <= 0 or content.height <= 0:
         return None
     scale = content.width / source_width
@@ -58,7 +58,7 @@ def on_picture(box: Box, source_width: float, source_height: float, picture: Box
     top = max(content.y + box.y * scale, content.y)
     right = min(content.x + box.right * scale, content.right)
     bottom = min(content.y + box.bottom * scale, content.bottom)
-    # Asked this way round, a box that is not a number is not seen either.
+    # Compared this way round, a box with NaN is not visible either.
     if right > left and bottom > top:
         return Box(left, top, right - left, bottom - top)
     return None

@@ -1,32 +1,27 @@
-"""The detections to be drawn over the picture: which, where, and whether still."""
+"""Detections over the video: which boxes to draw, where, and until when."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final
 
 from console.client.results import Detection, Detections
-from console.viewer.geometry import Box, on_picture
+from console.viewer.geometry import Box, on_frame
 
 _SILENT_AFTER_S: Final = 1.0
-"""Without news from the robot for this long, nobody knows whether the boxes are still true."""
+"""Age of a snapshot from which on its boxes are not drawn: they may be wrong by then."""
 
 
 @dataclass(frozen=True, slots=True)
 class Overlay:
-    """The newest detections.
+    """The latest detections.
 
     Args:
-        detections: as the robot told them.
-        received_s: when, on `time.monotonic()`.
+        detections: as the robot reported them.
+        received_s: when they came, on `time.monotonic()`.
     """
 
     detections: Detections
     received_s: float
-
-
-OverlaySource: TypeAlias = Callable[[], Overlay | None]
-"""Gives the newest; called by the thread that paints, so it must return at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,15 +30,15 @@ class Mark:
 
     Args:
         box: in pixels of the window.
-        label: what stands beside it; may be empty.
+        label: text beside it; may be empty.
     """
 
     box: Box
     label: str
 
 
-def marks(overlay: Overlay | None, picture: Box, now_s: float) -> list[Mark]:
-    """What to draw on a picture that is shown at `picture`; nothing when the detections are stale."""
+def marks(overlay: Overlay | None, frame: Box, now_s: float) -> list[Mark]:
+    """Returns the boxes to draw on a frame that is shown at `frame`; none if the detections are stale."""
     if overlay is None or now_s - overlay.received_s > _SILENT_AFTER_S:
         return []
     found = overlay.detections
@@ -51,19 +46,15 @@ def marks(overlay: Overlay | None, picture: Box, now_s: float) -> list[Mark]:
         return []
     drawn = []
     for item in found.items:
-        box = on_picture(_box(item), found.source_width_px, found.source_height_px, picture)
+        box = on_frame(_box(item), found.source_width_px, found.source_height_px, frame)
         if box:
             drawn.append(Mark(box, _label(item)))
     return drawn
 
 
 def _box(item: Detection) -> Box:
-    return Box(
-        item.center_x_px - item.width_px / 2,
-        item.center_y_px - item.height_px / 2,
-        item.width_px,
-        item.height_px,
-    )
+    left, top = item.center_x_px - item.width_px / 2, item.center_y_px - item.height_px / 2
+    return Box(left, top, item.width_px, item.height_px)
 
 
 def _label(item: Detection) -> str:

@@ -1,151 +1,126 @@
-"""One robot's preview for as long as a viewer is open: calls, calls again, keeps the newest picture."""
+"""Video session: one robot's preview for as long as a viewer is open; redials, and keeps the latest frame."""
 
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, TypeAlias
 
 from common.errors import UserError
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoPictureError, StreamError, UndecodableError
+from console.receiver.errors import NoFrameError, StreamError, UndecodableError
 from console.receiver.frame import Frame, PixelFormat
-from console.receiver.receiver import Receiver
+from console.receiver.options import ReceiverOptions
+from console.receiver.receiver import Connect, Receiver, open_connection
 from console.receiver.recording import Recording
-from console.receiver.setup import Setup
-from console.viewer.calling import Patience, Pauses, address_of
 from console.viewer.decoders import Decoders
-from console.viewer.state import Facts, ViewState, view_state
+from console.viewer.playback import Playback, PlaybackInputs, playback
+from console.viewer.redial import BLOCKED_PAUSE_S, address_of, deadline_s, redial_backoff
 
-_LOOK_S: Final = 0.1
-"""How often a call that brings nothing looks whether it is still wanted."""
+_POLL_S: Final = 0.1
+"""Period, while no frame comes, of checking whether the connection is still needed."""
 
-Connect: TypeAlias = Callable[[StreamAddress, Setup], Receiver]
-OnPicture: TypeAlias = Callable[[Frame], None]
-
-
-def _connect(address: StreamAddress, setup: Setup) -> Receiver:
-    return Receiver(address, queue_size=1, setup=setup)
-
-
-def _ignore(_frame: Frame) -> None:
-    """Nobody wants to be told."""
-
-
-@dataclass(frozen=True, slots=True)
-class Figures:
-    """What a session has done so far.
-
-    Args:
-        pictures: decoded and kept, for a moment at least.
-        redials: calls of the stream beyond the first.
-        decoder: GStreamer's element that makes the pictures; empty before the first.
-    """
-
-    pictures: int = 0
-    redials: int = 0
-    decoder: str = ""
+FrameListener: TypeAlias = Callable[[Frame], None]
 
 
 class VideoSession:
-    """Follows the stream that the robot's gateway names, by itself, until it is closed.
+    """Follows the stream that the robot's gateway announces until it is closed.
 
         session = VideoSession()
         session.start()
-        session.follow(robot.status().preview)   # whenever the gateway has said something
+        session.follow(robot.status().preview)   # after each new status
 
-    Every method may be called from any thread and returns at once, `close` excepted. What it does for a
-    picture to come back: it hangs up after a second of silence and calls again, with short pauses; it calls
-    another address as soon as it is told one. It counts its calls.
+    Thread-safe; every method but `close` returns at once. The session disconnects after a second of silence
+    and redials with short pauses; it connects to another address as soon as the status has one.
 
     Args:
-        pixels: the form pictures are wanted in.
-        on_picture: called in the session's thread with every new picture; must only hand over.
+        pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; the caller closes it.
-        decoders: who makes the pictures; by default hardware that has proven itself, else software.
-        connect: makes calls; only tests give another one.
+        decoders: choice of the decoders; by default hardware that has passed its trial, else software.
+        connect: opens connections; tests pass a double.
     """
 
     def __init__(
         self,
         *,
         pixels: PixelFormat = PixelFormat.BGRX,
-        on_picture: OnPicture = _ignore,
         recording: Recording | None = None,
         decoders: Decoders | None = None,
-        connect: Connect = _connect,
+        connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
-        self._on_picture = on_picture
         self._recording = recording
         self._decoders = decoders or Decoders()
         self._connect = connect
-        self._patience = Patience()
-        self._pauses = Pauses()
-        self._changing = threading.Condition()
-        self._facts = Facts()
+        self._backoff = redial_backoff()
+        self._changed = threading.Condition()
+        self._inputs = PlaybackInputs()
         self._address: StreamAddress | None = None
         self._latest: Frame | None = None
-        self._figures = Figures()
+        self._listeners: list[FrameListener] = []
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="video-session", daemon=True)
+        self.frames = 0
+        """Frames taken so far."""
 
     def start(self) -> None:
-        """Begins; the first call is made when an address is known."""
+        """Starts the thread; it connects once an address is known."""
         self._decoders.start()
         self._thread.start()
 
-    def watch_pictures(self, on_picture: OnPicture) -> None:
-        """From now on tells somebody else of new pictures: in the session's thread; must only hand over."""
-        self._on_picture = on_picture
+    def add_frame_listener(self, listener: FrameListener) -> None:
+        """Calls `listener` with every further frame, in the session's thread; it must only hand over."""
+        self._listeners.append(listener)
 
     def follow(self, preview: PreviewStatus) -> None:
-        """The gateway's newest word: where the stream is, and whether there should be one."""
+        """Takes the gateway's latest status: whether there is a stream, and its address."""
         try:
-            address, unusable = address_of(preview), None
+            address, invalid = address_of(preview), None
         except UserError as error:
-            address, unusable = None, error
-        with self._changing:
-            before = self._facts.preview
-            self._facts = replace(self._facts, preview=preview, gateway_trouble=None)
-            if unusable:
-                self._facts = replace(self._facts, stream_trouble=unusable, blocked=True)
+            address, invalid = None, error
+        with self._changed:
+            before = self._inputs.preview
+            self._inputs = replace(self._inputs, preview=preview, gateway_error=None)
+            if invalid:
+                self._inputs = replace(self._inputs, stream_error=invalid, blocked=True)
             if preview.state is PreviewState.RUNNING and before and before.state is not PreviewState.RUNNING:
-                self._pauses.reset()
-                self._changing.notify_all()
+                self._backoff.reset()
+                self._changed.notify_all()
             if address != self._address:
                 self._address = address
-                if not unusable:
-                    self._facts = replace(self._facts, stream_trouble=None, blocked=False)
-                self._changing.notify_all()
+                if not invalid:
+                    self._inputs = replace(self._inputs, stream_error=None, blocked=False)
+                self._changed.notify_all()
             if preview.state is PreviewState.DISABLED:
-                self._forget_picture()
+                self._latest = None
+                self._inputs = replace(self._inputs, frame_s=None, stream_error=None, blocked=False)
 
-    def lost(self, trouble: GatewayError) -> None:
-        """The gateway does not answer. The stream goes on: it does not need the gateway."""
-        with self._changing:
-            self._facts = replace(self._facts, gateway_trouble=trouble)
+    def gateway_lost(self, error: GatewayError) -> None:
+        """Notes that the gateway does not answer. The stream goes on without it."""
+        with self._changed:
+            self._inputs = replace(self._inputs, gateway_error=error)
 
-    def latest(self) -> Frame | None:
-        """The newest picture; None when there is none to show."""
+    def latest_frame(self) -> Frame | None:
+        """Returns the latest frame; None when there is none to show."""
         return self._latest
 
-    def state(self) -> ViewState:
-        """What to show beside the picture, at this moment."""
-        return view_state(self._facts, time.monotonic())
+    def playback(self) -> Playback:
+        """Returns the state of the video at this moment."""
+        return playback(self._inputs, time.monotonic())
 
-    def figures(self) -> Figures:
-        """What was done so far."""
-        return self._figures
+    @property
+    def redials(self) -> int:
+        """Connections to the stream beyond the first."""
+        return self._inputs.redials
 
-    def close(self, within_s: float = 2.0) -> bool:
-        """Hangs up. Whether everything ended in time. Closing again does nothing."""
-        with self._changing:
+    def close(self, timeout_s: float = 2.0) -> bool:
+        """Disconnects. Returns whether the thread ended in time. Closing again does nothing."""
+        with self._changed:
             self._closing = True
-            self._changing.notify_all()
+            self._changed.notify_all()
         if self._thread.ident is not None:
-            self._thread.join(within_s)
+            self._thread.join(timeout_s)
         return not self._thread.is_alive()
 
     # In the session's thread.
@@ -156,70 +131,58 @@ class VideoSession:
             if address is None:
                 self._wait(lambda: self._address is not None)
                 continue
-            trouble = self._call(address)
+            error = self._receive(address)
             if self._closing or address != self._address:
                 continue
-            blocked = not isinstance(trouble, StreamError) or trouble.final
-            self._note(stream_trouble=trouble, blocked=blocked)
-            self._wait(lambda: self._address != address, self._pauses.next_s(blocked=blocked))  # noqa: B023
-            self._redialled()
+            blocked = not isinstance(error, StreamError) or error.final
+            self._update(stream_error=error, blocked=blocked)
+            pause_s = BLOCKED_PAUSE_S if blocked else self._backoff.next_s()
+            self._wait(lambda: self._address != address, pause_s)  # noqa: B023 - called at once
+            self._update(redials=self._inputs.redials + 1)
 
-    def _call(self, address: StreamAddress) -> UserError:
-        """Shows one call's pictures until it is over, and says why it is."""
-        setup = Setup(self._pixels, self._decoders.chosen(), self._recording)
+    def _receive(self, address: StreamAddress) -> UserError:
+        """Takes the frames of one connection, and returns why it ended."""
+        options = ReceiverOptions(self._pixels, self._decoders.chosen(), self._recording)
         try:
-            with self._connect(address, setup) as receiver:
-                return self._take_pictures(receiver, address)
-        except UndecodableError as trouble:
-            return self._decoders.after_undecodable(trouble)
-        except UserError as trouble:
-            return trouble
+            with Receiver(address, queue_size=1, options=options, connect=self._connect) as receiver:
+                return self._take_frames(receiver, address)
+        except UndecodableError as error:
+            return self._decoders.after_undecodable(error)
+        except UserError as error:
+            return error
 
-    def _take_pictures(self, receiver: Receiver, address: StreamAddress) -> UserError:
-        called_s, picture_s = time.monotonic(), None
+    def _take_frames(self, receiver: Receiver, address: StreamAddress) -> UserError:
+        connected_s, frame_s = time.monotonic(), None
         while True:
             if self._closing or address != self._address:
-                return StreamError("nobody wants this stream any more", "")
+                return StreamError("this stream is not needed any more", "")
             try:
-                frame = receiver.next_frame(_LOOK_S)
-            except NoPictureError as silence:
-                if time.monotonic() > self._patience.ends_s(called_s, picture_s):
-                    if picture_s:
-                        return _silent(address)
-                    self._decoders.after_nothing()
+                frame = receiver.next_frame(_POLL_S)
+            except NoFrameError as silence:
+                if time.monotonic() > deadline_s(connected_s, frame_s):
+                    if frame_s:
+                        return StreamError(f"the stream from {address.uri} fell silent", "")
+                    self._decoders.after_no_frame()
                     return silence
             else:
-                picture_s = frame.arrival_s
-                self._keep(frame)
+                frame_s = frame.arrival_s
+                self._take(frame)
 
-    def _keep(self, frame: Frame) -> None:
-        with self._changing:
+    def _take(self, frame: Frame) -> None:
+        with self._changed:
             if self._address is None:
                 return
             self._latest = frame
-            self._figures = replace(self._figures, pictures=self._figures.pictures + 1, decoder=frame.decoder)
-            self._facts = replace(self._facts, picture_s=frame.arrival_s, stream_trouble=None, blocked=False)
-            self._pauses.reset()
-        self._on_picture(frame)
+            self.frames += 1
+            self._inputs = replace(self._inputs, frame_s=frame.arrival_s, stream_error=None, blocked=False)
+            self._backoff.reset()
+        for listener in self._listeners:
+            listener(frame)
 
-    def _forget_picture(self) -> None:
-        self._latest = None
-        self._facts = replace(self._facts, picture_s=None, stream_trouble=None, blocked=False)
-
-    def _note(self, *, stream_trouble: UserError, blocked: bool) -> None:
-        with self._changing:
-            self._facts = replace(self._facts, stream_trouble=stream_trouble, blocked=blocked)
-
-    def _redialled(self) -> None:
-        with self._changing:
-            redials = self._figures.redials + 1
-            self._figures = replace(self._figures, redials=redials)
-            self._facts = replace(self._facts, redials=redials)
+    def _update(self, **changes: object) -> None:
+        with self._changed:
+            self._inputs = replace(self._inputs, **changes)  # type: ignore[arg-type]
 
     def _wait(self, unless: Callable[[], bool], seconds: float | None = None) -> None:
-        with self._changing:
-            self._changing.wait_for(lambda: self._closing or unless(), seconds)
-
-
-def _silent(address: StreamAddress) -> StreamError:
-    return StreamError(f"the stream from {address.uri} fell silent", "")
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing or unless(), seconds)

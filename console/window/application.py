@@ -1,4 +1,4 @@
-"""Qt's side of a program with a window: display, look, signals, Qt's own complaints."""
+"""The Qt application of a program with a window: display, style, signals, Qt's own messages."""
 
 import os
 import signal
@@ -16,12 +16,12 @@ from common.errors import ExitCode, UserError
 
 @contextmanager
 def application(title: str) -> Iterator[QApplication]:
-    """The program's one QApplication; SIGINT and SIGTERM close its windows.
+    """Makes the program's one QApplication; SIGINT and SIGTERM close its windows.
 
     Python sees a signal only when Qt calls some Python: every window of ours has a timer that does.
 
     Args:
-        title: what stands in window titles behind the window's own.
+        title: application name, behind the title of each window.
 
     Raises:
         UserError: there is no display.
@@ -60,7 +60,7 @@ def _check_display() -> None:
 
 
 def _on_qt_message(kind: QtMsgType, _context: QMessageLogContext, text: str) -> None:
-    """Qt's words go to standard error; before it would abort, the program ends with one line."""
+    """Prints Qt's messages to standard error; a fatal one ends the program with one line, not an abort."""
     if kind is QtMsgType.QtFatalMsg:
         _end_at_once(UserError(f"Qt can't show a window: {text}", "Check DISPLAY and Qt's libraries"))
     if kind in (QtMsgType.QtCriticalMsg, QtMsgType.QtSystemMsg):

@@ -1,4 +1,4 @@
-"""The log of events, newest first."""
+"""List of events, newest first."""
 
 from datetime import datetime
 from typing import Final
@@ -6,14 +6,14 @@ from typing import Final
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
-from console.monitor.event_lines import KEPT, EventLine, EventTrail
-from console.tone import Tone
+from console.monitor.event_log import CAPACITY, EventLine, EventLog
+from console.presentation.severity_style import SeverityStyle
 
 _LINES_SHOWN: Final = 8
 
 
 class EventList(QListWidget):
-    """Grows at the top; stays where the operator has scrolled to."""
+    """Grows at the top; keeps the operator's scroll position."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -27,15 +27,15 @@ class EventList(QListWidget):
 
     @property
     def lines(self) -> list[str]:
-        """What is listed, newest first."""
+        """The listed texts, newest first."""
         return [self.item(row).text() for row in range(self.count())]
 
-    def show_trail(self, trail: EventTrail) -> None:
-        """Adds what it does not show yet."""
-        for event in trail.since(self._shown):
+    def show_log(self, log: EventLog) -> None:
+        """Adds the lines that are not shown yet."""
+        for event in log.since(self._shown):
             self.insertItem(0, _item(event))
-        self._shown = trail.count
-        while self.count() > KEPT:
+        self._shown = log.count
+        while self.count() > CAPACITY:
             self.takeItem(self.count() - 1)
 
 
@@ -44,6 +44,6 @@ def _item(event: EventLine) -> QListWidgetItem:
     item = QListWidgetItem(f"{at}  {event.text}")
     font = item.font()
     font.setItalic(event.own)
-    font.setBold(event.tone in (Tone.WARNING, Tone.BAD))
+    font.setBold(event.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
     item.setFont(font)
     return item

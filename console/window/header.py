@@ -1,18 +1,15 @@
-"""The top of the window: who the robot is, how it is, and whether it answers; a banner when it does not."""
+"""Header of the window: the robot's name and health, and the connection; a banner while it is lost."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from console.client.results import HealthState
-from console.monitor.link import LinkWords
-from console.monitor.state import MonitorState
-from console.tone import Tone
-from console.window.labels import ElidedLabel, WrappedLabel, scale_font, set_bold, set_text, word_label
+from console.monitor.link import LinkText
+from console.monitor.monitor_state import MonitorState
+from console.presentation.formatting import UNKNOWN, joined
+from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
+from console.window.labels import ElidedLabel, WrappedLabel, plain_label, scale_font, set_bold, set_text
 from console.window.lines import TintedLine
-from console.window.look import DimLabel, Marker
-from console.words import UNKNOWN, joined
-
-_HEALTH = {HealthState.OK: Tone.GOOD, HealthState.DEGRADED: Tone.WARNING, HealthState.UNKNOWN: Tone.QUIET}
+from console.window.theme import DimLabel, Marker
 
 
 class Header(QWidget):
@@ -24,46 +21,45 @@ class Header(QWidget):
 
     def __init__(self, target: str) -> None:
         super().__init__()
-        self.name, self.target = word_label("robot"), DimLabel(target)
-        self.health, self.link = MarkedWord(), MarkedWord(word_label())
+        self.name, self.target = plain_label("robot"), DimLabel(target)
+        self.health, self.link = MarkedWord(), MarkedWord(plain_label())
         set_bold(self.name, True)
         scale_font(self.name, 1.4)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(10)
-        for widget in (self.name, self.target):
-            layout.addWidget(widget)
+        layout.addWidget(self.name)
+        layout.addWidget(self.target)
         layout.addSpacing(12)
         layout.addWidget(self.health, 1)
         layout.addWidget(self.link)
 
-    def show_state(self, state: MonitorState, words: LinkWords, now_s: float) -> None:
-        """Shows the newest."""
-        self.link.show_word(words.tone, words.mark, words.detail)
+    def show_state(self, state: MonitorState, link: LinkText, now_s: float) -> None:
+        """Shows the latest state."""
+        self.link.show_word(link.style, link.mark, link.detail)
         if state.snapshot is None:
-            self.health.show_word(Tone.QUIET, "not known", "")
+            self.health.show_word(SeverityStyle.QUIET, "not known", "")
             return
-        status = state.snapshot.status
+        status, health = state.snapshot.status, state.snapshot.status.health
         set_text(self.name, status.gateway_name or "robot")
         self.target.setToolTip(f"Gateway {status.gateway_version or UNKNOWN}")
         if state.outdated(now_s):
-            last = joined(f"last heard: {status.health.state.value.upper()}", status.health.summary)
-            self.health.show_word(Tone.QUIET, "not known", last)
+            last = joined(f"last known: {health.state.value.upper()}", health.summary)
+            self.health.show_word(SeverityStyle.QUIET, "not known", last)
         else:
-            health = status.health
-            self.health.show_word(_HEALTH[health.state], health.state.value.upper(), health.summary)
+            self.health.show_word(HEALTH_STYLES[health.state], health.state.value.upper(), health.summary)
 
 
 class MarkedWord(QWidget):
-    """A marker, a word in bold, and what goes with it.
+    """A marker, a word in bold, and its detail.
 
     Args:
-        detail: takes that; by default a label that gives way where there is little room.
+        detail: label of the detail; by default one that is elided where there is little room.
     """
 
     def __init__(self, detail: QLabel | None = None) -> None:
         super().__init__()
-        self.marker, self.word, self.detail = Marker(), word_label(), detail or ElidedLabel()
+        self.marker, self.word, self.detail = Marker(), plain_label(), detail or ElidedLabel()
         set_bold(self.word, True)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -71,37 +67,37 @@ class MarkedWord(QWidget):
         layout.addWidget(self.word)
         layout.addWidget(self.detail, 1)
 
-    def show_word(self, tone: Tone, word: str, detail: str) -> None:
+    def show_word(self, style: SeverityStyle, word: str, detail: str) -> None:
         """Changes all three."""
-        self.marker.show_tone(tone)
+        self.marker.show_style(style)
         set_text(self.word, word)
         set_text(self.detail, detail)
         self.setAccessibleName(joined(word, detail))
 
 
-class Banner(TintedLine):
-    """Says why the robot does not answer and what to do; hidden while it does."""
+class ConnectionBanner(TintedLine):
+    """The connection's error and its remedy; hidden while connected."""
 
     retry = Signal()
-    """The operator does not want to wait for the next attempt."""
+    """The button "Retry now" was pressed."""
 
     def __init__(self) -> None:
         super().__init__()
         self.text, self.next_try = WrappedLabel(), DimLabel()
         self.button = QPushButton("&Retry now")
         self.button.clicked.connect(self.retry)
-        words = QVBoxLayout()
-        words.addWidget(self.text)
-        words.addWidget(self.next_try)
-        self.grid.addLayout(words, 0, 1)
+        column = QVBoxLayout()
+        column.addWidget(self.text)
+        column.addWidget(self.next_try)
+        self.grid.addLayout(column, 0, 1)
         self.grid.addWidget(self.button, 0, 2)
         self.grid.setColumnStretch(1, 1)
         self.setVisible(False)
 
-    def show_words(self, words: LinkWords) -> None:
-        """Shows the newest."""
-        self.setVisible(bool(words.banner))
-        if words.banner:
-            self.show_tone(words.tone)
-            set_text(self.text, words.banner)
-            set_text(self.next_try, words.retry)
+    def show_link(self, link: LinkText) -> None:
+        """Shows the latest text."""
+        self.setVisible(bool(link.banner))
+        if link.banner:
+            self.show_style(link.style)
+            set_text(self.text, link.banner)
+            set_text(self.next_try, link.retry)

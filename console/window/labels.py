@@ -1,4 +1,4 @@
-"""Labels that are told the same thing ten times a second, and do nothing unless it has changed."""
+"""Labels that are updated ten times a second, and lay out only changed texts."""
 
 from typing import Final
 
@@ -11,7 +11,7 @@ RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 class WrappedLabel(QLabel):
-    """Sentences from the robot: as many lines as they need; to be marked and copied, never markup."""
+    """Sentences from the robot, on as many lines as they need: selectable, never markup."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -21,19 +21,12 @@ class WrappedLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """One line; how many more it takes, Qt asks when it knows the width."""
+        """Returns the size of one line; Qt asks for the height of all lines once it knows the width."""
         return QSize(0, self.fontMetrics().height())
 
 
-def word_label(text: str = "") -> QLabel:
-    """For a word or a figure on one line."""
-    label = QLabel(text)
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    return label
-
-
 class ElidedLabel(QLabel):
-    """One line that gives way: what does not fit ends in dots, and is in the tool tip."""
+    """One line that is elided where there is little room; the tool tip has the whole text."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -41,20 +34,27 @@ class ElidedLabel(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
-        """Changes the text."""
+        """Changes the text and the tool tip."""
         super().setText(text)
         self.setToolTip(text)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Draws what fits."""
+        """Draws the elided text."""
         painter = QPainter(self)
         fitting = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, self.width())
         painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, fitting)
 
 
+def plain_label(text: str = "") -> QLabel:
+    """Returns a label for one line of plain text."""
+    label = QLabel(text)
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    return label
+
+
 def width_of(text: str, *, bold: bool = False) -> int:
-    """The width of a text in the desktop's font, in pixels."""
-    label = word_label(text)
+    """Returns the width of a text in the desktop's font, in pixels."""
+    label = plain_label(text)
     set_bold(label, bold)
     return label.sizeHint().width()
 
@@ -74,7 +74,7 @@ def set_bold(label: QLabel, bold: bool) -> None:
 
 
 def scale_font(label: QLabel, factor: float) -> None:
-    """Changes the size against the desktop's."""
+    """Changes the size relative to the desktop's."""
     font = label.font()
     font.setPointSizeF(font.pointSizeF() * factor)
     label.setFont(font)

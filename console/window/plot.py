@@ -1,4 +1,4 @@
-"""A small plot of the last two minutes of one figure."""
+"""Small plots of the last two minutes of each metric."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPalette, QPen, QPolygo
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
-from console.window.look import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
+from console.window.theme import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
 
 NO_DATA = "no data"
 _MARGIN = 6
@@ -16,10 +16,10 @@ _SMALL = 0.85
 
 
 class Plot(QWidget):
-    """Title and newest value on top, the curve below; where nothing is known there is a gap.
+    """Title and latest value on top, the curve below; unknown values are a gap.
 
     Args:
-        metric: what it shows.
+        metric: title, unit and scale.
     """
 
     def __init__(self, metric: Metric) -> None:
@@ -31,7 +31,7 @@ class Plot(QWidget):
 
     @property
     def value_text(self) -> str:
-        """The newest value, with its unit."""
+        """The latest value, with its unit."""
         newest = self._series[-1] if self._series else None
         return NO_DATA if newest is None else f"{newest:.{self._metric.digits}f} {self._metric.unit}"
 
@@ -43,17 +43,17 @@ class Plot(QWidget):
             self.update()
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Five of them stand side by side."""
+        """Returns a size that lets five stand side by side."""
         line = self.fontMetrics().height()
         return QSize(10 * line, 6 * line)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Wide enough for title and value below each other."""
+        """Returns a size for title and value below each other."""
         line = self.fontMetrics().height()
         return QSize(7 * line, 6 * line)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Draws everything."""
+        """Paints title, value and curve."""
         painter = QPainter(self)
         palette = self.palette()
         painter.fillRect(self.rect(), palette.color(QPalette.ColorRole.Base))
@@ -100,7 +100,7 @@ class Plot(QWidget):
             painter.drawPolyline(QPolygonF(points))
 
     def _pieces(self, box: QRectF) -> Iterator[list[QPointF]]:
-        """The curve between its gaps, in the box's coordinates."""
+        """Yields the curve between its gaps, in the box's coordinates."""
         bottom = self._metric.bottom
         height = top_of_scale(self._metric, self._series) - bottom
         piece: list[QPointF] = []
@@ -117,7 +117,7 @@ class Plot(QWidget):
 
 
 class Plots(QWidget):
-    """All of them, side by side."""
+    """All plots, side by side."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -129,6 +129,6 @@ class Plots(QWidget):
             layout.addWidget(plot)
 
     def show_history(self, history: History) -> None:
-        """Shows what was recorded."""
+        """Shows the recorded values."""
         for index, plot in enumerate(self.all):
             plot.show_series(history.series(index))

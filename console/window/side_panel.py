@@ -1,32 +1,28 @@
-"""The right side: faults with remedies, status by component, events."""
+"""Side panel: faults with remedies, status by component, events."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from console.monitor.components import Component, components
-from console.monitor.faults import FaultLine, fault_lines
-from console.monitor.state import MonitorState
-from console.tone import Tone
+from console.monitor.monitor_state import MonitorState
+from console.monitor.status_rows import FaultLine, component_rows, fault_lines
+from console.presentation.formatting import age
+from console.presentation.severity_style import SeverityStyle
 from console.window.event_list import EventList
 from console.window.labels import set_bold, set_text
-from console.window.line_list import LineList
-from console.window.lines import ComponentLine, FaultWidget
-from console.words import age
+from console.window.lines import ComponentLine, FaultWidget, LineList
 
-_SMALLEST_WIDTH = 34
-"""In average letters."""
-_NO_FAULT = FaultLine("none", Tone.GOOD, "The robot reports no fault", "", "")
-_NOTHING_KNOWN = FaultLine("", Tone.QUIET, "Nothing is known yet", "", "")
+_MIN_WIDTH_CHARS = 34
+_NO_FAULT = FaultLine("none", SeverityStyle.GOOD, "The robot reports no fault", "", "")
+_NO_STATUS = FaultLine("", SeverityStyle.QUIET, "No status received yet", "", "")
 
 
 class SidePanel(QWidget):
-    """Everything the robot tells in words."""
+    """The robot's status as text."""
 
     def __init__(self) -> None:
         super().__init__()
         self.faults_title, self.status_title = _heading("Faults"), _heading("Status")
-        self.faults: LineList[FaultLine] = LineList(FaultWidget)
-        self.components: LineList[Component] = LineList(ComponentLine)
+        self.faults, self.components = LineList(FaultWidget), LineList(ComponentLine)
         self.events = EventList()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -35,23 +31,22 @@ class SidePanel(QWidget):
         layout.addWidget(self.events, 1)
 
     def show_state(self, state: MonitorState, now_s: float) -> None:
-        """Shows the newest."""
-        none = _NOTHING_KNOWN if state.snapshot is None else _NO_FAULT
+        """Shows the latest state."""
+        none = _NO_STATUS if state.snapshot is None else _NO_FAULT
         self.faults.show_items(fault_lines(state, now_s) or [none])
-        self.components.show_items(components(state, now_s))
-        since = ""
+        self.components.show_items(component_rows(state, now_s))
+        received = ""
         if state.snapshot and state.outdated(now_s):
-            since = f", as heard {age(state.silent_ms(now_s))} ago"
-        set_text(self.faults_title, f"Faults{since}")
-        set_text(self.status_title, f"Status{since}")
-        self.events.show_trail(state.events)
+            received = f", as of {age(state.snapshot_age_ms(now_s))} ago"
+        set_text(self.faults_title, f"Faults{received}")
+        set_text(self.status_title, f"Status{received}")
+        self.events.show_log(state.events)
 
     def _scrolled(self) -> QScrollArea:
         inner = QWidget()
         column = QVBoxLayout(inner)
         column.setContentsMargins(0, 0, 4, 0)
-        for title, part in ((self.faults_title, self.faults), (self.status_title, self.components)):
-            column.addWidget(title)
+        for part in (self.faults_title, self.faults, self.status_title, self.components):
             column.addWidget(part)
         column.addStretch(1)
         scroll = QScrollArea()
@@ -60,7 +55,7 @@ class SidePanel(QWidget):
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         scroll.setAccessibleName("Faults and status")
-        scroll.setMinimumWidth(_SMALLEST_WIDTH * self.fontMetrics().horizontalAdvance("m"))
+        scroll.setMinimumWidth(_MIN_WIDTH_CHARS * self.fontMetrics().horizontalAdvance("m"))
         return scroll
 
 

@@ -1,4 +1,4 @@
-"""What is drawn over a picture: boxes with labels, and a banner."""
+"""Paints over the video: boxes with labels, and a banner."""
 
 import math
 from collections.abc import Sequence
@@ -7,14 +7,14 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
-from console.viewer.banner import Banner
+from console.viewer.formatting import Banner
 from console.viewer.geometry import Box
 from console.viewer.overlay import Mark
-from console.window.look import COLOURS
+from console.window.theme import COLOURS
 
 _HALO: Final = QPen(QColor(0, 0, 0, 190), 5.0)
 _LINE: Final = QPen(QColor("#F0E442"), 2.0)
-"""Yellow of Okabe and Ito's palette in a dark halo: seen on any picture, by colour-blind people, too."""
+"""Yellow of Okabe and Ito's palette in a dark halo: visible on any video, for colour-blind people, too."""
 _LABEL_GROUND: Final = QColor(0, 0, 0, 190)
 _LABEL_INK: Final = QColor("#F0E442")
 _PAPER: Final = QColor(16, 18, 20, 225)
@@ -31,7 +31,7 @@ _TITLE_FACTOR: Final = 1.35
 
 
 def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
-    """Boxes first, labels above all boxes."""
+    """Draws all boxes, then all labels on top."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for pen in (_HALO, _LINE):
         painter.setPen(pen)
@@ -42,26 +42,26 @@ def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
             _draw_label(painter, mark)
 
 
-def draw_banner(painter: QPainter, whole: QRectF, words: Banner, *, over_picture: bool) -> None:
-    """A card: at the lower edge over a picture, so that it hides little; else in the middle."""
+def draw_banner(painter: QPainter, whole: QRectF, text: Banner, *, over_frame: bool) -> None:
+    """Draws a card: at the lower edge over a frame, so that it hides little; else in the middle."""
     title_font, font = QFont(painter.font()), QFont(painter.font())
     title_font.setBold(True)
     title_font.setPointSizeF(font.pointSizeF() * _TITLE_FACTOR)
     beside = 2 * _MARGIN + _STRIPE
     room = QRectF(0, 0, min(whole.width() - 2 * _MARGIN, _WIDEST) - beside, whole.height())
-    title = _extent(title_font, room, words.title)
-    detail = _extent(font, room, words.detail)
-    # As wide as its words; the next second of "frozen for 9.9 s" does not change it.
+    title = _extent(title_font, room, text.title)
+    detail = _extent(font, room, text.detail)
+    # As wide as its text, in steps; the next second of "frozen for 9.9 s" does not change it.
     room.setWidth(min(room.width(), _in_steps(max(title.width(), detail.width()))))
     width = room.width() + beside
-    height = title.height() + (detail.height() + _GAP if words.detail else 0) + 2 * _MARGIN
-    top = whole.bottom() - _MARGIN - height if over_picture else whole.center().y() - height / 2
+    height = title.height() + (detail.height() + _GAP if text.detail else 0) + 2 * _MARGIN
+    top = whole.bottom() - _MARGIN - height if over_frame else whole.center().y() - height / 2
     card = QRectF(whole.center().x() - width / 2, max(whole.top(), top), width, height)
-    _draw_card(painter, card, COLOURS.get(words.tone, _QUIET))
+    _draw_card(painter, card, COLOURS.get(text.style, _QUIET))
     room.moveTo(card.left() + _STRIPE + _MARGIN, card.top() + _MARGIN)
-    _write(painter, title_font, _INK, room, words.title)
+    _write(painter, title_font, _INK, room, text.title)
     room.translate(0, title.height() + _GAP)
-    _write(painter, font, _DIM_INK, room, words.detail)
+    _write(painter, font, _DIM_INK, room, text.detail)
 
 
 def _in_steps(width: float) -> float:

@@ -1,18 +1,16 @@
-"""The window of `robotctl view`: the picture, and one line below it."""
+"""Window of `robotctl view`: the video, and one line below it."""
 
 import time
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtGui import QCloseEvent, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from console.monitor.preview_controls import controls
-from console.monitor.worker import Worker
-from console.receiver.recording import Recording
-from console.viewer.session import VideoSession
-from console.viewer.words import beside_the_picture, figures_line, recording_line
-from console.window.labels import ElidedLabel, set_text, word_label
-from console.window.look import DimLabel
+from console.viewer.formatting import figures_line, live_note, recording_line
+from console.viewer.robot_video import RobotVideo
+from console.window.labels import ElidedLabel, plain_label, set_text
+from console.window.theme import DimLabel
 from console.window.video_view import VideoView
 
 _TICK_MS = 500
@@ -23,28 +21,22 @@ class ViewWindow(QWidget):
     """Shows one robot's stream.
 
     Args:
-        worker: talks to the gateway.
-        session: receives the stream.
-        video: shows it.
-        recording: is kept beside; None when nothing is.
+        robot: status and video.
+        video: shows the video.
     """
 
-    def __init__(
-        self, worker: Worker, session: VideoSession, video: VideoView, recording: Recording | None
-    ) -> None:
+    def __init__(self, robot: RobotVideo, video: VideoView) -> None:
         super().__init__()
-        self._worker = worker
-        self._session = session
-        self._recording = recording
+        self.robot = robot
         self._counted = (time.monotonic(), 0)
         self.video = video
-        self.figures, self.said = word_label(), ElidedLabel()
+        self.figures, self.notes = plain_label(), ElidedLabel()
         self._lay_out()
-        # The picture in its own size, where there is room: Qt alone would take two thirds of the screen.
+        # The frame's own size where there is room: Qt alone would take two thirds of the screen.
         self.resize(self.sizeHint().boundedTo(self.screen().availableSize()))
-        self._ticks = QTimer(self, interval=_TICK_MS)
-        self._ticks.timeout.connect(self._tick)
-        self._ticks.start()
+        self._timer = QTimer(self, interval=_TICK_MS)
+        self._timer.timeout.connect(self._refresh)
+        self._timer.start()
         for key, act in (
             ("P", self._switch),
             ("O", lambda: self.video.show_overlay(not self.video.overlay_shown)),
@@ -53,12 +45,12 @@ class ViewWindow(QWidget):
             ("Esc", self._leave_full_screen),
             ("Q", self.close),
         ):
-            QShortcut(QKeySequence(key), self, act)
-        self.setWindowTitle(worker.target)
+            QShortcut(key, self, act)
+        self.setWindowTitle(robot.worker.target)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Nothing ticks any more."""
-        self._ticks.stop()
+        """Stops the timer."""
+        self._timer.stop()
         super().closeEvent(event)
 
     def _lay_out(self) -> None:
@@ -67,7 +59,7 @@ class ViewWindow(QWidget):
         line.setContentsMargins(8, 3, 8, 3)
         line.setSpacing(16)
         line.addWidget(self.figures)
-        line.addWidget(self.said, 1)
+        line.addWidget(self.notes, 1)
         keys = DimLabel(_KEYS)
         keys.setAlignment(Qt.AlignmentFlag.AlignRight)
         line.addWidget(keys)
@@ -77,23 +69,23 @@ class ViewWindow(QWidget):
         column.addWidget(self.video, 1)
         column.addWidget(self._below)
 
-    def _tick(self) -> None:
-        now_s, pictures = time.monotonic(), self._session.figures().pictures
+    def _refresh(self) -> None:
+        session, state = self.robot.session, self.robot.worker.latest()
+        now_s, frames = time.monotonic(), session.frames
         before_s, before = self._counted
-        self._counted = (now_s, pictures)
-        fps = (pictures - before) / (now_s - before_s)
-        set_text(self.figures, figures_line(self._session.latest(), fps, self._session.figures().redials))
-        state = self._worker.newest()
+        self._counted = (now_s, frames)
+        fps = (frames - before) / (now_s - before_s)
+        set_text(self.figures, figures_line(session.latest_frame(), fps, session.redials))
         notes = [note.text for note in controls(state, None, now_s).notes]
-        said = (recording_line(self._recording), *notes, beside_the_picture(self._session.state()))
-        set_text(self.said, "   ".join(filter(None, said)))
+        texts = (recording_line(self.robot.recording), *notes, live_note(session.playback()))
+        set_text(self.notes, "   ".join(filter(None, texts)))
         name = state.snapshot.status.gateway_name if state.snapshot else ""
-        self.setWindowTitle(f"{name} {self._worker.target}".strip())
+        self.setWindowTitle(f"{name} {self.robot.worker.target}".strip())
 
     def _switch(self) -> None:
-        now = controls(self._worker.newest(), None, time.monotonic())
+        now = controls(self.robot.worker.latest(), None, time.monotonic())
         if now.enabled:
-            self._worker.switch(now.switched())
+            self.robot.worker.switch(now.toggled())
 
     def _toggle_full_screen(self) -> None:
         full = not self.isFullScreen()

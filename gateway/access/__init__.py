@@ -1,1 +1,1 @@
-"""Who may do what: roles, credentials, what happens to those who guess, and the record of what was done."""
+"""Access control: roles, credentials, authentication, lockout and the audit log."""

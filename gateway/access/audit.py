@@ -1,7 +1,11 @@
-"""The audit log: every control action and every change of access, a JSON object each, bounded on the disk.
+"""The audit log: every control action and change of access, one JSON object a line, bounded on the disk.
 
-The event loop never waits for a disk: lines go through a bounded queue to one thread. A line that finds
-the queue full, or the disk, is counted and lost, and the operators see a fault; it is in the log anyway.
+The event loop never waits for a disk: lines go through a bounded queue to one thread. A line that finds the
+queue or the disk full is counted as lost and operators see a fault; the program's own log has it in any
+case.
+
+Not logging.handlers.RotatingFileHandler: it swallows a failed write (`Handler.handleError`), so that no
+fault could be raised, and leaves half a line behind when the disk fills up.
 """
 
 import errno
@@ -12,11 +16,12 @@ import queue
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
+
+from gateway.status.event import ControlAction
 
 _log = logging.getLogger(__name__)
 
@@ -27,45 +32,13 @@ _COMPLAIN_EVERY: Final = 100
 """Lost lines between two complaints in the log."""
 
 
-@dataclass(frozen=True, slots=True)
-class AuditRecord:
-    """What somebody did, or tried to.
-
-    Attributes:
-        who: the caller's name; empty when nobody knows.
-        role: what they may do; empty as well.
-        credential: by which credential they were known.
-        address: where the call came from.
-        action: the method.
-        request: what was asked for, for a person.
-        result: "accepted", "refused" or "failed".
-        answer: what was answered, for a person.
-        request_id: as in the logs.
-    """
-
-    who: str
-    role: str
-    credential: str
-    address: str
-    action: str
-    request: str
-    result: str
-    answer: str
-    request_id: str
-
-    def line(self, at: datetime) -> str:
-        """As it is written."""
-        time = at.astimezone(UTC).isoformat(timespec="milliseconds")
-        return json.dumps({"time": time, **asdict(self)}, ensure_ascii=True) + "\n"
-
-
 class AuditLog:
-    """Takes records on the event loop; a thread of its own writes them while `writing` lasts.
+    """Takes actions on the event loop; a thread of its own writes them while `writing` lasts.
 
     Args:
-        path: the file; its older generations are `path`.1, `path`.2 and so on. None: the log alone.
-        most_bytes: of one generation.
-        generations: how many there are, the newest included.
+        path: the file; its older generations are `path`.1, `path`.2 and so on. None writes to the log alone.
+        most_bytes: maximum size of one generation.
+        generations: how many are kept, the newest included.
     """
 
     def __init__(self, path: Path | None, most_bytes: int, generations: int) -> None:
@@ -75,25 +48,25 @@ class AuditLog:
         self._queue: queue.Queue[str | None] = queue.Queue(_QUEUE)
         self.lost = 0
         """Lines that did not reach the file since the start."""
-        self.trouble = ""
+        self.error = ""
         """Why the newest line could not be written; empty when it was."""
 
-    def note(self, record: AuditRecord) -> None:
-        """Takes one record. Never waits."""
+    def record(self, action: ControlAction) -> None:
+        """Takes one action. Never waits."""
         _log.info(
             "audit: %s (%s) from %s: %s (%s): %s, %s",
-            record.who or "nobody known",
-            record.role or "no role",
-            record.address,
-            record.action,
-            record.request or "nothing more",
-            record.result,
-            record.answer,
+            action.who or "unauthenticated caller",
+            action.role or "no role",
+            action.address,
+            action.method,
+            action.request or "no parameters",
+            action.result.value,
+            action.answer,
         )
         if self._path is None:
             return
         try:
-            self._queue.put_nowait(record.line(datetime.now(UTC)))
+            self._queue.put_nowait(_line(action, datetime.now(UTC)))
         except queue.Full:
             self._lose("the disk is too slow")
 
@@ -123,7 +96,7 @@ class AuditLog:
             except OSError as error:
                 self._lose(f"{path} can't be written: {error.strerror}")
             else:
-                self.trouble = ""
+                self.error = ""
 
     def _make_room(self, path: Path, more_bytes: int) -> None:
         """The file as it is becomes an older generation where it would grow too large."""
@@ -144,10 +117,26 @@ class AuditLog:
                 newer.replace(older)
 
     def _lose(self, why: str) -> None:
-        self.trouble = why
+        self.error = why
         self.lost += 1
         if self.lost % _COMPLAIN_EVERY == 1:
             _log.error("audit: %s; %d lines are lost so far", why, self.lost)
+
+
+def _line(action: ControlAction, at: datetime) -> str:
+    fields = {
+        "time": at.isoformat(timespec="milliseconds"),
+        "who": action.who,
+        "role": action.role,
+        "credential": action.credential,
+        "address": action.address,
+        "action": action.method,
+        "request": action.request,
+        "result": action.result.value,
+        "answer": action.answer,
+        "request_id": action.request_id,
+    }
+    return json.dumps(fields, ensure_ascii=True) + "\n"
 
 
 def _append(path: Path, line: bytes) -> None:

@@ -1,21 +1,21 @@
-"""What a robot's keeper types here to change credentials: in containers it is another command."""
+"""The command that manages credentials, as the user has to type it on this machine."""
 
 import os
 from pathlib import Path
 from typing import Final
 
 _VARIABLE: Final = "ROBOT_GATEWAY_CREDENTIALS"
-"""Whoever wraps the program names the wrapped command in it; it knows its directory."""
+"""Set in containers to the command that runs there in place of `robot-gateway credentials`."""
 
 
-def to_type(words: str, directory: Path | None = None) -> str:
-    """The whole command, for a person to type.
+def credentials_command(arguments: str, directory: Path | None = None) -> str:
+    """Returns the complete command line.
 
     Args:
-        words: of `robot-gateway credentials`, "init" for example.
-        directory: where the credentials are, if that has to be said.
+        arguments: of `robot-gateway credentials`, "init" for example.
+        directory: of the credentials; a command in a container has its own.
     """
-    if wrapped := os.environ.get(_VARIABLE):
-        return f"{wrapped} {words}"
-    where = f" --directory {directory}" if directory else ""
-    return f"robot-gateway credentials {words}{where}"
+    if in_container := os.environ.get(_VARIABLE):
+        return f"{in_container} {arguments}"
+    option = f" --directory {directory}" if directory else ""
+    return f"robot-gateway credentials {arguments}{option}"

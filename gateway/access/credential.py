@@ -1,4 +1,4 @@
-"""One credential: who shows it, what it allows, how long; and the caller that it makes."""
+"""A credential as the robot stores it, and the principal that it authenticates."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -7,14 +7,14 @@ from gateway.access.role import Role
 
 
 class Kind(Enum):
-    """How somebody proves who they are."""
+    """Kind of a credential."""
 
     TOKEN = "token"
     CERTIFICATE = "certificate"
 
 
 class State(Enum):
-    """What a credential is worth at one instant."""
+    """Validity of a credential at one instant."""
 
     VALID = "valid"
     NOT_YET = "not yet valid"
@@ -24,17 +24,17 @@ class State(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Credential:
-    """What the robot keeps of it; instants are seconds of the calendar clock since 1970 (UTC).
+    """A credential without its secret. Instants are seconds since 1970 (UTC).
 
     Attributes:
-        credential_id: of this one alone; it is never used again.
-        name: of the person or the program that it was made for. Several may have the same.
-        proof: of a token its hash, of a certificate its SHA-256 fingerprint. No secret follows from it.
-        made_s: when.
-        begins_s: not valid before; None when it was valid at once. No more than that is asked of the
-            robot's clock by default, because a computer without a battery for it starts in the past.
-        ends_s: not valid from then on; None for a credential that does not end by itself.
-        revoked_s: when it was revoked.
+        credential_id: unique; never used again.
+        name: of the person or program it was issued to; need not be unique.
+        proof: hash of the token, or SHA-256 fingerprint of the certificate. Reveals no secret.
+        made_s: time of issue.
+        begins_s: start of validity. None, the default, checks none and so does not rely on the robot's clock:
+            a computer without a battery-backed clock starts in the past.
+        ends_s: time of expiry; None for a credential that does not expire.
+        revoked_s: time of revocation, if revoked.
     """
 
     credential_id: str
@@ -48,7 +48,7 @@ class Credential:
     revoked_s: int | None = None
 
     def state(self, now_s: float) -> State:
-        """What it is worth now."""
+        """Returns the validity at `now_s`; revocation takes precedence."""
         if self.revoked_s is not None:
             return State.REVOKED
         if self.ends_s is not None and now_s >= self.ends_s:
@@ -60,12 +60,12 @@ class Credential:
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Somebody who has proved who they are.
+    """An authenticated caller.
 
     Attributes:
-        name: as the robot's keeper called them.
-        role: what they may do.
-        credential_ids: by what they proved it; all must stay valid.
+        name: as on the credentials.
+        role: the lowest role of the credentials.
+        credential_ids: the credentials presented; all must remain valid.
     """
 
     name: str

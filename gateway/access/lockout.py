@@ -1,68 +1,68 @@
-"""Those who show wrong credentials again and again wait longer and longer.
+"""Lockout of callers who repeatedly present wrong credentials, with exponentially growing waits.
 
-What is locked is a pair: an address, and the credential that was meant. Somebody who guesses Anna's token
-locks that token's use from their own address. Ben behind the same address (the same tunnel, the same Wi-Fi
-router) goes on working, and so does Anna anywhere else. Guesses that name no credential of this robot share
-one entry per address, which locks nobody who has a credential.
+The unit that is locked is a pair of address and credential. A guesser of Anna's token locks the use of that
+token from their own address; Ben behind the same address (a tunnel, a Wi-Fi router) is not affected, nor is
+Anna at any other address. Guesses that name no credential of this robot share one entry per address, which
+affects no holder of a credential.
 """
 
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final, TypeAlias
+from dataclasses import dataclass, field
+from typing import Final
 
+from common.backoff import Backoff
 from common.errors import TooMuchError
 from common.reasons import Reason
-from gateway.access.site import site_of
+from gateway.access.address_prefix import address_prefix
 
-FREE: Final = 5
-"""Wrong credentials that cost nothing: people mistype, and programs start with an old token."""
+FREE_FAILURES: Final = 5
+"""Failures without a wait: people mistype, and programs start with an old token."""
 FIRST_WAIT_S: Final = 1.0
 LONGEST_WAIT_S: Final = 60.0
-FORGOTTEN_AFTER_S: Final = 600.0
-"""Without a further failure."""
-MOST: Final = 1024
-"""Entries; of more than that, the one that failed longest ago is forgotten. Who has a thousand addresses is
-not held up by this, and still has to guess 256 bits."""
-
-Key: TypeAlias = tuple[str, str]
+FORGET_AFTER_S: Final = 600.0
+"""Seconds without a failure after which earlier ones no longer count."""
+MAX_ENTRIES: Final = 1024
+"""Beyond that, the entry whose last failure is oldest is dropped. An attacker with a thousand addresses
+evades the lockout, but still has to guess 256 bits."""
 
 
 @dataclass(slots=True)
 class _Entry:
-    failures: int
     last_s: float
     locked_until_s: float
+    failures: int = 0
+    wait: Backoff = field(default_factory=lambda: Backoff(FIRST_WAIT_S, LONGEST_WAIT_S))
 
 
 class Lockout:
-    """Belongs to one event loop.
+    """Failure counts by address prefix and credential. Used on one event loop alone.
 
     Args:
-        clock: seconds, monotonic.
+        clock: monotonic seconds.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._entries: dict[Key, _Entry] = {}
-        """The one that failed last at the end."""
+        self._entries: dict[tuple[str, str], _Entry] = {}
+        """Ordered by last failure, the latest at the end."""
 
     def __len__(self) -> int:
         return len(self._entries)
 
     def admit(self, host: str, credential_id: str) -> None:
-        """Lets an attempt through, or not.
+        """Checks that an attempt may be made.
 
         Args:
-            host: where it comes from, without the port.
-            credential_id: the one it means; empty when this robot has none such.
+            host: address of the caller, without the port.
+            credential_id: the credential that the token names; empty if this robot has none of that id.
 
         Raises:
-            TooMuchError: too many failed before.
+            TooMuchError: the pair is locked.
         """
-        # Every call comes by here, and nearly always nobody is locked out.
-        entry = self._entries.get((site_of(host), credential_id)) if self._entries else None
+        # Every call passes here, and nearly always there are no entries.
+        entry = self._entries.get((address_prefix(host), credential_id)) if self._entries else None
         if entry is None:
             return
         left_s = entry.locked_until_s - self._clock()
@@ -75,22 +75,22 @@ class Lockout:
             )
 
     def failed(self, host: str, credential_id: str) -> bool:
-        """An attempt was wrong. Whether that has locked the pair just now."""
-        key, now_s = (site_of(host), credential_id), self._clock()
+        """Counts a failed attempt; returns whether the pair is locked now."""
+        key, now_s = (address_prefix(host), credential_id), self._clock()
         entry = self._entries.pop(key, None)
-        if entry is None or now_s - entry.last_s > FORGOTTEN_AFTER_S:
-            entry = _Entry(0, now_s, now_s)
+        if entry is None or now_s - entry.last_s > FORGET_AFTER_S:
+            entry = _Entry(now_s, now_s)
         entry.failures += 1
         entry.last_s = now_s
-        beyond = entry.failures - FREE
-        if beyond > 0:
-            entry.locked_until_s = now_s + min(LONGEST_WAIT_S, FIRST_WAIT_S * 2.0 ** min(beyond - 1, 16))
+        locked = entry.failures > FREE_FAILURES
+        if locked:
+            entry.locked_until_s = now_s + entry.wait.next_s()
         self._entries[key] = entry
-        if len(self._entries) > MOST:
+        if len(self._entries) > MAX_ENTRIES:
             del self._entries[next(iter(self._entries))]
-        return beyond > 0
+        return locked
 
     def succeeded(self, host: str, credential_id: str) -> None:
-        """An attempt was right: what failed before it is forgotten."""
+        """Resets the pair after a successful attempt."""
         if self._entries:
-            self._entries.pop((site_of(host), credential_id), None)
+            self._entries.pop((address_prefix(host), credential_id), None)

@@ -1,20 +1,20 @@
-"""What somebody may do: three roles, each of which may do what the ones before it may."""
+"""Roles of callers, ordered: each includes the permissions of those before it."""
 
 from enum import Enum
 
 
 class Role(Enum):
-    """The order of the members is the order of what they may do."""
+    """A role; the order of the members is the order of their permissions."""
 
     VIEWER = "viewer"
-    """Looks at everything, the video included, and changes nothing."""
+    """Reads everything, including the video."""
     OPERATOR = "operator"
-    """Switches what an operator switches."""
+    """Also controls the robot."""
     ADMIN = "admin"
-    """Sees and manages who else is there."""
+    """Also manages the access of others."""
 
     def may(self, needed: "Role") -> bool:
-        """Whether this role is enough for what needs that one."""
+        """Returns whether this role includes the permissions of `needed`."""
         return _RANKS[self] >= _RANKS[needed]
 
 

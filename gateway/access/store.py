@@ -1,165 +1,147 @@
-"""The document of credentials as values: read strictly, changed as a whole. Knows no file."""
+"""The list of credentials as an immutable value, and its JSON encoding. Knows no file."""
 
-import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Annotated, Final, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from common.errors import UserError
-from gateway.access.command import to_type
+from gateway.access.command import credentials_command
 from gateway.access.credential import Credential, Kind, State
 from gateway.access.role import Role
 
-MOST: Final = 512
-"""Credentials in one document, those included that are over."""
+MAX_CREDENTIALS: Final = 512
+"""In one list, including revoked and expired ones."""
 _VERSION: Final = 1
-_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,62}")
-_ID: Final = re.compile(r"[0-9a-f]{12}")
-_PROOF: Final = re.compile(r"[0-9a-f]{64}")
-_KEYS: Final = frozenset({"id", "name", "role", "kind", "proof", "made", "begins", "ends", "revoked"})
+_NAME: Final = r"[A-Za-z0-9][A-Za-z0-9._@-]{0,62}"
 
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """All credentials of a robot by their ids, the oldest first."""
+    """All credentials of a robot by id, in order of issue."""
 
     credentials: Mapping[str, Credential] = field(default_factory=lambda: MappingProxyType({}))
 
-    def with_one_more(self, credential: Credential) -> "Store":
-        """The same and this one. What has been over the longest makes room.
+    def adding(self, credential: Credential) -> "Store":
+        """Returns a list with one more credential; if full, the one revoked first is dropped.
 
         Raises:
-            UserError: there are too many that are not over.
+            UserError: the list is full and none is revoked.
         """
         kept = dict(self.credentials)
-        if len(kept) >= MOST:
-            over = [each for each in kept.values() if each.revoked_s is not None]
-            if not over:
-                raise UserError(f"{len(kept)} credentials are as many as one robot has", "Revoke some")
-            del kept[min(over, key=lambda each: each.revoked_s or 0).credential_id]
+        if len(kept) >= MAX_CREDENTIALS:
+            revoked = [each for each in kept.values() if each.revoked_s is not None]
+            if not revoked:
+                raise UserError(f"this robot has {len(kept)} credentials, which is the limit", "Revoke some")
+            del kept[min(revoked, key=lambda each: each.revoked_s or 0).credential_id]
         kept[credential.credential_id] = credential
         return Store(MappingProxyType(kept))
 
-    def found(self, name_or_id: str, now_s: float) -> tuple[Credential, ...]:
-        """Those that a person means, without those that are over.
+    def find(self, name_or_id: str, now_s: float) -> tuple[Credential, ...]:
+        """Returns the credentials of a name or id that are neither revoked nor expired.
 
         Raises:
             UserError: there are none.
         """
-        over = (State.REVOKED, State.EXPIRED)
-        meant = tuple(
+        found = tuple(
             each
             for each in self.credentials.values()
-            if name_or_id in (each.name, each.credential_id) and each.state(now_s) not in over
+            if name_or_id in (each.name, each.credential_id)
+            and each.state(now_s) not in (State.REVOKED, State.EXPIRED)
         )
-        if not meant:
+        if not found:
             raise UserError(
-                f"no credential in force has the name or the id '{name_or_id}'",
-                f"{to_type('list')} has all of them",
+                f"no valid credential has the name or id '{name_or_id}'",
+                f"To list all of them, type: {credentials_command('list')}",
             )
-        return meant
+        return found
 
-    def revoked(self, which: Iterable[Credential], now_s: int) -> "Store":
-        """The same with those revoked."""
-        return self._changed({each.credential_id: replace(each, revoked_s=now_s) for each in which})
+    def revoking(self, which: Iterable[Credential], now_s: int) -> "Store":
+        """Returns a list with the given credentials revoked."""
+        return self._changed(replace(each, revoked_s=now_s) for each in which)
 
-    def ending(self, which: Iterable[Credential], ends_s: int) -> "Store":
-        """The same with those ending then, unless they end earlier anyway."""
-        changed = {}
-        for each in which:
-            ends = ends_s if each.ends_s is None else min(ends_s, each.ends_s)
-            changed[each.credential_id] = replace(each, ends_s=ends)
-        return self._changed(changed)
+    def expiring(self, which: Iterable[Credential], ends_s: int) -> "Store":
+        """Returns a list in which the given credentials expire at `ends_s` at the latest."""
+        return self._changed(
+            replace(each, ends_s=ends_s if each.ends_s is None else min(ends_s, each.ends_s))
+            for each in which
+        )
 
-    def _changed(self, changed: Mapping[str, Credential]) -> "Store":
-        return Store(MappingProxyType({**self.credentials, **changed}))
+    def _changed(self, changed: Iterable[Credential]) -> "Store":
+        return Store(MappingProxyType({**self.credentials, **{each.credential_id: each for each in changed}}))
 
 
 def check_name(name: str) -> str:
-    """The name, if somebody may be called so.
+    """Returns the name if a credential may have it.
 
     Raises:
-        UserError: it may not.
+        UserError: it has other characters or is too long.
     """
-    if not _NAME.fullmatch(name):
+    if not re.fullmatch(_NAME, name):
         raise UserError(
             f"'{name}' can't be the name on a credential",
-            "Take up to 63 letters, digits, . _ @ and -, the first a letter or a digit",
+            "Use up to 63 letters, digits, . _ @ and -, starting with a letter or digit",
         )
     return name
 
 
+_Instant: TypeAlias = Annotated[int, Field(ge=0)]
+
+
+class _Entry(BaseModel):
+    """The JSON encoding of a credential. Every key is required: a missing "revoked" must not mean valid."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    credential_id: Annotated[str, Field(alias="id", pattern=r"^[0-9a-f]{12}$")]
+    name: Annotated[str, Field(pattern=f"^{_NAME}$")]
+    role: Role
+    kind: Kind
+    proof: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    made_s: Annotated[_Instant, Field(alias="made")]
+    begins_s: Annotated[_Instant | None, Field(alias="begins")]
+    ends_s: Annotated[_Instant | None, Field(alias="ends")]
+    revoked_s: Annotated[_Instant | None, Field(alias="revoked")]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    version: Literal[1]
+    credentials: Annotated[list[_Entry], Field(max_length=MAX_CREDENTIALS)]
+
+
 def store_text(store: Store) -> str:
-    """As it is kept: JSON for people and programs, without any secret."""
-    listed = [
-        {
-            "id": each.credential_id,
-            "name": each.name,
-            "role": each.role.value,
-            "kind": each.kind.value,
-            "proof": each.proof,
-            "made": each.made_s,
-            "begins": each.begins_s,
-            "ends": each.ends_s,
-            "revoked": each.revoked_s,
-        }
-        for each in store.credentials.values()
-    ]
-    return json.dumps({"version": _VERSION, "credentials": listed}, indent=1) + "\n"
+    """Encodes the list as JSON; it contains no secret."""
+    entries = [asdict(each) for each in store.credentials.values()]
+    document = _Document.model_validate(
+        {"version": _VERSION, "credentials": entries}, by_name=True, by_alias=False
+    )
+    return document.model_dump_json(by_alias=True, indent=1) + "\n"
 
 
 def parse_store(text: str) -> Store:
-    """The credentials that a text holds.
+    """Decodes a list.
 
     Raises:
-        ValueError: it is none of ours; the words quote nothing out of it.
+        ValueError: it is malformed or invalid; the message quotes nothing of it.
     """
     try:
-        document = json.loads(text)
-    except RecursionError as error:
-        raise ValueError("it is nested too deeply") from error
-    if not isinstance(document, dict) or document.get("version") != _VERSION:
-        raise ValueError(f"it is not a document of version {_VERSION}")
-    listed = document.get("credentials")
-    if not isinstance(listed, list) or len(listed) > MOST:
-        raise ValueError(f"it does not list up to {MOST} credentials")
-    credentials = [_credential(number, each) for number, each in enumerate(listed, 1)]
-    by_id = {each.credential_id: each for each in credentials}
-    if len(by_id) != len(credentials):
+        document = _Document.model_validate_json(text)
+    except ValidationError as error:
+        raise ValueError(_problem(error)) from error
+    by_id = {each.credential_id: Credential(**dict(each)) for each in document.credentials}
+    if len(by_id) != len(document.credentials):
         raise ValueError("two credentials have the same id")
     return Store(MappingProxyType(by_id))
 
 
-def _credential(number: int, value: Any) -> Credential:
-    try:
-        if set(value) != _KEYS:
-            raise ValueError("keys")  # noqa: TRY301  # one way out for all that may be wrong
-        return Credential(
-            credential_id=_text(_ID, value["id"]),
-            name=_text(_NAME, value["name"]),
-            role=Role(value["role"]),
-            kind=Kind(value["kind"]),
-            proof=_text(_PROOF, value["proof"]),
-            made_s=_instant(value["made"]) or 0,
-            begins_s=_instant(value["begins"]),
-            ends_s=_instant(value["ends"]),
-            revoked_s=_instant(value["revoked"]),
-        )
-    except (ValueError, TypeError, KeyError) as error:
-        raise ValueError(f"credential {number} is not in order") from error
-
-
-def _text(form: re.Pattern[str], value: Any) -> str:
-    if not form.fullmatch(value):
-        raise ValueError("text")
-    return str(value)
-
-
-def _instant(value: Any) -> int | None:
-    if value is None:
-        return None
-    if type(value) is not int or value < 0:
-        raise ValueError("instant")
-    return value
+def _problem(error: ValidationError) -> str:
+    match error.errors(include_input=False, include_url=False)[0]["loc"]:
+        case ("credentials", int(index), *_):
+            return f"credential {index + 1} is invalid"
+        case _:
+            return f"it is not a list of up to {MAX_CREDENTIALS} credentials in version {_VERSION}"

@@ -1,1 +1,1 @@
-"""What keeps this machine from being a robot's gateway: looked at from beside it, whether it runs or not."""
+"""Checks of the gateway's machine: configuration, credentials, endpoints, devices and ROS sources."""

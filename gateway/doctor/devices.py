@@ -1,4 +1,4 @@
-"""The device files that cameras and encoders need, and this user's right to them."""
+"""Checks of the device files of cameras and encoders, and of this user's permissions on them."""
 
 import grp
 import os
@@ -13,14 +13,14 @@ _FAMILIES: Final = (
     ("video*", "camera or encoder"),
     ("dri/renderD*", "graphics, for its encoder"),
     ("mpp_service", "Rockchip's encoder"),
-    ("rga", "Rockchip's picture scaler"),
+    ("rga", "Rockchip's image scaler"),
     ("dma_heap/*", "memory shared with encoders"),
     ("nvidia[0-9]*", "graphics, for its encoder"),
 )
 
 
 def device_findings(dev: Path = Path("/dev")) -> Iterator[Finding]:
-    """One finding per device file; one in all where there is none."""
+    """Yields one finding per device file, or one note if there is none."""
     found = [(path, use) for pattern, use in _FAMILIES for path in sorted(dev.glob(pattern))]
     for path, use in found:
         yield _finding(path, use)
@@ -28,19 +28,19 @@ def device_findings(dev: Path = Path("/dev")) -> Iterator[Finding]:
         yield note(
             "devices",
             "no camera, graphics or encoder device on this machine",
-            "The preview can show a test picture and encode on the processor, nothing else",
-            "In a container: hand the devices in (docs/configuration.md lists what the source needs)",
+            "The preview can only show a test pattern and encode on the CPU",
+            "In a container: pass the devices through (docs/configuration.md lists what the source needs)",
         )
 
 
 def _finding(path: Path, use: str) -> Finding:
     check = f"device.{path.name}"
     if os.access(path, os.R_OK | os.W_OK):
-        return good(check, f"{path} ({use}) may be used")
+        return good(check, f"{path} ({use}) is accessible")
     group = _group(path)
     return wrong(
         check,
-        f"{path} ({use}) is there, but this user may not use it",
+        f"{path} ({use}) exists, but this user has no access",
         f"It belongs to the group '{group}'",
         f"Type: sudo usermod -aG {group} $USER, and log in again; in a container: group_add: [{group}]",
     )

@@ -1,40 +1,59 @@
-"""The examination of this machine: configuration first, then everything it names."""
+"""Runs all checks: the configuration first, then everything that it refers to."""
 
+import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
-from gateway.config import GatewaySettings, SourceSettings, load_settings
-from gateway.doctor.access import access_finding
+from gateway.access.command import credentials_command
+from gateway.access.credential import State
+from gateway.access_control import read_access
+from gateway.config import SecuritySettings, SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.doors import operator_door, preview_door
+from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
 
 
 def examine(config: Path | None) -> Iterator[Finding]:
-    """All findings, one after the other; looking at ROS takes some seconds."""
+    """Yields all findings; the checks of ROS take some seconds."""
     try:
         settings = load_settings(config)
     except UserError as error:
         yield wrong("configuration", error.what, "The gateway does not start with it", error.remedy)
         return
-    yield from _of(settings, config)
-
-
-def _of(settings: GatewaySettings, config: Path | None) -> Iterator[Finding]:
-    yield good("configuration", f"{config or 'defaults and environment'}: good, gateway '{settings.name}'")
+    yield good("configuration", f"{config or 'defaults and environment'}: valid, gateway '{settings.name}'")
     if settings.security.insecure:
         yield note(
             "access",
-            "security.insecure: everybody who reaches the address may read and switch everything",
-            "Nothing is encrypted and nobody is asked who they are",
+            "security.insecure: everyone who can reach the gateway may read and control everything",
+            "Nothing is encrypted, and callers are not authenticated",
         )
     if settings.security.credentials is not None:
-        yield access_finding(settings.security)
-    yield operator_door(settings.grpc.host, settings.grpc.port)
-    yield preview_door(settings.preview.socket)
+        yield _access(settings.security, settings.security.credentials)
+    yield operator_endpoint(settings.grpc.host, settings.grpc.port)
+    yield preview_endpoint(settings.preview.socket)
     yield from device_findings()
     yield from _ros(settings.sources)
+
+
+def _access(settings: SecuritySettings, directory: Path) -> Finding:
+    try:
+        loaded = read_access(settings, directory)
+    except UserError as error:
+        return wrong("access", error.what, "The gateway does not start with it", error.remedy)
+    now_s = time.time()
+    valid = sum(each.state(now_s) is State.VALID for each in loaded.store.credentials.values())
+    if not valid:
+        return note(
+            "access",
+            f"no credential in {directory} is valid",
+            "Every caller must present one",
+            f"Type: {credentials_command('add NAME --role operator')}",
+        )
+    ends = [datetime.fromtimestamp(each, UTC).date().isoformat() for each in loaded.ends_s.values()]
+    until = f"; the certificate is valid until {min(ends)}" if ends else ""
+    return good("access", f"valid credentials: {valid}{until}")
 
 
 def _ros(sources: tuple[SourceSettings, ...]) -> Iterator[Finding]:
@@ -42,8 +61,7 @@ def _ros(sources: tuple[SourceSettings, ...]) -> Iterator[Finding]:
         yield good("ros", "no sources are configured; ROS is not used")
         return
     try:
-        # Late, because this doctor must not need what it looks for.
-        # The first one ends with a sentence for people where rclpy is missing.
+        # Imported late, because the doctor must run without rclpy; the import then raises a UserError.
         from gateway.ros.doctor import ros_findings  # noqa: PLC0415
     except UserError as error:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)

@@ -1,5 +1,5 @@
-"""What Prometheus may read: off unless configured.
+"""Metrics for Prometheus; off unless configured.
 
-`calls` and `loop_delay` measure, `collector` tells them together with the newest snapshot, `endpoint` serves
-the text. Nothing here is computed unless somebody asks for it, but for the two measurements.
+`calls` and `loop_delay` measure all the time; `collector` computes the rest on request, from the newest
+snapshot; `endpoint` serves the text.
 """

@@ -1,8 +1,7 @@
 """The metrics by name. docs/metrics.md explains each; a test holds the page and this module together."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator
+from typing import Final, Protocol
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily as CounterFamily
@@ -11,87 +10,86 @@ from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from gateway.metrics.calls import Calls
 from gateway.metrics.loop_delay import LoopDelay
-from gateway.status.faults.fault import Severity
+from gateway.rpc.event_stream import EventStream
+from gateway.rpc.interceptors.stats import Stats
+from gateway.rpc.status_stream import StatusStream
+from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 
 _PREFIX: Final = "robot_gateway"
 
 
-@dataclass(frozen=True, slots=True)
-class StreamFigures:
-    """Of the streams to operators.
+class SnapshotSource(Protocol):
+    """Where the gauges come from."""
 
-    Attributes:
-        open: how many go on, by method.
-        skipped: statuses that slow readers did not get, because they got newer ones.
-        gaps: how often a subscriber was told that events are missing.
-    """
-
-    open: Mapping[str, int]
-    skipped: int
-    gaps: int
+    def snapshot(self) -> Snapshot:
+        """Returns everything at this instant."""
 
 
 class GatewayCollector(Collector):
-    """Everything that is told, of one instant.
+    """Collects all metrics at one instant.
 
     Args:
-        take: makes a snapshot of this instant.
-        calls: what became of the calls.
+        state: where the gauges come from.
+        stats: of the calls.
         loop_delay: how late the event loop was.
-        streams: the figures of this instant.
+        status_stream: counts responses that slow readers skipped.
+        event_stream: counts gaps of subscribers.
     """
 
     def __init__(
         self,
-        take: Callable[[], Snapshot],
-        calls: Calls,
+        state: SnapshotSource,
+        stats: Stats,
         loop_delay: LoopDelay,
-        streams: Callable[[], StreamFigures],
+        status_stream: StatusStream,
+        event_stream: EventStream,
     ) -> None:
-        self._take = take
-        self._streams = streams
-        self._calls = calls
+        self._state = state
+        self._stats = stats
         self._loop_delay = loop_delay
+        self._status_stream = status_stream
+        self._event_stream = event_stream
         self._registry = CollectorRegistry()
         self._registry.register(self)
 
     def text(self) -> bytes:
-        """In Prometheus' text format."""
+        """Returns them in Prometheus' text format."""
         return generate_latest(self._registry)
 
     def describe(self) -> list[Metric]:
-        """Nothing beforehand: to describe would be to collect."""
+        """Returns nothing: without this method, registering would collect."""
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """All of it."""
-        now = self._take()
+        """Yields every family."""
+        now = self._state.snapshot()
         yield from _gateway(now)
-        yield from self._of_calls()
-        yield from _streams(self._streams())
+        yield from self._calls()
+        yield from self._streams()
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
         yield from _stream(now)
 
-    def _of_calls(self) -> Iterator[Metric]:
+    def _calls(self) -> Iterator[Metric]:
+        methods = sorted(self._stats.methods.items())
         ended = CounterFamily(
             f"{_PREFIX}_requests", "Calls that ended, by gRPC code.", labels=("method", "code")
         )
-        for labels, count in sorted(self._calls.ended.items()):
-            ended.add_metric(labels, count)
-        yield ended
         durations = HistogramFamily(
             f"{_PREFIX}_request_duration_seconds",
             "How long calls took; a stream from its first to its last message.",
             labels=("method",),
         )
-        for method, each in sorted(self._calls.durations.items()):
-            durations.add_metric((method,), each.cumulative(), each.sum_s)
+        for method, stats in methods:
+            for code, count in sorted(stats.ended.items()):
+                ended.add_metric((method, code), count)
+            if stats.ended:
+                durations.add_metric((method,), stats.durations.cumulative(), stats.durations.sum_s)
+        yield ended
         yield durations
         delays = self._loop_delay.delays
         yield HistogramFamily(
@@ -101,20 +99,20 @@ class GatewayCollector(Collector):
             sum_value=delays.sum_s,
         )
 
-
-def _streams(figures: StreamFigures) -> Iterator[Metric]:
-    streams = Gauge(f"{_PREFIX}_streams", "Streams that go on.", labels=("method",))
-    for method, count in sorted(figures.open.items()):
-        streams.add_metric((method,), count)
-    yield streams
-    yield CounterFamily(
-        f"{_PREFIX}_statuses_skipped",
-        "Statuses that slow readers did not get, because they got newer ones.",
-        value=figures.skipped,
-    )
-    yield CounterFamily(
-        f"{_PREFIX}_event_gaps", "Times a subscriber was told that events are missing.", value=figures.gaps
-    )
+    def _streams(self) -> Iterator[Metric]:
+        streams = Gauge(f"{_PREFIX}_streams", "Open streams.", labels=("method",))
+        for method, stats in sorted(self._stats.contract.items()):
+            if stats.open:
+                streams.add_metric((method,), stats.open)
+        yield streams
+        yield CounterFamily(
+            f"{_PREFIX}_statuses_skipped",
+            "Statuses that slow readers did not get, because they got newer ones.",
+            value=self._status_stream.skipped,
+        )
+        yield CounterFamily(
+            f"{_PREFIX}_event_gaps", "Times a subscriber missed events.", value=self._event_stream.gaps
+        )
 
 
 def _gateway(now: Snapshot) -> Iterator[Metric]:

@@ -1,7 +1,6 @@
-"""Serves the metrics over plain HTTP, on the gateway's own loop.
+"""Serves the metrics over plain HTTP on the gateway's event loop.
 
-prometheus_client has a server, too, but it gives every connection a thread and as much time as it likes; this
-one gives a few at a time some seconds.
+The server of prometheus_client gives every connection a thread and unlimited time; this one bounds both.
 """
 
 import asyncio
@@ -17,10 +16,10 @@ from common.errors import ExitCode, UserError
 _log = logging.getLogger(__name__)
 
 _DEADLINE_S: Final = 3.0
-"""For a caller to ask and to take the answer."""
-_MOST_CALLERS: Final = 4
-"""At once; more are hung up on."""
-_LONGEST_REQUEST: Final = 8192
+"""Seconds for a client to send its request and receive the response."""
+_MAX_CONNECTIONS: Final = 4
+"""Concurrent connections; further ones are closed."""
+_MAX_REQUEST_BYTES: Final = 8192
 _END_OF_REQUEST: Final = b"\r\n\r\n"
 _TEXT_FORMAT: Final = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -30,19 +29,19 @@ async def serving_metrics(text: Callable[[], bytes], host: str, port: int) -> As
     """Serves until the block ends.
 
     Args:
-        text: makes the answer.
+        text: returns the metrics in Prometheus' text format.
         host: an address of this machine.
-        port: 0 takes any free one.
+        port: 0 for any free one.
 
     Yields:
-        The port.
+        The bound port.
 
     Raises:
         UserError: the address can't be bound.
     """
     endpoint = _Endpoint(text)
     try:
-        server = await asyncio.start_server(endpoint.serve, host, port, limit=_LONGEST_REQUEST)
+        server = await asyncio.start_server(endpoint.serve, host, port, limit=_MAX_REQUEST_BYTES)
     except OSError as error:
         raise UserError(
             f"metrics can't be served at {bracketed(host)}:{port} ({error.strerror})",
@@ -58,34 +57,34 @@ async def serving_metrics(text: Callable[[], bytes], host: str, port: int) -> As
 class _Endpoint:
     def __init__(self, text: Callable[[], bytes]) -> None:
         self._text = text
-        self._callers = 0
+        self._connections = 0
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One connection: one request, one answer."""
-        self._callers += 1
+        """Serves one connection: one request, one response."""
+        self._connections += 1
         try:
-            if self._callers <= _MOST_CALLERS:
+            if self._connections <= _MAX_CONNECTIONS:
                 async with asyncio.timeout(_DEADLINE_S):
-                    writer.write(answer(await reader.readuntil(_END_OF_REQUEST), self._text))
+                    writer.write(respond(await reader.readuntil(_END_OF_REQUEST), self._text))
                     await writer.drain()
-        except (TimeoutError, OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as trouble:
-            _log.debug("a caller of the metrics got no answer: %r", trouble)
+        except (TimeoutError, OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as error:
+            _log.debug("a metrics request got no response: %r", error)
             writer.transport.abort()
         finally:
-            self._callers -= 1
+            self._connections -= 1
             writer.close()
             with suppress(OSError):
                 await writer.wait_closed()
 
 
-def answer(request: bytes, text: Callable[[], bytes]) -> bytes:
-    """The whole answer to a whole request, whatever that is."""
+def respond(request: bytes, text: Callable[[], bytes]) -> bytes:
+    """Returns the complete response to a complete request (RFC 9112), valid or not."""
     method, _, rest = request.partition(b"\r\n")[0].partition(b" ")
     path = rest.partition(b" ")[0].partition(b"?")[0]
     if path != b"/metrics":
-        return _http(HTTPStatus.NOT_FOUND, b"There is /metrics only.\n")
+        return _http(HTTPStatus.NOT_FOUND, b"Only /metrics exists.\n")
     if method not in {b"GET", b"HEAD"}:
-        return _http(HTTPStatus.METHOD_NOT_ALLOWED, b"GET it.\n")
+        return _http(HTTPStatus.METHOD_NOT_ALLOWED, b"Use GET.\n")
     body = text()
     return _http(HTTPStatus.OK, b"" if method == b"HEAD" else body, len(body))
 

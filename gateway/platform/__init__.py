@@ -1,1 +1,1 @@
-"""The robot's computer, sampled from psutil and the files under /sys and /proc."""
+"""State of the robot's computer, sampled with psutil and from files in /sys and /proc."""

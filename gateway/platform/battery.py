@@ -1,4 +1,4 @@
-"""The battery of the computer itself, as its operating system tells it."""
+"""The battery of the computer itself, as reported by the kernel (sysfs class power_supply)."""
 
 from pathlib import Path
 from typing import Final
@@ -10,7 +10,7 @@ _CHARGING: Final = {"Charging": True, "Full": False, "Discharging": False, "Not 
 
 
 def read(sys: Path = Path("/sys")) -> Battery | None:
-    """The first battery that feeds the computer; None when it has none (a mouse's does not count)."""
+    """Returns the first battery that powers the computer, not one of a peripheral; None if there is none."""
     for supply in sorted(sys.glob("class/power_supply/*")):
         if text(supply / "type") == "Battery" and text(supply / "scope") != "Device":
             return _battery(supply)

@@ -1,4 +1,4 @@
-"""CPU load, heat, memory and disk."""
+"""CPU load, temperature, throttling, memory and disk of the computer."""
 
 from pathlib import Path
 from typing import Final
@@ -9,24 +9,24 @@ from gateway.platform.files import number, text
 from gateway.status.values import Compute
 
 _CPU_ZONES: Final = ("cpu", "core", "soc", "x86_pkg", "package")
-"""What thermal zones of processors have in their type ("bigcore0-thermal", "x86_pkg_temp")."""
+"""Parts of the type of a processor's thermal zone ("bigcore0-thermal", "x86_pkg_temp")."""
 _CPU_CHIPS: Final = frozenset({"coretemp", "k10temp", "zenpower", "cpu_thermal"})
-"""Hardware monitors of processors that have no thermal zone."""
+"""Names of the hardware monitors of processors without a thermal zone."""
 _CPU_COOLERS: Final = ("cpufreq", "thermal-cpufreq", "processor")
-"""Cooling devices that cool by clocking down; a fan is none of them."""
+"""Types of cooling devices that reduce the clock rate, which a fan does not."""
 _PI_THROTTLED: Final = "devices/platform/soc/soc:firmware/get_throttled"
-"""Where a Raspberry Pi's firmware tells, in hexadecimal; it slows down without asking the kernel."""
+"""Flags of a Raspberry Pi's firmware, which throttles by itself; hexadecimal."""
 _PI_SLOWED_BY_HEAT: Final = 0b1100
-"""Its bits for "throttled" and "soft temperature limit" at this moment."""
+"""Bits 2 and 3: currently throttled, soft temperature limit active (vcgencmd get_throttled)."""
 _PLAUSIBLE_C: Final = range(-40, 151)
 
 
 def read(disk_path: Path, sys: Path = Path("/sys")) -> Compute:
-    """What is true now; the CPU load is that since the previous call.
+    """Samples the computer; the CPU load is the average since the previous call.
 
     Args:
-        disk_path: on the file system whose fill level counts.
-        sys: where the kernel shows its devices.
+        disk_path: a path on the file system whose usage is sampled.
+        sys: mount point of sysfs.
     """
     memory = psutil.virtual_memory()
     return Compute(
@@ -40,12 +40,12 @@ def read(disk_path: Path, sys: Path = Path("/sys")) -> Compute:
 
 
 def begin() -> None:
-    """Notes where the processor's counters stand: the first call of `read` tells the load since then."""
+    """Reads the processor's counters, from which the first call of `read` measures the load."""
     psutil.cpu_percent(interval=None)
 
 
 def temperature_c(sys: Path) -> float | None:
-    """The hottest processor sensor; None when the machine has none."""
+    """Returns the temperature of the hottest processor sensor in degrees Celsius; None without a sensor."""
     zones = [
         number(zone / "temp")
         for zone in sys.glob("class/thermal/thermal_zone*")
@@ -62,7 +62,7 @@ def temperature_c(sys: Path) -> float | None:
 
 
 def throttled(sys: Path) -> bool | None:
-    """Whether a processor is clocked down because of heat; None when the machine doesn't tell."""
+    """Returns whether a processor is throttled because of heat; None if the machine does not report it."""
     states = [
         number(cooler / "cur_state")
         for cooler in sys.glob("class/thermal/cooling_device*")

@@ -1,10 +1,10 @@
-"""Reading the small files by which Linux tells about the machine."""
+"""Reads the small files in /proc and /sys by which Linux describes the machine."""
 
 from pathlib import Path
 
 
 def text(path: Path) -> str | None:
-    """The file's only line; None when it does not exist or the driver has nothing to say now."""
+    """Returns the file's content without surrounding white space; None if it can't be read now."""
     try:
         return path.read_text(encoding="ascii", errors="replace").strip()
     except OSError:
@@ -12,9 +12,13 @@ def text(path: Path) -> str | None:
 
 
 def number(path: Path) -> int | None:
-    """The file's whole number; None when there is none."""
-    content = text(path)
+    """Returns the file's content as an integer; None if it holds none."""
     try:
-        return int(content) if content else None
+        return int(text(path) or "")
     except ValueError:
         return None
+
+
+def boot_id(proc: Path = Path("/proc")) -> str:
+    """Returns the kernel's random boot ID (random(4)); empty if unavailable."""
+    return text(proc / "sys/kernel/random/boot_id") or ""

@@ -1,4 +1,4 @@
-"""By which names and addresses this machine may be called."""
+"""Names and addresses by which other machines may reach this one."""
 
 import ipaddress
 import socket
@@ -6,30 +6,25 @@ from collections.abc import Iterable
 
 import psutil
 
-_LOCAL = ("localhost", "127.0.0.1", "::1")
-"""Always: who comes through a tunnel calls these."""
+_LOOPBACK = ("localhost", "127.0.0.1", "::1")
+"""Always included: clients behind a tunnel connect to these."""
 
 
-def hosts_found() -> tuple[str, ...]:
-    """Host name, the same with ".local" (mDNS), and every address that other machines may know."""
+def find_hosts() -> tuple[str, ...]:
+    """Returns the host name, its mDNS name (".local", RFC 6762 3), and all lasting addresses."""
     name = socket.gethostname().partition(".")[0]
-    full = socket.getfqdn()
-    addresses = [
-        each.address
-        for interface in psutil.net_if_addrs().values()
-        for each in interface
-        if _lasts(each.address)
-    ]
-    return with_local((name, f"{name}.local", full, *sorted(addresses)))
+    interfaces = psutil.net_if_addrs().values()
+    addresses = [each.address for interface in interfaces for each in interface if _is_lasting(each.address)]
+    return with_loopback((name, f"{name}.local", socket.getfqdn(), *sorted(addresses)))
 
 
-def with_local(hosts: Iterable[str]) -> tuple[str, ...]:
-    """These and those that always count, each once."""
-    return tuple(dict.fromkeys(host for host in (*hosts, *_LOCAL) if host))
+def with_loopback(hosts: Iterable[str]) -> tuple[str, ...]:
+    """Returns the hosts and the loopback names and addresses, each once."""
+    return tuple(dict.fromkeys(host for host in (*hosts, *_LOOPBACK) if host))
 
 
-def _lasts(text: str) -> bool:
-    """Whether it is an address by which others may call for more than a moment."""
+def _is_lasting(text: str) -> bool:
+    """Returns whether this is an IP address that other machines can use, now and later."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

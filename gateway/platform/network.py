@@ -1,4 +1,4 @@
-"""The network interface that leads to the operator."""
+"""State of the network interface that leads to the operator."""
 
 import socket
 from pathlib import Path
@@ -10,23 +10,23 @@ from gateway.status.values import Network
 
 _DEFAULT_ROUTE: Final = "00000000"
 _QUALITY_SCALE: Final = 70
-"""What Linux drivers count their link quality up to."""
+"""Maximum link quality of Linux drivers."""
 _LEAST_FIELDS: Final = 4
 """Columns of /proc/net/wireless up to the signal."""
 _PLAUSIBLE_DBM: Final = range(-120, 0)
-"""An interface that has lost its network tells -256."""
+"""A disconnected interface reports -256."""
 _DEFAULT_ROUTE_6: Final = ("0" * 32, "00")
 """Destination and prefix length."""
 _UNREACHABLE_6: Final = 0x0200
-"""Route flag: reject; the kernel keeps one such default route by itself."""
+"""RTF_REJECT; the kernel itself adds a default route with this flag."""
 
 
 def read(interface: str | None, proc: Path = Path("/proc")) -> Network:
-    """What is true now.
+    """Samples an interface.
 
     Args:
-        interface: the one to look at; None takes that of the default route.
-        proc: where the kernel shows its tables.
+        interface: its name; None for the interface of the default route.
+        proc: mount point of procfs.
     """
     name = interface or default_interface(proc)
     if name is None:
@@ -41,13 +41,13 @@ def read(interface: str | None, proc: Path = Path("/proc")) -> Network:
 
 
 def default_interface(proc: Path) -> str | None:
-    """The interface of the default route with the smallest metric, IPv4 first; None when none leads out."""
+    """Returns the interface of the default route with the lowest metric, IPv4 first; None without a route."""
     out = _default_routes_4(proc) or _default_routes_6(proc)
     return min(out)[1] if out else None
 
 
 def _default_routes_4(proc: Path) -> list[tuple[int, str]]:
-    """Metric and interface of each."""
+    """Returns metric and interface of each IPv4 default route."""
     routes = [line.split() for line in _lines(proc / "net/route")[1:]]
     return [(int(route[6]), route[0]) for route in routes if len(route) > 6 and route[1] == _DEFAULT_ROUTE]
 
@@ -64,7 +64,7 @@ def _default_routes_6(proc: Path) -> list[tuple[int, str]]:
 
 
 def wireless(name: str, proc: Path) -> tuple[int | None, int | None]:
-    """Link quality in percent and signal in dBm; None for each that the driver doesn't tell."""
+    """Returns link quality in percent and signal in dBm; None for values that the driver does not report."""
     for line in _lines(proc / "net/wireless"):
         fields = line.split()
         if len(fields) >= _LEAST_FIELDS and fields[0] == f"{name}:":

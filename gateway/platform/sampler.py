@@ -1,8 +1,7 @@
-"""Samples the robot's computer about once a second, in a thread of its own.
+"""Samples the robot's computer periodically, in a thread of its own.
 
-A thread, because a question to the file system can hang (a network share that is gone). Then the values
-grow stale, which is the truth, and nothing else waits. A daemon, so that a hanging one can't keep the gateway
-from ending.
+A call of the file system can block (a network share that is gone). In a thread it blocks nothing else, and
+the values become stale, as they should. The thread is a daemon, so that the gateway can exit while it blocks.
 """
 
 import logging
@@ -15,22 +14,23 @@ from typing import Final, Self
 from gateway.config import PlatformSettings
 from gateway.platform import battery, compute, network
 from gateway.status.board import Board
+from gateway.status.sources import COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Received
 
 _log = logging.getLogger(__name__)
 
 _STOP_WITHIN_S: Final = 1.0
 _FIRST_AFTER_S: Final = 0.1
-"""The load of the processor needs two looks at its counters, and some time between them."""
+"""Seconds before the first sample: the CPU load is the difference of two readings."""
 
 
 class PlatformSampler:
-    """Writes `compute`, `network` and `onboard_battery` of the board, from `__enter__` to `__exit__`.
+    """Writes the platform sources to the board while its context is entered.
 
     Args:
-        settings: how often, and what to look at.
-        board: where the values go.
-        clock: seconds, monotonic.
+        settings: sampling interval, disk and network interface.
+        board: receives the values.
+        clock: monotonic seconds.
     """
 
     def __init__(
@@ -52,15 +52,15 @@ class PlatformSampler:
         self._stop.set()
         self._thread.join(_STOP_WITHIN_S)
         if self._thread.is_alive():
-            _log.warning("the platform sampler hangs in a question to the system; leaving it behind")
+            _log.warning("the platform sampler is blocked in a system call; exiting without it")
 
     def sample(self) -> None:
-        """Takes every value once."""
-        self._board.compute = Received(compute.read(self._settings.disk_path), self._clock())
-        self._board.network = Received(network.read(self._settings.interface), self._clock())
+        """Samples all values once."""
+        self._board[COMPUTE] = Received(compute.read(self._settings.disk_path), self._clock())
+        self._board[NETWORK] = Received(network.read(self._settings.interface), self._clock())
         onboard = battery.read()
         if onboard:
-            self._board.onboard_battery = Received(onboard, self._clock())
+            self._board[ONBOARD_BATTERY] = Received(onboard, self._clock())
 
     def _run(self) -> None:
         interval_s = self._settings.interval_ms / 1000
@@ -73,7 +73,7 @@ class PlatformSampler:
                 self.sample()
                 failing = False
             except (OSError, RuntimeError, ValueError, IndexError) as error:
-                # What the kernel's tables hold differs between machines; one bad answer must not end it.
+                # The kernel's tables differ between machines; an unexpected one must not end the thread.
                 if not failing:
-                    _log.warning("the computer's own state can't be read: %s", error)
+                    _log.warning("the state of the computer can't be sampled: %s", error)
                 failing = True

@@ -2,5 +2,5 @@
 
 from common.ros_environment import check_middleware
 
-# Here, because importing rclpy ends the process when the environment names a middleware that is not there.
+# Importing rclpy ends the process if the environment names a middleware that is not installed.
 check_middleware()

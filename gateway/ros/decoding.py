@@ -1,44 +1,36 @@
-"""One message: bytes in, a value out."""
+"""Decodes one serialised message into a value."""
 
-from dataclasses import replace
 from typing import Any
 
 from rclpy.serialization import deserialize_message
 
 from gateway.config import SourceSettings
-from gateway.ros.cutting import cut
+from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import is_header_and_list, reader_for
-from gateway.ros.readers.registry import Value
-from gateway.status.board import SourceKind
-from gateway.status.diagnostics import COMPONENTS_KEPT
-from gateway.status.values import Detections
 
 
 class Decoder:
     """Decodes the messages of one source.
 
     Args:
-        source: which reader, and how many items of a list.
-        message_type: the message's Python class.
+        source: its settings.
+        message_type: Python class of the messages.
     """
 
     def __init__(self, source: SourceSettings, message_type: Any) -> None:
         self._source = source
         self._message_type = message_type
         self._read = reader_for(source)
-        self._longest = longest_list(source)
+        self._max_items = max_list_items(source)
 
-    def decode(self, raw: bytes) -> Value | None:
-        """The value; None when the message holds nothing that can be used. Raises what the decoder raises."""
-        raw, left_out = cut(raw, self._longest) if self._longest else (raw, 0)
+    def decode(self, raw: bytes) -> Any:
+        """Returns the value; None if the message holds nothing usable. Errors of the deserialiser pass."""
+        raw, truncated = truncate_list(raw, self._max_items) if self._max_items else (raw, 0)
         value = self._read(deserialize_message(raw, self._message_type), self._source)
-        if left_out and isinstance(value, Detections):
-            return replace(value, count=value.count + left_out)
-        return value
+        add_truncated = self._source.spec.add_truncated
+        return add_truncated(value, truncated) if truncated and add_truncated and value else value
 
 
-def longest_list(source: SourceSettings) -> int | None:
-    """How many items of a message's list are wanted; None where the message is not a header and a list."""
-    if not is_header_and_list(source):
-        return None
-    return COMPONENTS_KEPT if source.kind is SourceKind.DIAGNOSTICS else source.max_items
+def max_list_items(source: SourceSettings) -> int | None:
+    """Returns the length to truncate lists to; None if the message is not a header and a list."""
+    return (source.spec.max_items or source.max_items) if is_header_and_list(source) else None

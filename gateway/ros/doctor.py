@@ -1,27 +1,25 @@
-"""What ROS 2 on this machine can do for the gateway: middleware, domain, message types, who publishes."""
+"""Examines ROS 2 on this machine: middleware, domain, message types, publishers."""
 
 import os
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from rclpy.utilities import get_rmw_implementation_identifier
-
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.config import SourceSettings
-from gateway.ros.lifetime import ros_node
-from gateway.ros.presence import presence_of
+from gateway.ros.lifetime import middleware_name, ros_node
+from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
-from gateway.ros.subscribing import TypeMissingError, message_class
+from gateway.ros.subscription import TypeMissingError, message_class
 
 DISCOVERY_S: Final = 3.0
-"""How long publishers are looked for; those of a running robot are usually found in a tenth of it."""
-_LOOK_EVERY_S: Final = 0.1
+"""Time limit for discovery; those of a running robot are usually found in a tenth of it."""
+_POLL_EVERY_S: Final = 0.1
 
 
 def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
-    """Looks at the ROS 2 graph for a moment, without subscribing to anything."""
+    """Yields the findings on the ROS 2 graph, without subscribing to anything."""
     yield from _environment()
     readable = []
     for source in sources:
@@ -31,13 +29,13 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
             readable.append(source)
     try:
         with ros_node("robot_gateway_doctor") as node:
-            yield good("ros", f"ROS 2 starts, with {get_rmw_implementation_identifier()}")
-            offers = _discover(node, readable)
+            yield good("ros", f"ROS 2 starts, with {middleware_name()}")
+            found = _discover(node, readable)
     except UserError as error:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)
         return
-    for source, publishers in offers:
-        yield _offer_finding(source, publishers)
+    for source, publishers in found:
+        yield _topic_finding(source, publishers)
 
 
 def _environment() -> Iterator[Finding]:
@@ -48,7 +46,7 @@ def _environment() -> Iterator[Finding]:
         yield wrong(
             "ros.discovery",
             "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF",
-            "No publisher is found by itself",
+            "Publishers are not discovered",
             "Unset it, or set it to LOCALHOST or SUBNET",
         )
 
@@ -71,41 +69,41 @@ def _type_finding(source: SourceSettings) -> Finding:
 
 
 def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any]]]:
-    """Who offers each source, as soon as each has somebody, or when time is up."""
+    """Returns the publishers of each source, once each has one or the time limit is reached."""
     until_s = time.monotonic() + DISCOVERY_S
     while True:
-        offers = [(source, list(node.get_publishers_info_by_topic(source.topic))) for source in sources]
-        if all(publishers for _, publishers in offers) or time.monotonic() >= until_s:
-            return offers
-        # Nothing tells of a new publisher unless somebody spins, and nobody does.
-        time.sleep(_LOOK_EVERY_S)
+        found = [(source, list(node.get_publishers_info_by_topic(source.topic))) for source in sources]
+        if all(publishers for _, publishers in found) or time.monotonic() >= until_s:
+            return found
+        # Polled: graph events need an executor that spins.
+        time.sleep(_POLL_EVERY_S)
 
 
-def _offer_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
+def _topic_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
     check = f"topic.{source.name}"
     if not publishers:
-        tell = wrong if source.required else note
-        return tell(
+        report = wrong if source.required else note
+        return report(
             check,
-            f"nobody publishes {source.topic}",
-            f"{source.name} can't come",
-            "Start the program that makes it, in the same domain; look with: ros2 topic list",
+            f"nothing publishes {source.topic}",
+            f"{source.name} can't be received",
+            "Start the program that publishes it, in the same domain; to check, type: ros2 topic list",
         )
-    presence = presence_of(source, publishers)
-    if presence.wrong_type:
+    verdict = publishers_of(source, publishers)
+    if verdict.wrong_type:
         types = sorted({each.topic_type for each in publishers})
         return wrong(
             check,
-            f"{source.topic} is published as {', '.join(types)}, configured is {source.type}",
-            f"{source.name} can't come",
+            f"{source.topic} is published as {', '.join(types)}, but configured as {source.type}",
+            f"{source.name} can't be received",
             f"Set the type of this source to {types[0]}",
         )
-    if presence.qos_mismatch:
+    if verdict.qos_mismatch:
         return wrong(
             check,
-            f"{source.topic} is published with another quality of service: {presence.qos_mismatch}",
-            "The middleware connects only what fits: nothing arrives",
-            "Set reliability to best_effort and durability to volatile for this source: they take all",
+            f"{source.topic} is published with an incompatible QoS: {verdict.qos_mismatch}",
+            "The middleware does not connect the two: nothing arrives",
+            "Set reliability to best_effort and durability to volatile for this source: they fit all",
         )
     return good(check, f"{source.topic}: {len(publishers)} publishing")
 

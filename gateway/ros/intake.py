@@ -9,11 +9,11 @@ from typing import Any
 
 from gateway.config import SourceSettings
 from gateway.ros.lifetime import ros_node
-from gateway.ros.presence import PresenceWatch
+from gateway.ros.publishers import PublisherMonitor
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
-from gateway.ros.subscribing import TypeMissingError, subscribe
+from gateway.ros.subscription import TypeMissingError, subscribe
 from gateway.status.board import Board
 
 log = logging.getLogger(__name__)
@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Intake:
-    """What is running: the sampler and its sources by name, for whoever watches over them."""
+    """The running sampler, and its sources by name."""
 
     sampler: Sampler
     sources: Mapping[str, Source]
@@ -31,19 +31,19 @@ class Intake:
 def intake(
     settings: Sequence[SourceSettings], board: Board, *, rate_hz: float = SAMPLING_HZ
 ) -> Iterator[Intake]:
-    """Reads the sources onto the board until the block ends; entering takes about 0.1 s, leaving as long.
+    """Reads the sources onto the board until the block ends; entering and leaving take about 0.1 s each.
 
-    A source whose message type is not installed is noted in `board.unusable` and left out.
+    A source whose message type is not installed is recorded in `board.unusable` and left out.
 
     Raises:
-        UserError: rclpy is missing or can't start, or no reader knows a configured type.
+        UserError: rclpy is missing or can't start, or a configured type has no reader.
     """
     for source in settings:
-        reader_for(source)  # a mistake in the configuration shows before anything starts
+        reader_for(source)  # reports a mistake in the configuration before anything starts
     with ros_node("robot_gateway") as node:
         sources = dict(_open(node, settings, board))
-        presence = PresenceWatch(node, [source for source in settings if source.name in sources], board)
-        with Sampler((*sources.values(), presence), rate_hz) as sampler:
+        monitor = PublisherMonitor(node, [source for source in settings if source.name in sources], board)
+        with Sampler((*sources.values(), monitor), rate_hz) as sampler:
             yield Intake(sampler, sources)
 
 
@@ -52,7 +52,7 @@ def _open(node: Any, settings: Sequence[SourceSettings], board: Board) -> Iterat
         try:
             subscription = subscribe(node, source)
         except TypeMissingError as error:
-            board.unusable[source.name] = str(error)
+            board.unusable[source.spec] = str(error)
             log.warning("source '%s' is not read: %s", source.name, error)
         else:
             yield source.name, Source(source, subscription, board, created_at_s=time.monotonic())

@@ -1,8 +1,8 @@
-"""How long the gateway is part of the ROS 2 graph: exactly as long as a `with` block.
+"""The gateway's node in the ROS 2 graph exists exactly as long as a `with` block.
 
 Domain, middleware and discovery range come from the environment (ROS_DOMAIN_ID, RMW_IMPLEMENTATION,
-ROS_AUTOMATIC_DISCOVERY_RANGE), as everywhere in ROS 2. Nothing of the process is touched: own context, no
-signal handlers, no log files, none of the services an ordinary node offers.
+ROS_AUTOMATIC_DISCOVERY_RANGE), as everywhere in ROS 2. The process is left alone: own context, no signal
+handlers, no log files, none of the services of an ordinary node.
 """
 
 from collections.abc import Iterator
@@ -12,10 +12,13 @@ from typing import Any
 from common.errors import UserError
 from common.ros_environment import check_domain
 
+# intake.py and doctor.py import this module before the others that need rclpy, so that its absence ends in
+# this error.
 try:
     from rclpy.context import Context
     from rclpy.node import Node
     from rclpy.parameter import Parameter
+    from rclpy.utilities import get_rmw_implementation_identifier
 except ImportError as error:
     raise UserError(
         f"ROS 2 can't be used from Python ({error})",
@@ -23,9 +26,14 @@ except ImportError as error:
     ) from error
 
 
+def middleware_name() -> str:
+    """Returns the name of the middleware in use: "rmw_fastrtps_cpp" for example."""
+    return str(get_rmw_implementation_identifier())
+
+
 @contextmanager
 def ros_node(name: str) -> Iterator[Any]:
-    """A node named `name` that only ever reads; gone from the graph when the block ends.
+    """Yields a node that only reads; it leaves the graph when the block ends.
 
     Raises:
         UserError: the environment names an impossible domain, or the middleware can't start.

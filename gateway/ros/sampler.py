@@ -1,7 +1,7 @@
-"""The one thread that reads ROS: it looks at every source some twenty times a second. No executor spins.
+"""The one thread that reads ROS: it polls every source some twenty times a second. No executor spins.
 
-Waking up for each message costs by the message; looking at fixed times costs by the clock. An operator's
-screen can't show more than twenty values a second anyway, and a value's age is exact whenever it is fetched.
+An executor wakes up for every message, polling costs the same at any message rate. An operator's screen can't
+show more than twenty values a second, and a value's age is exact whenever it is fetched.
 """
 
 import threading
@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Final, Protocol, Self
 
 SAMPLING_HZ: Final = 20.0
-"""How often each source is looked at: a value waits at most 50 ms for its turn."""
+"""How often each source is polled: a value waits at most 50 ms."""
 
 _STOP_WITHIN_S = 5.0
 
@@ -24,10 +24,10 @@ class Takes(Protocol):
 
 
 class Sampler:
-    """Runs `take` of every source at fixed times, from `__enter__` to `__exit__`.
+    """Calls `take` of every source at fixed times, from `__enter__` to `__exit__`.
 
     Args:
-        sources: looked at one after the other.
+        sources: polled one after the other.
         rate_hz: how often.
     """
 
@@ -35,7 +35,7 @@ class Sampler:
         self._sources = tuple(sources)
         self._period_s = 1 / rate_hz
         self._stop = threading.Event()
-        # A daemon, so that a middleware that never returns can't keep a gateway alive that was told to end.
+        # A daemon, so that a middleware call that never returns can't prevent the process from exiting.
         self._thread = threading.Thread(target=self._run, name="ros-sampler", daemon=True)
         self.last_pass_at_s: float | None = None
         """When the newest pass ended, in monotonic seconds; None before the first."""
@@ -58,5 +58,5 @@ class Sampler:
             for source in self._sources:
                 source.take()
             self.last_pass_at_s = time.monotonic()
-            # Late passes are not made up for: the next one would find nothing new.
+            # Missed passes are skipped, not repeated: they would find nothing new.
             due_s = max(due_s + self._period_s, self.last_pass_at_s)

@@ -2,7 +2,7 @@
 
 import grpc
 
-from gateway.access.watch import TlsMaterial
+from gateway.access.reloader import TlsMaterial
 
 
 class ServerTls:
@@ -16,7 +16,7 @@ class ServerTls:
     """
 
     def __init__(self, material: TlsMaterial) -> None:
-        self._insists = material.client_authority is not None
+        self._insists = material.client_ca is not None
         self._configuration = self._given = _configuration(material)
 
     def use(self, material: TlsMaterial) -> None:
@@ -43,5 +43,5 @@ class ServerTls:
 def _configuration(material: TlsMaterial) -> grpc.ServerCertificateConfiguration:
     server = material.server
     return grpc.ssl_server_certificate_configuration(
-        [(server.key, server.certificate)], root_certificates=material.client_authority
+        [(server.key, server.certificate)], root_certificates=material.client_ca
     )

@@ -1,1 +1,1 @@
-"""What the gateway knows and what follows from it. Pure: no ROS, no gRPC, no protobuf, no clock."""
+"""The status and what follows from it. Pure: no ROS, no gRPC, no protobuf, no clock."""

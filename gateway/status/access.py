@@ -1,22 +1,22 @@
-"""What guards the gateway, as far as the operators should know how it is doing."""
+"""The state of authentication and encryption, as far as operators should know it."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class CertificateEnd:
-    """A certificate that ends some day.
+class CertificateExpiry:
+    """A certificate and its end of validity.
 
     Attributes:
-        key: short and stable, "server_certificate" for example.
-        words: the same for people.
-        ends_on: the day, as "2027-03-01".
-        left_s: until then; negative when it is over.
+        key: short and stable; "server_certificate" for example.
+        name: the name for people.
+        ends_on: last day of validity as "2027-03-01".
+        left_s: seconds until then; negative after it.
         remedy: what to type.
     """
 
     key: str
-    words: str
+    name: str
     ends_on: str
     left_s: float
     remedy: str
@@ -24,17 +24,17 @@ class CertificateEnd:
 
 @dataclass(frozen=True, slots=True)
 class AccessView:
-    """At one instant.
+    """The state at one instant.
 
     Attributes:
-        certificates: that TLS depends on.
-        trouble: why the newest credentials are not in force; empty when they are.
-        audit_trouble: why the audit log is not written; empty when it is.
+        certificates: those that TLS depends on.
+        credentials_error: why the newest credentials are not in force; empty if they are.
+        audit_error: why the audit log can't be written; empty if it can.
     """
 
-    certificates: tuple[CertificateEnd, ...] = ()
-    trouble: str = ""
-    audit_trouble: str = ""
+    certificates: tuple[CertificateExpiry, ...] = ()
+    credentials_error: str = ""
+    audit_error: str = ""
 
 
 UNGUARDED = AccessView()

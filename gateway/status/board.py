@@ -1,80 +1,54 @@
-"""The board: the newest value of every source, handed over from the threads that read to the asyncio loop.
+"""The board: the newest value of every source, handed over from the sampling threads to the asyncio loop.
 
-A slot is written by one reference assignment and read by one reference read, which CPython makes atomic;
-there is no lock, no queue and nobody waits. An older value is simply gone.
+Each hand-over is one assignment of an immutable value under a key that hashes by identity, which is atomic in
+CPython. So there is no lock and no queue, and neither side waits; an older value is dropped.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import Enum
+from dataclasses import dataclass
+from typing import Any
 
-from gateway.status.access import UNGUARDED, AccessView
-from gateway.status.values import (
-    Battery,
-    CommandSource,
-    Compute,
-    Detections,
-    Diagnostics,
-    Mode,
-    Network,
-    Odometry,
-    Received,
-    Velocity,
-    Vision,
-)
-
-
-class SourceKind(Enum):
-    """What a source tells about the robot."""
-
-    ODOMETRY = "odometry"
-    VISION = "vision"
-    DETECTIONS = "detections"
-    BATTERY = "battery"
-    DIAGNOSTICS = "diagnostics"
-    MODE = "mode"
-    EFFECTIVE_COMMAND = "effective_command"
-    """What the robot's command mux lets through."""
-    MUX_INPUT = "mux_input"
-    """What one of those who may command asks for; several, told apart by their CommandSource."""
+from gateway.status.sources import SourceSpec, ValueT
+from gateway.status.values import Received
 
 
 @dataclass(frozen=True, slots=True)
-class Presence:
-    """Who offers a source on the robot's message bus at this moment.
+class Publishers:
+    """The publishers of a source's topic in the ROS graph.
 
     Attributes:
-        offered_by: how many publishers there are, of whatever type.
-        qos_mismatch: how each of them excludes us by its quality of service, in words; else empty.
-        wrong_type: whether each of them publishes another type than configured.
+        count: how many there are, of any type.
+        qos_mismatch: why the QoS of each of them is incompatible with the gateway's; empty if one fits.
+        wrong_type: whether all of them publish another type than configured.
     """
 
-    offered_by: int
+    count: int
     qos_mismatch: str = ""
     wrong_type: bool = False
 
 
-@dataclass(slots=True)
 class Board:
-    """One slot per source; None until the first value arrives. Each slot has one writer."""
+    """The newest value by source. Each source has exactly one writing thread; any thread may read.
 
-    odometry: Received[Odometry] | None = None
-    vision: Received[Vision] | None = None
-    detections: Received[Detections] | None = None
-    battery: Received[Battery] | None = None
-    """The traction battery, as the robot's message bus tells it."""
-    diagnostics: Received[Diagnostics] | None = None
-    mode: Received[Mode] | None = None
-    effective_command: Received[Velocity] | None = None
-    mux_inputs: Mapping[CommandSource, Received[Velocity]] = field(default_factory=dict)
-    """The newest command of each input that has spoken; replaced as a whole, never changed."""
-    compute: Received[Compute] | None = None
-    network: Received[Network] | None = None
-    onboard_battery: Received[Battery] | None = None
-    """The computer's own battery, as its operating system tells it."""
-    access: AccessView = UNGUARDED
-    """How the gateway's own door is doing."""
-    presence: dict[str, Presence] = field(default_factory=dict)
-    """Who offers each source, by its name ("odometry", "mux_input.keyboard")."""
-    unusable: dict[str, str] = field(default_factory=dict)
-    """Sources by name that can't deliver (message type not installed), with the reason for the log."""
+    Attributes:
+        publishers: by source; a source is absent until the graph was examined.
+        unusable: sources that can't be subscribed (message type not installed), with the reason for the log.
+    """
+
+    __slots__ = ("_newest", "publishers", "unusable")
+
+    def __init__(self, newest: Mapping[SourceSpec[Any], Received[Any]] | None = None) -> None:
+        self._newest: dict[SourceSpec[Any], Received[Any]] = dict(newest or {})
+        self.publishers: dict[SourceSpec[Any], Publishers] = {}
+        self.unusable: dict[SourceSpec[Any], str] = {}
+
+    def __getitem__(self, spec: SourceSpec[ValueT]) -> Received[ValueT] | None:
+        """Returns the newest value; None before the first."""
+        return self._newest.get(spec)
+
+    def __setitem__(self, spec: SourceSpec[ValueT], received: Received[ValueT]) -> None:
+        """Replaces the newest value, merging it with the present one where the spec says so."""
+        present = self._newest.get(spec)
+        if spec.merge and present:
+            received = Received(spec.merge(present.value, received.value), received.at_s)
+        self._newest[spec] = received

@@ -1,37 +1,62 @@
-"""What counts as a change of the status: everything an operator would act on, and no age.
+"""Change detection: what wakes the clients that watch the status.
 
-Two snapshots whose `essence` is equal tell the same story at two instants. Left out are ages (they grow by
-themselves), the uptime, and the counts of calls and clients (a watcher's own looks would be news to it).
+Total by construction: a source counts unless its spec excludes it, and each field of the snapshot has a
+projection here or is named in EXCLUDED.
 """
 
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from operator import attrgetter
+from typing import Any, Final
 
+from gateway.status.fault import Fault
 from gateway.status.freshness import Sample
+from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Snapshot
+from gateway.status.source_view import SourceView
+from gateway.status.sources import SourceSpec
+
+EXCLUDED: Final = frozenset({"at_s", "gateway", "events", "access"})
+"""Time; counters that the watchers' own calls advance; events, which have their own stream; the access state,
+whose problems are faults."""
 
 
-def essence(snapshot: Snapshot) -> tuple[Any, ...]:
-    """To be compared with another one; nothing else."""
-    return (
-        snapshot.identity,
-        snapshot.health,
-        _value(snapshot.odometry),
-        _value(snapshot.vision),
-        _value(snapshot.battery),
-        _value(snapshot.mode),
-        _value(snapshot.command),
-        _value(snapshot.compute),
-        _value(snapshot.network),
-        _value(snapshot.onboard_battery),
-        replace(snapshot.preview, measured=None),
-        _value(snapshot.preview_measured),
-        tuple(
-            (source.name, source.state, source.freshness.stale, source.detail) for source in snapshot.sources
-        ),
-        tuple((fault.condition, fault.onset_s, fault.cleared_s) for fault in snapshot.faults),
-    )
+def change_key(snapshot: Snapshot) -> tuple[Any, ...]:
+    """Returns a key that differs between two snapshots when an operator would act on the difference.
+
+    It holds no ages: they grow by themselves.
+    """
+    return tuple([project(getattr(snapshot, field)) for field, project in PROJECTIONS.items()])
 
 
-def _value(sample: Sample[Any]) -> tuple[Any, bool]:
+def _whole(value: object) -> object:
+    return value
+
+
+def _value_and_staleness(sample: Sample[Any]) -> tuple[Any, bool]:
     return sample.value, sample.freshness.stale
+
+
+def _samples(samples: Mapping[SourceSpec[Any], Sample[Any]]) -> object:
+    return [(each.value, each.freshness.stale) for spec, each in samples.items() if spec.in_change_key]
+
+
+def _sources(sources: tuple[SourceView, ...]) -> object:
+    return [(each.spec, each.state, each.freshness.stale, each.detail) for each in sources]
+
+
+def _faults(faults: tuple[Fault, ...]) -> object:
+    return [(each.condition, each.onset_s, each.cleared_s) for each in faults]
+
+
+PROJECTIONS: Final[Mapping[str, Callable[[Any], object]]] = {
+    "identity": _whole,
+    "health": _whole,
+    "samples": _samples,
+    "command": _value_and_staleness,
+    # The measurement is the next field: its time of reception is no change.
+    "preview": attrgetter(*(field.name for field in fields(PreviewView) if field.name != "measured")),
+    "preview_measured": _value_and_staleness,
+    "sources": _sources,
+    "faults": _faults,
+}

@@ -1,7 +1,7 @@
-"""The velocity command that the robot follows, and who gave it.
+"""The velocity command that the robot follows, and the input of the command mux that it is attributed to.
 
-The robot's command mux lets one of its inputs through and doesn't say which. What it emits is attributed to
-the input that spoke last, and only when that one just asked for the same; in every doubt to nobody.
+A mux forwards one of its inputs without naming it. Its output is attributed to the input that was received
+last, and only if that one requested the same velocity just before; in doubt it stays unattributed.
 """
 
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ from gateway.status.freshness import Sample, sample
 from gateway.status.values import CommandSource, Received, Velocity
 
 TOLERANCE: Final = 0.02
-"""m/s and rad/s: a ramp changes that much between two messages, and both are not read at one instant."""
+"""m/s and rad/s: a ramp changes that much between two messages, and the two are not read at one instant."""
 TOGETHER_S: Final = 0.25
-"""An input that old when the mux emitted is not what it emitted."""
+"""Largest time between the mux's output and the input that it may have forwarded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What the robot is told to do; `source` is None when nobody can be named."""
+    """The effective command; `source` is None if it can't be attributed."""
 
     velocity: Velocity
     source: CommandSource | None
@@ -31,22 +31,22 @@ def effective_command(
     stale_after_ms: int,
     now_s: float,
 ) -> Sample[Command]:
-    """What the mux emitted last, and who asked for it.
+    """Returns the newest output of the mux and its source.
 
     Args:
         emitted: the newest command out of the mux.
-        inputs: the newest command of each of those who may command.
-        stale_after_ms: how long a command counts.
-        now_s: the moment to look at.
+        inputs: the newest command of each input.
+        stale_after_ms: age from which a command no longer counts.
+        now_s: the instant to look at.
     """
     seen = sample(emitted, stale_after_ms, now_s)
     if emitted is None:
         return Sample(None, seen.freshness)
-    source = _giver(emitted, inputs) if seen.freshness.fresh else None
+    source = _source(emitted, inputs) if seen.freshness.fresh else None
     return Sample(Command(emitted.value, source), seen.freshness)
 
 
-def _giver(
+def _source(
     emitted: Received[Velocity], inputs: Mapping[CommandSource, Received[Velocity]]
 ) -> CommandSource | None:
     if not inputs:

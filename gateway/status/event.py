@@ -1,39 +1,39 @@
-"""What can happen that an operator may want to know: one value per kind of event."""
+"""Events: what happened on the robot that an operator may want to know, one detail type per kind."""
 
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from gateway.status.faults.fault import Fault, Severity
+from gateway.status.fault import Fault, Severity
 from gateway.status.preview import PreviewState, Profile
 
 
 class ControlResult(Enum):
-    """What became of a control action."""
+    """How a control action ended."""
 
     ACCEPTED = "accepted"
     REFUSED = "refused"
     FAILED = "failed"
-    """By an error of our own."""
+    """By a defect of the gateway."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultRaised:
-    """A fault began, or grew worse."""
+    """A fault began or became more severe."""
 
     fault: Fault
 
 
 @dataclass(frozen=True, slots=True)
 class FaultCleared:
-    """A fault is over."""
+    """A fault ended."""
 
     fault: Fault
 
 
 @dataclass(frozen=True, slots=True)
 class PreviewChanged:
-    """The preview came to rest in another state, or another profile is in force."""
+    """The preview settled in another state, or with another profile."""
 
     state: PreviewState
     profile: Profile | None
@@ -42,7 +42,7 @@ class PreviewChanged:
 
 @dataclass(frozen=True, slots=True)
 class EncoderFallback:
-    """Another encoder than the first choice took over."""
+    """Another encoder than the preferred one took over."""
 
     running: str
     wanted: str
@@ -51,28 +51,31 @@ class EncoderFallback:
 
 @dataclass(frozen=True, slots=True)
 class ClientJoined:
-    """Somebody watches; `address` says from where."""
+    """A client has had a stream open for a while."""
 
     address: str
 
 
 @dataclass(frozen=True, slots=True)
 class ClientLeft:
-    """Somebody who was told of watches no more."""
+    """A client that had joined closed its last stream."""
 
     address: str
 
 
 @dataclass(frozen=True, slots=True)
 class ControlAction:
-    """Somebody asked for something that changes the robot.
+    """A call that changes the robot, or tried to; also what the audit log records.
 
     Attributes:
-        who: the caller's name where the gateway asks for one; else empty.
+        who: the caller's name; empty where callers are not authenticated.
         address: where the call came from.
         method: of the contract.
-        request: what was asked for, for a person.
-        answer: what was answered, for a person.
+        request: its parameters as text.
+        answer: what the caller was answered, as text.
+        role: the caller's; empty like `who`.
+        credential: ID of the one that was shown; empty like `who`.
+        request_id: as in the logs.
     """
 
     who: str
@@ -81,11 +84,14 @@ class ControlAction:
     request: str
     result: ControlResult
     answer: str
+    role: str = ""
+    credential: str = ""
+    request_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class ModeChanged:
-    """The robot is about something else; empty when it tells no mode any more."""
+    """The robot reports another mode; empty when it no longer reports one."""
 
     mode: str
 
@@ -103,14 +109,14 @@ Detail: TypeAlias = (
 
 
 @dataclass(frozen=True, slots=True)
-class News:
+class Event:
     """Something that has just happened.
 
     Attributes:
-        component: the part of the robot that it happened to, as operators call it.
-        message: what happened, for a person.
-        detail: the same for programs.
-        sentence: how the short list of the overlay tells it; None leaves it out there.
+        component: the affected part of the robot, by the operators' name for it.
+        message: for people.
+        detail: for programs.
+        sentence: its text in the overlay's short list; None leaves it out there.
     """
 
     severity: Severity
@@ -121,16 +127,16 @@ class News:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """News in their order.
+class LoggedEvent:
+    """Numbered, timestamped event.
 
     Attributes:
         sequence: counts from 1 in this run of the gateway.
-        at_s: on the gateway's monotonic clock.
-        unix_ms: what the calendar clock showed.
+        at_s: seconds, on the gateway's monotonic clock.
+        unix_ms: calendar clock, ms since 1970 (UTC).
     """
 
     sequence: int
     at_s: float
     unix_ms: int
-    news: News
+    event: Event

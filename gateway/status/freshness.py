@@ -1,14 +1,14 @@
 """Whether a value was ever received, and whether it is too old to rely on."""
 
 from dataclasses import dataclass
-from typing import Final, Generic
+from typing import Any, Final, Generic
 
 from gateway.status.values import Received, ValueT_co
 
 
 @dataclass(frozen=True, slots=True)
 class Freshness:
-    """How far a value can be relied on; `age_ms` is 0 when none was received."""
+    """Availability, staleness and age of a value; `age_ms` is 0 if none was received."""
 
     available: bool
     stale: bool
@@ -16,7 +16,7 @@ class Freshness:
 
     @property
     def fresh(self) -> bool:
-        """Received, and not too old."""
+        """Whether a value was received and is not too old."""
         return self.available and not self.stale
 
 
@@ -25,18 +25,21 @@ NEVER: Final = Freshness(available=False, stale=False, age_ms=0)
 
 @dataclass(frozen=True, slots=True)
 class Sample(Generic[ValueT_co]):
-    """A value as it stood at one instant: None exactly when it is not available."""
+    """A value at one instant; None exactly if it is not available."""
 
     value: ValueT_co | None
     freshness: Freshness
 
 
-def sample(received: Received[ValueT_co] | None, stale_after_ms: int, now_s: float) -> Sample[ValueT_co]:
-    """The value at `now_s`; stale when strictly older than `stale_after_ms`.
+ABSENT: Final[Sample[Any]] = Sample(None, NEVER)
 
-    A value that was handed over after `now_s` was read has the age 0.
+
+def sample(received: Received[ValueT_co] | None, stale_after_ms: int, now_s: float) -> Sample[ValueT_co]:
+    """Returns the value at `now_s`; stale if strictly older than `stale_after_ms`.
+
+    A value that another thread received after `now_s` was read has the age 0.
     """
     if received is None:
-        return Sample(None, NEVER)
+        return ABSENT
     age_ms = max(0, int((now_s - received.at_s) * 1000))
     return Sample(received.value, Freshness(available=True, stale=age_ms > stale_after_ms, age_ms=age_ms))

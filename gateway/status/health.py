@@ -1,5 +1,6 @@
-"""Whether the robot can be relied on: the first rule that applies decides."""
+"""The robot's health: the first rule that applies decides."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -8,7 +9,7 @@ from gateway.status.freshness import Freshness
 
 
 class HealthState(Enum):
-    """One word for it."""
+    """Overall verdict."""
 
     OK = "ok"
     DEGRADED = "degraded"
@@ -16,7 +17,7 @@ class HealthState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """One word and one sentence."""
+    """The verdict and its reason in one sentence."""
 
     state: HealthState
     summary: str
@@ -30,18 +31,15 @@ class Health:
 HEALTHY: Final = Health(HealthState.OK, "robot healthy")
 
 
-def assess(odometry: Freshness | None, vision: Freshness | None) -> Health:
-    """Applies the rules in the field's order. None: this robot is not required to have the source."""
-    if odometry and not odometry.available:
-        return _degraded("waiting for odometry")
-    if odometry and odometry.stale:
-        return _degraded("odometry stale")
-    if vision and not vision.available:
-        return _degraded("waiting for vision telemetry")
-    if vision and vision.stale:
-        return _degraded("vision telemetry stale")
+def assess(required: Iterable[tuple[str, Freshness]]) -> Health:
+    """Returns the health that follows from the required sources.
+
+    Args:
+        required: name and freshness of each, the most important first.
+    """
+    for name, freshness in required:
+        if not freshness.available:
+            return Health(HealthState.DEGRADED, f"waiting for {name}")
+        if freshness.stale:
+            return Health(HealthState.DEGRADED, f"{name} stale")
     return HEALTHY
-
-
-def _degraded(summary: str) -> Health:
-    return Health(HealthState.DEGRADED, summary)

@@ -1,4 +1,4 @@
-"""The live preview as the gateway knows it."""
+"""The state of the live preview."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -7,7 +7,7 @@ from gateway.status.values import Received
 
 
 class PreviewState(Enum):
-    """Where the preview is in its life."""
+    """Lifecycle state of the preview."""
 
     DISABLED = "disabled"
     STARTING = "starting"
@@ -17,7 +17,7 @@ class PreviewState(Enum):
 
 
 class Profile(Enum):
-    """How much bandwidth the preview may take."""
+    """Bandwidth profile of the preview."""
 
     LOW_BW = "LOW_BW"
     BALANCED = "BALANCED"
@@ -25,7 +25,7 @@ class Profile(Enum):
 
 
 class Codec(Enum):
-    """How the pictures are compressed."""
+    """Video codec."""
 
     H264 = "H.264"
     H265 = "H.265"
@@ -33,7 +33,7 @@ class Codec(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Where the robot listens for viewers (SRT over UDP)."""
+    """The SRT listener for viewers: UDP port, and latency as SRTO_RCVLATENCY in ms."""
 
     port: int
     latency_ms: int
@@ -41,7 +41,7 @@ class Listener:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What a pipeline makes. The codec is None until the encoder is chosen."""
+    """The stream that the pipeline produces. The codec is None until an encoder is selected."""
 
     width_px: int
     height_px: int
@@ -54,7 +54,7 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class Encoder:
-    """Which encoder runs, which was wanted, and why it is not that one."""
+    """The running encoder, the preferred one, and why that one does not run."""
 
     name: str
     hardware: bool
@@ -64,7 +64,7 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """Figures of the running stream. The worst of all viewers is None without viewers."""
+    """Measurements of the running stream. The worst values of all viewers are None without viewers."""
 
     fps: float
     bitrate_kbps: float
@@ -76,7 +76,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """How often things happened. They only grow."""
+    """Monotonic counters since the gateway started."""
 
     starts: int = 0
     restarts: int = 0
@@ -86,15 +86,15 @@ class Counters:
 
 @dataclass(frozen=True, slots=True)
 class PreviewView:
-    """Everything a client may learn of the preview. A change of anything makes a new object.
+    """The state of the preview for clients. Any change makes a new object.
 
     Attributes:
-        profile: the one in force, or the one the next enable will use; None when none was ever chosen.
-        last_error: what went wrong and what to do; empty when the preview works.
-        listener: None until the preview service has told it.
+        profile: the one in force, or the one of the next start; None if none was ever selected.
+        last_error: the error and its remedy; empty if the preview works.
+        listener: None until the preview service has reported it.
         stream: None while no pipeline exists; so is `encoder`.
         measured: None before the first measurement of this run.
-        passphrase: of this session; empty when the stream is not encrypted.
+        passphrase: of this session; empty if the stream is not encrypted.
     """
 
     state: PreviewState

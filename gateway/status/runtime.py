@@ -1,4 +1,4 @@
-"""The gateway program itself, as operators may know it."""
+"""The gateway process as the status describes it."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,15 +6,16 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Runtime:
-    """What changes while the gateway runs, and which build it is.
+    """Build and counters of the running gateway.
 
     Attributes:
-        revision: of the source it was built from; empty when unknown.
-        boot_id: another one after each start of the computer; empty when unknown.
-        run_id: another one after each start of the gateway program; it numbers the events.
-        client_count: connections that asked for something lately.
+        revision: source revision of the build; empty if unknown.
+        boot_id: the kernel's boot ID; empty if unknown.
+        uptime_ms: since the gateway started.
+        client_count: connections with a recent request.
         requests_served: calls answered since the start.
         requests_refused: calls refused since the start.
+        run_id: unique for each start of the gateway; qualifies the sequence numbers of events.
     """
 
     revision: str

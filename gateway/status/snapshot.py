@@ -1,37 +1,35 @@
-"""One instant of everything: the newest values, their freshness and the verdict that follows."""
+"""The snapshot: the newest values of one instant, their freshness, and the health that follows from them."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
 
 from gateway.status.access import UNGUARDED, AccessView
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
 from gateway.status.command import Command, effective_command
-from gateway.status.events import OperatorEvent
-from gateway.status.faults.fault import Fault
-from gateway.status.freshness import Freshness, Sample, sample
+from gateway.status.event_log import OperatorEvent
+from gateway.status.fault import Fault
+from gateway.status.freshness import ABSENT, Sample, sample
 from gateway.status.health import Health, assess
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.runtime import UNKNOWN, Runtime
-from gateway.status.sources import SourceView, detail, state_of, words_for
-from gateway.status.values import (
-    Battery,
-    CommandSource,
-    Compute,
-    Detections,
-    Diagnostics,
-    Mode,
-    Network,
-    Odometry,
-    Vision,
+from gateway.status.source_view import SourceView, source_view
+from gateway.status.sources import (
+    EFFECTIVE_COMMAND,
+    MUX_INPUTS,
+    PLATFORM_SOURCES,
+    SOURCES,
+    SourceSpec,
+    ValueT,
 )
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
+_HEALTH_SOURCES: Final = tuple(spec for spec in SOURCES if spec.health_name)
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Which gateway speaks, and whether anybody on the network may listen in."""
+    """Name and version of the gateway, and whether it serves unencrypted or without authentication."""
 
     name: str
     version: str
@@ -40,7 +38,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class SourceRule:
-    """What is expected of one source."""
+    """The expectations of one source."""
 
     stale_after_ms: int
     required: bool
@@ -48,48 +46,39 @@ class SourceRule:
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """What is expected of everything. A kind that is not in `sources` is not configured."""
+    """The expectations of all sources; `sources` holds the configured ones in the order they are shown."""
 
-    sources: Mapping[SourceKind, SourceRule]
-    """All but the mux inputs."""
+    sources: Mapping[SourceSpec[Any], SourceRule]
     platform_stale_after_ms: int
-    mux_inputs: Mapping[CommandSource, SourceRule] = field(default_factory=dict)
-
-    def stale_after_ms(self, kind: SourceKind) -> int:
-        """The limit of a source; 0 for one that is not configured, and so never has a value."""
-        rule = self.sources.get(kind)
-        return rule.stale_after_ms if rule else 0
-
-    def if_required(self, kind: SourceKind, freshness: Freshness) -> Freshness | None:
-        """The freshness where the robot's health depends on it, else None."""
-        rule = self.sources.get(kind)
-        return freshness if rule and rule.required else None
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Everything at `at_s`."""
+    """The status at `at_s` (seconds, monotonic). Maps each source to its sample.
+
+    Attributes:
+        samples: of the configured sources and of the platform.
+        command: the effective command with the mux input it is attributed to.
+        sources: the state of each configured source.
+        events: the overlay's short list, oldest first.
+    """
 
     at_s: float
     identity: Identity
     gateway: Runtime
     health: Health
-    odometry: Sample[Odometry]
-    vision: Sample[Vision]
-    detections: Sample[Detections]
-    battery: Sample[Battery]
-    diagnostics: Sample[Diagnostics]
-    mode: Sample[Mode]
+    samples: Mapping[SourceSpec[Any], Sample[Any]]
     command: Sample[Command]
-    compute: Sample[Compute]
-    network: Sample[Network]
-    onboard_battery: Sample[Battery]
     preview: PreviewView
     preview_measured: Sample[Measurement]
     sources: tuple[SourceView, ...]
     events: tuple[OperatorEvent, ...]
     faults: tuple[Fault, ...]
-    access: AccessView = UNGUARDED
+    access: AccessView
+
+    def __getitem__(self, spec: SourceSpec[ValueT]) -> Sample[ValueT]:
+        """Returns the sample of a source; an absent one if the source is not configured."""
+        return self.samples.get(spec, ABSENT)
 
 
 def take(
@@ -102,54 +91,45 @@ def take(
     now_s: float,
     faults: tuple[Fault, ...] = (),
     gateway: Runtime = UNKNOWN,
+    access: AccessView = UNGUARDED,
 ) -> Snapshot:
-    """What is true at `now_s`, from the newest values alone."""
-    odometry = sample(board.odometry, rules.stale_after_ms(SourceKind.ODOMETRY), now_s)
-    vision = sample(board.vision, rules.stale_after_ms(SourceKind.VISION), now_s)
+    """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
+    configured = rules.sources
+    samples = {spec: sample(board[spec], rule.stale_after_ms, now_s) for spec, rule in configured.items()}
+    for spec in PLATFORM_SOURCES:
+        samples[spec] = sample(board[spec], rules.platform_stale_after_ms, now_s)
     return Snapshot(
         at_s=now_s,
         identity=identity,
         gateway=gateway,
         health=assess(
-            rules.if_required(SourceKind.ODOMETRY, odometry.freshness),
-            rules.if_required(SourceKind.VISION, vision.freshness),
+            (spec.health_name, samples[spec].freshness)
+            for spec in _HEALTH_SOURCES
+            if spec in configured and configured[spec].required
         ),
-        odometry=odometry,
-        vision=vision,
-        detections=sample(board.detections, rules.stale_after_ms(SourceKind.DETECTIONS), now_s),
-        battery=sample(board.battery, rules.stale_after_ms(SourceKind.BATTERY), now_s),
-        diagnostics=sample(board.diagnostics, rules.stale_after_ms(SourceKind.DIAGNOSTICS), now_s),
-        mode=sample(board.mode, rules.stale_after_ms(SourceKind.MODE), now_s),
-        command=effective_command(
-            board.effective_command,
-            board.mux_inputs,
-            rules.stale_after_ms(SourceKind.EFFECTIVE_COMMAND),
-            now_s,
-        ),
-        compute=sample(board.compute, rules.platform_stale_after_ms, now_s),
-        network=sample(board.network, rules.platform_stale_after_ms, now_s),
-        onboard_battery=sample(board.onboard_battery, rules.platform_stale_after_ms, now_s),
+        samples=samples,
+        command=_command(rules, board, now_s),
         preview=preview,
         preview_measured=sample(preview.measured, MEASUREMENT_STALE_AFTER_MS, now_s),
-        sources=tuple(_sources(rules, board, now_s)),
+        sources=tuple(
+            source_view(
+                spec,
+                samples[spec].freshness,
+                board.publishers.get(spec),
+                required=rule.required,
+                unusable=spec in board.unusable,
+            )
+            for spec, rule in configured.items()
+        ),
         events=events,
         faults=faults,
-        access=board.access,
+        access=access,
     )
 
 
-def _sources(rules: Rules, board: Board, now_s: float) -> Iterator[SourceView]:
-    for kind, rule in rules.sources.items():
-        if kind is not SourceKind.MUX_INPUT:
-            seen = sample(getattr(board, kind.value), rule.stale_after_ms, now_s).freshness
-            yield _source(kind, kind.value, rule, seen, board)
-    for giver, rule in rules.mux_inputs.items():
-        seen = sample(board.mux_inputs.get(giver), rule.stale_after_ms, now_s).freshness
-        yield _source(SourceKind.MUX_INPUT, f"{SourceKind.MUX_INPUT.value}.{giver.value}", rule, seen, board)
-
-
-def _source(kind: SourceKind, name: str, rule: SourceRule, seen: Freshness, board: Board) -> SourceView:
-    presence = board.presence.get(name)
-    state = state_of(seen, presence, unusable=name in board.unusable)
-    words = words_for(name)
-    return SourceView(kind, name, words, state, seen, rule.required, detail(state, words, presence))
+def _command(rules: Rules, board: Board, now_s: float) -> Sample[Command]:
+    rule = rules.sources.get(EFFECTIVE_COMMAND)
+    if rule is None:
+        return ABSENT
+    inputs = {source: command for source, spec in MUX_INPUTS.items() if (command := board[spec])}
+    return effective_command(board[EFFECTIVE_COMMAND], inputs, rule.stale_after_ms, now_s)

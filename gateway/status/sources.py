@@ -1,91 +1,143 @@
-"""Every configured source as operators see it: whether it comes, and if not, why not."""
+"""The table of sources: an entry makes a kind known to board, snapshot, change detection, configuration.
 
-from collections.abc import Mapping
+docs/adding-a-source.md lists the steps that remain for a new kind: a reader and a field of the schema.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
-from typing import Final
+from enum import Enum, auto
+from typing import Any, Final, Generic, TypeVar
 
-from gateway.status.board import Presence, SourceKind
-from gateway.status.freshness import Freshness
+from gateway.status.values import (
+    MAX_COMPONENTS,
+    Battery,
+    CommandSource,
+    Compute,
+    Detections,
+    Diagnostics,
+    Mode,
+    Network,
+    Odometry,
+    Velocity,
+    Vision,
+)
 
+ValueT = TypeVar("ValueT")
 
-class SourceState(Enum):
-    """What is known of a source at one instant."""
-
-    WAITING = "waiting"
-    """Nothing has come, and nobody on the robot offers it."""
-    SILENT = "silent"
-    """Somebody offers it, and nothing has come."""
-    RECEIVING = "receiving"
-    STALE = "stale"
-    """It came once; the newest value is too old."""
-    QOS_MISMATCH = "qos_mismatch"
-    """It is offered with a quality of service that excludes ours, so nothing can come."""
-    WRONG_TYPE = "wrong_type"
-    """It is offered as another type than configured, so nothing can come."""
-    TYPE_MISSING = "type_missing"
-    """Its message type is not installed beside the gateway."""
+_DAY_MS: Final = 86_400_000
 
 
-@dataclass(frozen=True, slots=True)
-class SourceView:
-    """One configured source at one instant.
+class Origin(Enum):
+    """The thread that writes a source onto the board."""
+
+    ROS = auto()
+    """The ROS sampler, from a topic of the configuration."""
+    PLATFORM = auto()
+    """The platform sampler, from the operating system."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceSpec(Generic[ValueT]):
+    """Describes one source. Compared by identity: a spec is the key of its values in dictionaries.
 
     Attributes:
-        name: short and stable, for programs: "odometry".
-        words: the same for people.
-        detail: the state in a sentence; empty while all is well.
+        kind: `kind` of the configuration; "odometry" for example.
+        value_type: what its readers return.
+        label: distinguishes sources of the same kind; None where a kind has one source.
+        origin: the thread that writes it.
+        stale_after_ms: default age limit. Of a platform source the configuration's platform.stale_after_ms
+            applies instead.
+        queue_depth: depth of the subscription's KEEP_LAST history. With 1 the middleware drops older messages
+            before Python sees them, so that a faster topic costs next to nothing.
+        max_items: length to which lists are truncated before decoding; None: max_items of the configuration.
+        merge: combines the present value with a new one; None: the new one replaces it.
+        add_truncated: adds the number of list items that were truncated before decoding to a value.
+        health_name: name in the health summary; empty: the robot's health does not depend on the source.
+        quiet: published on change only, so silence is a fault only where the source is required.
+        in_change_key: whether a new value counts as a change of the status.
     """
 
-    kind: SourceKind
-    name: str
-    words: str
-    state: SourceState
-    freshness: Freshness
-    required: bool
-    detail: str
+    kind: str
+    value_type: type[ValueT]
+    label: CommandSource | None = None
+    origin: Origin = Origin.ROS
+    stale_after_ms: int = 1000
+    queue_depth: int = 1
+    max_items: int | None = None
+    merge: Callable[[ValueT, ValueT], ValueT] | None = None
+    add_truncated: Callable[[ValueT, int], ValueT] | None = None
+    health_name: str = ""
+    quiet: bool = False
+    in_change_key: bool = True
+
+    @property
+    def name(self) -> str:
+        """Unique, stable name for programs: "odometry", "mux_input.keyboard"."""
+        return f"{self.kind}.{self.label.value}" if self.label else self.kind
+
+    @property
+    def display_name(self) -> str:
+        """The name for people: "odometry", "commands of keyboard"."""
+        return f"commands of {self.label.value}" if self.label else self.kind.replace("_", " ")
 
 
-_SENTENCES: Final[Mapping[SourceState, str]] = {
-    SourceState.WAITING: "no {words} since the gateway started, and nobody on the robot offers it",
-    SourceState.SILENT: "the robot offers {words}, but nothing has arrived",
-    SourceState.RECEIVING: "",
-    SourceState.STALE: "{words} stopped coming",
-    SourceState.QOS_MISMATCH: "the robot offers {words} with delivery guarantees that exclude the gateway's",
-    SourceState.WRONG_TYPE: "the robot offers {words} in another form than the gateway is configured for",
-    SourceState.TYPE_MISSING: "{words} can't be read: its message type is not installed beside the gateway",
+ODOMETRY: Final = SourceSpec("odometry", Odometry, health_name="odometry")
+VISION: Final = SourceSpec("vision", Vision, stale_after_ms=2000, health_name="vision telemetry")
+DETECTIONS: Final = SourceSpec(
+    "detections",
+    Detections,
+    stale_after_ms=500,
+    add_truncated=Detections.with_truncated,
+    # The status carries no detections: the overlay, which does, is polled.
+    in_change_key=False,
+)
+BATTERY: Final = SourceSpec("battery", Battery, stale_after_ms=5000)
+"""The traction battery."""
+DIAGNOSTICS: Final = SourceSpec(
+    "diagnostics",
+    Diagnostics,
+    stale_after_ms=5000,
+    # Many programs publish on this one topic, each about its own components.
+    queue_depth=64,
+    max_items=MAX_COMPONENTS,
+    merge=Diagnostics.merged,
+    # Those that matter are faults, and faults are part of the change key.
+    in_change_key=False,
+)
+MODE: Final = SourceSpec("mode", Mode, stale_after_ms=_DAY_MS, quiet=True)
+EFFECTIVE_COMMAND: Final = SourceSpec("effective_command", Velocity, stale_after_ms=500, quiet=True)
+"""Output of the robot's command mux."""
+MUX_INPUTS: Final = {
+    label: SourceSpec(
+        "mux_input",
+        Velocity,
+        label,
+        stale_after_ms=500,
+        quiet=True,
+        # Not in the status: they only attribute the effective command, which is.
+        in_change_key=False,
+    )
+    for label in CommandSource
 }
-"""Total: every state in a sentence, free of the robot's own names."""
+"""The inputs of the robot's command mux."""
+COMPUTE: Final = SourceSpec("compute", Compute, origin=Origin.PLATFORM)
+NETWORK: Final = SourceSpec("network", Network, origin=Origin.PLATFORM)
+ONBOARD_BATTERY: Final = SourceSpec("onboard_battery", Battery, origin=Origin.PLATFORM)
+"""The computer's own battery, as its operating system reports it."""
 
-
-def words_for(name: str) -> str:
-    """A source's name for people: "odometry", "commands of keyboard"."""
-    kind, _, giver = name.partition(".")
-    return f"commands of {giver}" if giver else kind.replace("_", " ")
-
-
-def detail(state: SourceState, words: str, presence: Presence | None) -> str:
-    """The state of the source that operators call `words`, in a sentence; empty while all is well."""
-    if state is SourceState.RECEIVING and presence and presence.offered_by > 1:
-        return f"{presence.offered_by} programs offer {words}: what is shown may be of any of them"
-    if state is SourceState.STALE and presence and presence.offered_by == 0:
-        return f"{words} stopped coming: nobody on the robot offers it any more"
-    if state is SourceState.QOS_MISMATCH and presence:
-        return f"{_SENTENCES[state].format(words=words)}: {presence.qos_mismatch}"
-    return _SENTENCES[state].format(words=words)
-
-
-def state_of(freshness: Freshness, presence: Presence | None, *, unusable: bool) -> SourceState:
-    """The state that follows. Without `presence` nobody has looked who offers it."""
-    if unusable:
-        return SourceState.TYPE_MISSING
-    if freshness.fresh:
-        return SourceState.RECEIVING
-    if presence and presence.offered_by:
-        if presence.wrong_type:
-            return SourceState.WRONG_TYPE
-        if presence.qos_mismatch:
-            return SourceState.QOS_MISMATCH
-        if not freshness.available:
-            return SourceState.SILENT
-    return SourceState.STALE if freshness.available else SourceState.WAITING
+SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
+    ODOMETRY,
+    VISION,
+    DETECTIONS,
+    BATTERY,
+    DIAGNOSTICS,
+    MODE,
+    EFFECTIVE_COMMAND,
+    *MUX_INPUTS.values(),
+    COMPUTE,
+    NETWORK,
+    ONBOARD_BATTERY,
+)
+"""Every source. The health summary names the first one in this order that is missing."""
+ROS_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.ROS)
+PLATFORM_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.PLATFORM)

@@ -1,16 +1,19 @@
-"""What can be known of the robot: one frozen value per source, in SI units, free of ROS and of the wire.
+"""The values of the sources: one frozen dataclass per kind, in SI units, free of ROS and of protobuf.
 
-A value that is not known is None. Numbers are finite: readers drop NaN and infinity before they get here.
+Unknown values are None. Numbers are finite: the readers discard NaN and infinity.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Final, Generic, Self, TypeVar
+
+MAX_COMPONENTS: Final = 256
+"""Components whose diagnostics are kept; beyond it those are dropped that have been silent longest."""
 
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """How the robot moves, in its own frame: x forward, y left, z up."""
+    """Measured velocity in the robot's body frame (REP-105 base_link): x forward, y left, z up (REP-103)."""
 
     vx_mps: float
     vy_mps: float
@@ -19,7 +22,7 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Vision:
-    """What the vision process says of itself."""
+    """Telemetry of the vision process: rates, latency of the newest inference, error counts."""
 
     producer_fps: float
     consumer_fps: float
@@ -30,7 +33,7 @@ class Vision:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """One object, its box in pixels of the source image: x right, y down, origin upper left."""
+    """One detected object; its box in pixels of the source image: x right, y down, origin upper left."""
 
     class_id: int
     class_name: str
@@ -44,17 +47,21 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """The objects of one image. `count` is how many there were; `items` may hold fewer when capped."""
+    """The objects of one image. `count` is the number detected; `items` may hold fewer when capped."""
 
     source_width_px: int
     source_height_px: int
     count: int
     items: tuple[Detection, ...]
 
+    def with_truncated(self, truncated: int) -> Self:
+        """Returns the same items with the count raised by the objects that were not decoded."""
+        return replace(self, count=self.count + truncated)
+
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """One battery."""
+    """State of one battery."""
 
     present: bool
     voltage_v: float | None
@@ -64,7 +71,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Velocity:
-    """A velocity command, in the robot's own frame: x forward, y left, z up."""
+    """A velocity command in the robot's body frame: x forward, y left, z up (REP-103)."""
 
     vx_mps: float
     vy_mps: float
@@ -72,7 +79,7 @@ class Velocity:
 
 
 class CommandSource(Enum):
-    """Who may command the robot: the inputs of its command mux."""
+    """The inputs of the robot's command mux."""
 
     KEYBOARD = "keyboard"
     AUTONOMY = "autonomy"
@@ -81,24 +88,24 @@ class CommandSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """What the robot is about, in its own words: "idle", "exploring", "returning"."""
+    """The robot's mode of operation under its own name: "idle", "exploring", "returning"."""
 
     name: str
 
 
 class DiagnosticLevel(Enum):
-    """What a component of the robot says of itself."""
+    """Level of a diagnostic status (REP-107, diagnostic_msgs/DiagnosticStatus)."""
 
     OK = "ok"
     WARNING = "warning"
     ERROR = "error"
     STALE = "stale"
-    """Whoever watches the component has heard nothing from it for too long."""
+    """The component's monitor has received nothing from it for too long."""
 
 
 @dataclass(frozen=True, slots=True)
 class DiagnosticItem:
-    """The newest word of one component."""
+    """The newest diagnostic status of one component."""
 
     component: str
     level: DiagnosticLevel
@@ -107,25 +114,26 @@ class DiagnosticItem:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostics:
-    """The newest word of every component that spoke, whichever message it came in; who spoke last is last."""
+    """The newest status of every component; the one that reported last comes last."""
 
     items: tuple[DiagnosticItem, ...]
 
+    def merged(self, newer: "Diagnostics") -> "Diagnostics":
+        """Returns these statuses with those of `newer`, which replace the ones of the same components.
 
-ValueT_co = TypeVar("ValueT_co", covariant=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Received(Generic[ValueT_co]):
-    """A value and when it was received, in seconds on the gateway's monotonic clock."""
-
-    value: ValueT_co
-    at_s: float
+        A message names some of the components only (REP-107: every driver publishes its own).
+        """
+        items = {item.component: item for item in self.items}
+        for item in newer.items:
+            # Removed first: a dictionary keeps the place of a key that is assigned again.
+            items.pop(item.component, None)
+            items[item.component] = item
+        return Diagnostics(tuple(items.values())[-MAX_COMPONENTS:])
 
 
 @dataclass(frozen=True, slots=True)
 class Compute:
-    """The robot's computer: load, heat, memory, disk."""
+    """The robot's computer: load, temperature, memory, disk."""
 
     cpu_percent: float
     cpu_temperature_c: float | None
@@ -136,7 +144,7 @@ class Compute:
 
     @property
     def ram_used_percent(self) -> float:
-        """Memory in use, in percent of the installed."""
+        """Used memory in percent of the installed memory."""
         return 100.0 * self.ram_used_bytes / self.ram_total_bytes if self.ram_total_bytes else 0.0
 
 
@@ -148,3 +156,14 @@ class Network:
     connected: bool
     wifi_signal_dbm: int | None
     link_quality_percent: int | None
+
+
+ValueT_co = TypeVar("ValueT_co", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Received(Generic[ValueT_co]):
+    """A value with its time of reception in seconds on the gateway's monotonic clock."""
+
+    value: ValueT_co
+    at_s: float

@@ -1,42 +1,45 @@
-"""The list of encoders for a person or a program."""
+"""List of all encoders and their trials, for `robot-preview encoders`."""
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Final
 
 from rich.console import Console
 from rich.table import Table
 
-from preview.app import new_prober, preference
-from preview.config import PreviewSettings
 from preview.encoders.catalogue import Encoder
-from preview.selection import Verdict
+from preview.encoders.selection import Prober
 
 _WIDTH: Final = 160
+_HEADINGS: Final = ("encoder", "family", "element", "codec", "present", "proven", "first byte", "why not")
 
 
-async def try_all(settings: PreviewSettings) -> list[dict[str, Any]]:
-    """Tries every encoder, those that the configuration allows first."""
-    prober = new_prober(settings)
-    allowed = settings.encoders.allowed
+async def rows(
+    prober: Prober, encoders: Sequence[Encoder], allowed: Sequence[Encoder]
+) -> list[dict[str, Any]]:
+    """Tries the encoders in turn and returns one JSON object for each."""
     return [
-        _row(encoder, await prober.verdict(encoder), allowed=encoder.name in allowed)
-        for encoder in preference(settings)
+        {
+            "name": encoder.name,
+            "family": encoder.family,
+            "element": encoder.element,
+            "codec": encoder.codec.value,
+            "hardware": encoder.hardware,
+            "allowed": encoder in allowed,
+            **asdict(await prober.verdict(encoder)),
+        }
+        for encoder in encoders
     ]
 
 
-def table(rows: list[dict[str, Any]]) -> str:
-    """The rows for a person."""
-    view = Table(
-        "encoder", "family", "element", "codec", "present", "proven", "first byte", "why not", box=None
-    )
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Returns the rows as a table for a terminal."""
+    view = Table(*_HEADINGS, box=None)
     for row in rows:
         first_byte_ms = row["first_byte_ms"]
         view.add_row(
-            row["name"],
-            row["family"],
-            row["element"],
-            row["codec"],
-            "yes" if row["present"] else "no",
-            "yes" if row["proven"] else "no",
+            *(row[key] for key in ("name", "family", "element", "codec")),
+            *("yes" if row[key] else "no" for key in ("present", "proven")),
             "" if first_byte_ms is None else f"{first_byte_ms:.0f} ms",
             row["reason"],
         )
@@ -44,18 +47,3 @@ def table(rows: list[dict[str, Any]]) -> str:
     with console.capture() as capture:
         console.print(view)
     return capture.get().rstrip()
-
-
-def _row(encoder: Encoder, verdict: Verdict, *, allowed: bool) -> dict[str, Any]:
-    return {
-        "name": encoder.name,
-        "family": encoder.family,
-        "element": encoder.element,
-        "codec": encoder.codec.value,
-        "hardware": encoder.hardware,
-        "allowed": allowed,
-        "present": verdict.present,
-        "proven": verdict.proven,
-        "reason": verdict.reason,
-        "first_byte_ms": verdict.first_byte_ms,
-    }

@@ -1,8 +1,8 @@
-"""Which encoders this machine really has: each one is tried in a process of its own, once.
+"""Trials of encoders: which ones really encode on this machine.
 
-That an element exists says little: drivers refuse later, give nothing, give empty buffers, crash or hang. So
-a candidate counts only after it really encoded frames. A crash or a hang of the trial is a result like any
-other. Results are remembered for the life of this process.
+The existence of an element proves little: drivers refuse later, return nothing, return empty buffers, crash
+or hang. So an encoder counts as proven only after it has encoded frames, in a process of its own with a
+deadline; a crash or a hang is a result like any other. Results are cached for the life of this process.
 """
 
 import asyncio
@@ -14,18 +14,18 @@ from typing import Final
 
 from common.gst import Gst
 from preview.encoders.catalogue import Encoder
-from preview.selection import Verdict
+from preview.encoders.selection import Verdict
 from preview.values import Target
 
-_MAX_ANSWER_BYTES: Final = 64 * 1024
+_MAX_OUTPUT_BYTES: Final = 64 * 1024
 
 
-class Prober:
-    """Tries encoders, one at a time, and remembers.
+class TrialProber:
+    """Runs trials, one at a time, and caches their results.
 
     Args:
-        target: what they are tried with.
-        timeout_s: how long one trial may take, the start of its process included.
+        target: stream parameters of the trials.
+        timeout_s: deadline of one trial, start of its process included.
     """
 
     def __init__(self, target: Target, timeout_s: float) -> None:
@@ -36,7 +36,7 @@ class Prober:
 
     @property
     def verdicts(self) -> Mapping[str, Verdict]:
-        """What is known so far, by name."""
+        """Results so far, by encoder name."""
         return {
             name: trial.result()
             for name, trial in self._trials.items()
@@ -44,59 +44,58 @@ class Prober:
         }
 
     async def verdict(self, encoder: Encoder) -> Verdict:
-        """What came of trying it; tries it when that was not done yet."""
+        """Returns the result for one encoder; runs its trial when there is none."""
         trial = self._trials.get(encoder.name)
         if trial is None:
             trial = asyncio.create_task(self._try(encoder), name=f"trial of {encoder.name}")
             self._trials[encoder.name] = trial
-        # One who waits may give up; the trial goes on for the others.
+        # A cancelled caller does not cancel the trial: others may wait for it, too.
         return await asyncio.shield(trial)
 
     async def try_all(self, encoders: Iterable[Encoder]) -> None:
-        """Tries them in turn."""
+        """Runs the trials of these encoders, in order."""
         for encoder in encoders:
             await self.verdict(encoder)
 
     async def close(self) -> None:
-        """Ends trials that still run."""
+        """Cancels running trials and waits for their processes."""
         for trial in self._trials.values():
             trial.cancel()
         await asyncio.gather(*self._trials.values(), return_exceptions=True)
 
     async def _try(self, encoder: Encoder) -> Verdict:
         if Gst.ElementFactory.find(encoder.element) is None:
-            return Verdict(
-                present=False, proven=False, reason=f"there is no GStreamer element {encoder.element}"
-            )
+            reason = f"there is no GStreamer element {encoder.element}"
+            return Verdict(present=False, proven=False, reason=reason)
         async with self._one_at_a_time:
             return await self._run_trial(encoder)
 
     async def _run_trial(self, encoder: Encoder) -> Verdict:
-        figures = (self._target.width_px, self._target.height_px, self._target.fps, self._target.bitrate_kbps)
+        target = self._target
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "preview.encoders.probe_child", encoder.name),
-            *(str(figure) for figure in figures),
+            *map(str, (target.width_px, target.height_px, target.fps, target.bitrate_kbps)),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            limit=_MAX_ANSWER_BYTES,
+            limit=_MAX_OUTPUT_BYTES,
         )
         try:
-            answer, _ = await asyncio.wait_for(process.communicate(), self._timeout_s)
+            output, _ = await asyncio.wait_for(process.communicate(), self._timeout_s)
         except TimeoutError:
             return _failed(f"it hung: no result within {self._timeout_s:g} s")
         finally:
             if process.returncode is None:
                 process.kill()
                 await process.wait()
-        return _read(answer, process.returncode or 0)
+        return _parse(output, process.returncode or 0)
 
 
-def _read(answer: bytes, code: int) -> Verdict:
+def _parse(output: bytes, code: int) -> Verdict:
     if code < 0:
         return _failed(f"it crashed when tried ({signal.Signals(-code).name})")
     try:
-        outcome = json.loads(answer)
+        outcome = json.loads(output)
         reason, first_byte_ms = str(outcome["reason"]), outcome["first_byte_ms"]
     except (ValueError, KeyError, TypeError):
         return _failed(f"its trial ended with code {code} and without a result")

@@ -1,7 +1,7 @@
-"""One trial of one encoder, in a process that may crash or hang.
+"""Trial of one encoder, in a process that may crash or hang.
 
-Encodes real frames of the wanted size through the real chain and prints one line of JSON: whether pictures
-came out, why not, and how long the first one took. Whoever started it sets the deadline.
+Encodes frames of the requested size with the elements of the real pipeline and prints one line of JSON: the
+reason of a failure, and the time to the first byte. The parent process enforces the deadline.
 """
 
 import json
@@ -14,23 +14,22 @@ from typing import Any, Final
 from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE, Encoder
-from preview.encoders.chain import chain, size_caps
 from preview.values import Target
 
 FRAMES: Final = 10
 _ENOUGH: Final = 8
-"""Pictures that must come out; an encoder may keep a frame or two until more arrive."""
+"""Frames that must come out; an encoder may hold back one or two until more arrive."""
 _ENDS_WITHIN_S: Final = 90
-"""More than the configuration allows a trial: the service sets the deadline, unless it was killed."""
+"""Longer than any configurable deadline: applies only when the parent was killed."""
 _NICE: Final = 5
-"""A trial yields to whatever runs."""
+"""A trial yields the CPU to a running stream."""
 
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of it; `reason` is empty when the encoder is proven."""
+    """Result of the trial; `reason` is empty when the encoder is proven."""
 
     reason: str = ""
     first_byte_ms: float | None = None
@@ -38,7 +37,7 @@ class Outcome:
 
 @dataclass(slots=True)
 class _Counts:
-    """Written by pad probes, once per frame."""
+    """Counts of the pad probes, updated once per frame."""
 
     first_in_at: float = 0.0
     first_out_at: float = 0.0
@@ -47,9 +46,36 @@ class _Counts:
     parsed: int = 0
     key_frames: int = 0
 
+    def on_input(self, _pad: Any, _info: Any) -> Any:
+        self.first_in_at = time.monotonic()
+        return Gst.PadProbeReturn.REMOVE
+
+    def on_encoded(self, _pad: Any, info: Any) -> Any:
+        self.encoded += 1
+        self.encoded_bytes += info.get_buffer().get_size()
+        if self.encoded_bytes:
+            self.first_out_at = self.first_out_at or time.monotonic()
+        return Gst.PadProbeReturn.OK
+
+    def on_parsed(self, _pad: Any, info: Any) -> Any:
+        self.parsed += 1
+        self.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
+        return Gst.PadProbeReturn.OK
+
+    def outcome(self) -> Outcome:
+        if self.encoded == 0:
+            return Outcome("it produced no output")
+        if self.encoded_bytes == 0:
+            return Outcome("it produced only empty buffers")
+        if self.parsed < _ENOUGH:
+            return Outcome(f"only {self.parsed} of {FRAMES} frames could be parsed")
+        if self.key_frames == 0:
+            return Outcome("its stream has no key frame")
+        return Outcome(first_byte_ms=(self.first_out_at - self.first_in_at) * 1000)
+
 
 def main() -> None:
-    """Runs one trial; the arguments are the encoder's name, width, height, fps and kbit/s.
+    """Runs one trial; the arguments are the encoder's name, width, height, frames/s and kbit/s.
 
     `python -m preview.encoders.probe_child x264 1280 720 30 2500`
     """
@@ -58,93 +84,57 @@ def main() -> None:
     name, *figures = sys.argv[1:]
     width, height, fps, bitrate = (int(figure) for figure in figures)
     try:
-        # Kept until the end: a pipeline that is forgotten while it plays is torn down badly.
+        # Referenced until the end: a pipeline that is freed while playing is torn down badly.
         pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
         outcome = trial(pipeline)
     except UserError as error:
         outcome = Outcome(str(error))
-    # Nothing is stopped: the process ends, and a driver that hangs while it closes has no say any more.
+    # The pipeline is not stopped, so that a driver that hangs while closing can't delay the result.
     sys.stdout.write(json.dumps(asdict(outcome)) + "\n")
     sys.stdout.flush()
     os._exit(0)
 
 
 def trial(pipeline: Any) -> Outcome:
-    """Encodes FRAMES moving frames and judges what comes out."""
+    """Encodes FRAMES moving frames and evaluates the output."""
     counts = _Counts()
-    _watch(pipeline, counts)
+    for element, pad, probe in (
+        ("encoder", "sink", counts.on_input),
+        ("encoder", "src", counts.on_encoded),
+        ("out", "sink", counts.on_parsed),
+    ):
+        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
         return Outcome(_first_error(pipeline) or "it can't be started")
     message = pipeline.get_bus().timed_pop_filtered(
         Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
     )
-    silent = _judge(counts) if counts.encoded_bytes == 0 else None
-    if message.type == Gst.MessageType.ERROR and not (silent and _is_consequence(message, pipeline)):
+    # Without any output the parser reports an error, too: a consequence, not the cause.
+    consequence = counts.encoded_bytes == 0 and message.src is pipeline.get_by_name("parser")
+    if message.type == Gst.MessageType.ERROR and not consequence:
         return Outcome(message.parse_error()[0].message)
-    return silent or _judge(counts)
-
-
-def _is_consequence(message: Any, pipeline: Any) -> bool:
-    """Whether the parser complains, about getting nothing it could parse."""
-    return bool(message.src is pipeline.get_by_name("parser"))
+    return counts.outcome()
 
 
 def build(encoder: Encoder, target: Target) -> Any:
-    """The pipeline of a trial, not yet started.
+    """Returns the pipeline of a trial, not yet started.
 
     Raises:
-        UserError: the chain can't be built.
+        UserError: the pipeline can't be built.
     """
     description = (
         f"videotestsrc num-buffers={FRAMES} pattern=smpte horizontal-speed=16"
         f" ! video/x-raw,width={target.width_px},height={target.height_px},framerate={target.fps}/1"
-        f" ! {chain(encoder)} ! fakesink name=out sync=false"
+        f" ! {properties.chain(encoder)} ! fakesink name=out sync=false"
     )
     try:
         pipeline = Gst.parse_launch(description)
     except GLib.Error as error:
         raise UserError(error.message) from error
-    pipeline.get_by_name("size").set_property("caps", size_caps(encoder, target))
+    pipeline.get_by_name("size").set_property("caps", properties.size_caps(encoder, target))
     kbps = target.bitrate_kbps
-    settings.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
+    properties.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
-
-
-def _watch(pipeline: Any, counts: _Counts) -> None:
-    def entered(_pad: Any, _info: Any) -> Any:
-        counts.first_in_at = counts.first_in_at or time.monotonic()
-        return Gst.PadProbeReturn.REMOVE
-
-    def encoded(_pad: Any, info: Any) -> Any:
-        counts.encoded += 1
-        counts.encoded_bytes += info.get_buffer().get_size()
-        if counts.encoded_bytes:
-            counts.first_out_at = counts.first_out_at or time.monotonic()
-        return Gst.PadProbeReturn.OK
-
-    def parsed(_pad: Any, info: Any) -> Any:
-        counts.parsed += 1
-        counts.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
-        return Gst.PadProbeReturn.OK
-
-    for element, pad, probe in (
-        ("encoder", "sink", entered),
-        ("encoder", "src", encoded),
-        ("out", "sink", parsed),
-    ):
-        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
-
-
-def _judge(counts: _Counts) -> Outcome:
-    if counts.encoded == 0:
-        return Outcome("it gave no output")
-    if counts.encoded_bytes == 0:
-        return Outcome("it gave empty buffers only")
-    if counts.parsed < _ENOUGH:
-        return Outcome(f"only {counts.parsed} of {FRAMES} pictures came out readable")
-    if counts.key_frames == 0:
-        return Outcome("its stream has no key frame")
-    return Outcome(first_byte_ms=(counts.first_out_at - counts.first_in_at) * 1000)
 
 
 def _first_error(pipeline: Any) -> str:

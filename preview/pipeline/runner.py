@@ -1,317 +1,289 @@
-"""A running pipeline, seen from the loop: start, watch, change, stop.
+"""One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
-What can fail, how it is noticed, and what follows:
-
-| failure | noticed by | follows |
-|---|---|---|
-| an element is missing, a description makes no sense | building: UserError | FAULTED, retry |
-| port taken, address not ours | ERROR of the sink while starting | FAULTED "UDP port ...", retry |
-| camera or file can't be opened, unplugged, unreadable | ERROR of the source | FAULTED, retry |
-| source ends | EOS on the bus | FAULTED, retry; a file begins again instead |
-| source stalls without a word | watchdog: no new frames | FAULTED, retry |
-| encoder can't be opened | ERROR of the encoder while starting | next encoder at once |
-| encoder fails later | ERROR of the encoder | next encoder at once |
-| encoder gives nothing, or empty buffers | watchdog: frames go in, nothing comes out | next encoder at once |
-| starting blocks | deadline of the call | as a failure of the encoder |
-| another profile, a bit rate or a request for a key frame blocks | deadline of the call | next encoder |
-| stopping blocks in the encoder | deadline | left behind, its port and source free; next encoder |
-| stopping blocks elsewhere | deadline of the call | the process ends with code 70, to be started again |
-| a viewer is slow, frozen, gone, a stranger | the listener drops it | others notice nothing |
-
-A process with an abandoned pipeline ends, with code 70, when the preview is next disabled: only that frees
-the driver. GStreamer's threads meet us in few places (framing.py, joining.py, looping.py) and hand over to
-the loop. Whatever may block in a driver (state changes, live figures, requests for key frames) runs in a
-thread of its own with a deadline.
+supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in three
+places only (framing.py, keyframe_gate.py, file_loop.py) and schedule calls on the loop. Every call that may
+block in a driver (state changes, properties of a playing encoder, requests for key frames) runs in a thread
+of its own with a deadline.
 """
 
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.adaptive import BitrateController, Decision
 from preview.config import TimeoutSettings
-from preview.encoders import settings
+from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
-from preview.pipeline.crossing import Crossing, in_thread
-from preview.pipeline.faults import Blame, Fault
+from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
+from preview.pipeline.events import Fault, HungError, PipelineEvents
+from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
-from preview.pipeline.joining import Joining
-from preview.pipeline.looping import Looping
+from preview.pipeline.keyframe_gate import KeyframeGate
+from preview.pipeline.plan import Plan
+from preview.pipeline.threads import in_thread
 from preview.pipeline.watchdogs import Silent, Watchdogs
-from preview.plan import Plan
-from preview.values import Measurement, Profile, Target
+from preview.values import Measurement, Profile, StreamState, Target
 
 _log = logging.getLogger(__name__)
 
-_LOOK_EVERY_S: Final = 0.2
-MEASURE_EVERY_S: Final = 0.5
+_CHECK_INTERVAL_S: Final = 0.2
+_WINDOW_S: Final = 0.5
+"""Window of the statistics, rounded up to a multiple of _CHECK_INTERVAL_S."""
 _DRIVER_DEADLINE_S: Final = 2.0
-"""For what an encoder is told while it runs."""
-_INTERESTING: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
-
-
-class HungError(Exception):
-    """The listener or the source can't be stopped: only the end of the process frees port and device."""
+"""For a call into the encoder's driver while it runs."""
+_GRAPH_DEADLINE_S: Final = 0.3
+_MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
 
 class Runner:
-    """One pipeline from building to stopping. Made, used and dropped on the loop.
+    """One pipeline from building to teardown; created and used on the loop.
 
     Args:
         plan: what to build.
-        timeouts: how long things may take.
-        on_first_picture: called once when the first encoded picture reached the listener.
-        on_fault: called with the first thing that failed, once.
-        on_measured: called when there are new figures.
-        controller: follows the viewers' links with the bit rate. None: it stays.
+        timeouts: deadlines.
+        events: receives the first frame, the first fault and new statistics.
 
     Raises:
         UserError: the pipeline can't be built.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        timeouts: TimeoutSettings,
-        *,
-        on_first_picture: Callable[[], None],
-        on_fault: Callable[[Fault], None],
-        on_measured: Callable[[], None],
-        controller: BitrateController | None = None,
-    ) -> None:
+    def __init__(self, plan: Plan, timeouts: TimeoutSettings, events: PipelineEvents) -> None:
         self.plan = plan
         self.measurement: Measurement | None = None
-        self.bitrate_kbps = plan.target.bitrate_kbps
-        self.bitrate_reason = ""
+        self._bitrate = Decision(plan.target.bitrate_kbps)
         self._timeouts = timeouts
-        self._on_first_picture = on_first_picture
-        self._on_fault = on_fault
-        self._on_measured = on_measured
-        self._controller = controller
-        self._loop = asyncio.get_running_loop()
-        self._crossing = Crossing()
-        self._parts = builder.build(plan)
-        self._framing = Framing(lambda: self._crossing.hand_over(self._first_picture), plan.target.fps)
-        self._framing.attach(self._parts.muxer_pad)
-        self._looping = Looping(self._parts, self._crossing, self._loop_failed) if plan.source.loops else None
-        self._joining = Joining(self._parts, self._crossing, self._request_key_frame)
-        self._bus = self._parts.pipeline.get_bus()
+        self._events = events
+        self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
+        loop = self._loop = asyncio.get_running_loop()
+        parts = self._parts = builder.build(plan)
+        self._framing = Framing(parts, loop, self._first_frame, plan.target.fps)
+        self._keyframe_gate = KeyframeGate(parts, loop, self._request_key_frame)
+        self._file_loop = FileLoop(parts, loop, self._source_ended) if plan.source.loops else None
+        self._bus = parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
-        self._watch: asyncio.Task[None] | None = None
-        self._key_frame: asyncio.Task[None] | None = None
-        self._new_bitrate: asyncio.Task[None] | None = None
-        self._telling = asyncio.Lock()
-        """Held while the encoder is told something."""
-        self._over: asyncio.Future[None] = self._loop.create_future()
-        """Done when it has failed or is being stopped."""
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        """The newest task of each kind."""
+        self._driver_lock = asyncio.Lock()
+        self._ended: asyncio.Future[None] = loop.create_future()
+        """Done when the pipeline has failed or is being stopped; no event is reported from then on."""
+
+    @property
+    def stream(self) -> StreamState:
+        """Parameters of the stream being served."""
+        plan, bitrate = self.plan, self._bitrate
+        return StreamState(
+            plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, plan.encrypted
+        )
 
     async def start(self) -> None:
-        """Starts the pipeline. What fails is told through `on_fault`, also after this has returned."""
+        """Starts the pipeline. Failures are reported as events, also after this has returned."""
         self._loop.add_reader(self._bus_fd, self._read_bus)
         pipeline = self._parts.pipeline
         try:
             outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
         except TimeoutError:
-            self.fail(faults.from_silence(Silent.ENCODER, self._timeouts.start_s, self.plan))
+            self._fail(faults.from_silence(Silent.ENCODER, self._timeouts.start_s, self.plan))
             return
         self._read_bus()
         if outcome == Gst.StateChangeReturn.FAILURE:
-            # An element that refuses without saying why left no message behind.
-            self.fail(faults.unexplained(self.plan))
+            self._fail(faults.unexplained(self.plan))  # Counts only if no element posted an error.
             return
-        self._watch = asyncio.create_task(self._supervise(), name="supervision")
+        self._spawn("watch", self._watch())
+
+    async def switch(self, profile: Profile, target: Target) -> None:
+        """Switches to another profile; viewers stay connected."""
+        plan = self.plan = self.plan.switched(profile, target)
+        self._bitrate = Decision(target.bitrate_kbps)
+        self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
+        elements, framing = self._parts.adjustable, self._framing
+
+        def apply() -> None:
+            builder.apply_target(elements, plan)
+            framing.set_rate(target.fps)
+
+        await self._call_driver(apply, "the profile was changed")
 
     async def stop(self) -> "asyncio.Task[bool]":
         """Tears the pipeline down, each part with a deadline.
 
-        First the listener, so that its port is free and viewers know, then the source, so that its device
-        is free: so the next pipeline can start whatever becomes of the rest.
+        First the listener, which frees its port and disconnects the viewers, then the source, which frees its
+        device: so the next pipeline can start even if the rest hangs.
 
         Returns:
-            The rest: the encoder and all around it. True when it is stopped, False when it hangs for good.
+            Teardown of the rest, the encoder among it: True when it has finished, False when it hangs.
 
         Raises:
             HungError: the listener or the source hangs.
         """
-        self._end()  # Whatever fails from here on is the teardown's own doing.
-        await self._stop_watching()
+        self._end()  # Errors from here on are caused by the teardown.
+        self._loop.remove_reader(self._bus_fd)
+        for task in self._tasks.values():
+            task.cancel()
+        for task in self._tasks.values():
+            with suppress(asyncio.CancelledError):
+                await task
         deadline_s = self._timeouts.stop_s
         for part, name in (
             (self._parts.sink, "the SRT listener"),
             (self._parts.source, self.plan.source.label),
         ):
             try:
-                await in_thread(partial(_to_null, part), deadline_s)
+                await in_thread(partial(_stop_element, part), deadline_s)
             except TimeoutError as error:
                 raise HungError(f"{name} hung when it was stopped") from error
         del part
-        return asyncio.create_task(self._stop_rest(self._let_go(), deadline_s), name="stop the encoder")
+        return asyncio.create_task(_stop_pipeline(self._release(), deadline_s), name="stop the encoder")
 
-    def _let_go(self) -> list[Any]:
-        """Cuts every tie to the pipeline; what is returned is the last reference to it."""
-        self._joining.detach()
+    async def write_graph(self, path: Path) -> None:
+        """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
+
+        def write() -> None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            graph = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
+            path.write_text(graph, encoding="utf-8")
+
+        try:
+            await in_thread(write, _GRAPH_DEADLINE_S)
+        except (TimeoutError, OSError) as error:
+            _log.warning("no graph of the failed pipeline in %s: %s", path, error)
+
+    def _release(self) -> list[Any]:
+        """Drops every reference to the pipeline; the returned list has the last one."""
+        self._keyframe_gate.detach()
         self._framing.detach()
-        if self._looping:
-            self._looping.detach()
-            self._looping = None
+        if self._file_loop:
+            self._file_loop.detach()
+            self._file_loop = None
         last = [self._parts.pipeline]
         del self._parts, self._bus
         return last
 
-    async def _stop_rest(self, last: list[Any], deadline_s: float) -> bool:
-        def stop() -> None:
-            last[0].set_state(Gst.State.NULL)
-            # Forgotten here, in this thread: SRT frees the port for good, and cleans up after itself, when
-            # its last element is gone, and both take their time.
-            last.clear()
+    # --- events ---
 
-        try:
-            await in_thread(stop, deadline_s)
-        except TimeoutError:
-            return False
-        return True
+    def _first_frame(self) -> None:
+        if not self._ended.done():
+            self._events.first_frame()
 
-    async def switch(self, profile: Profile, target: Target) -> None:
-        """Goes on with another profile; viewers stay connected."""
-        plan = self.plan = self.plan.switched(profile, target)
-        self.bitrate_kbps, self.bitrate_reason = target.bitrate_kbps, ""
-        if self._controller:
-            self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
+    def _source_ended(self) -> None:
+        self._fail(faults.end_of_stream(self.plan))
 
-        dials, framing = self._parts.dials, self._framing
-
-        def change() -> None:
-            builder.apply_target(dials, plan)
-            framing.set_rate(target.fps)
-
-        await self._tell_encoder(change, "the profile was changed")
-
-    async def _tell_encoder(self, call: Callable[[], None], when: str) -> None:
-        """Makes a call that may block in the encoder's driver: one at a time, and none once it is over."""
-        async with self._telling:
-            if self._over.done():
-                return
-            told = asyncio.create_task(in_thread(call, _DRIVER_DEADLINE_S), name=f"encoder: {when}")
-            try:
-                # Another failure meanwhile is not kept waiting: a viewer sits in the dark.
-                await asyncio.wait((told, self._over), return_when=asyncio.FIRST_COMPLETED)
-                if told.done():
-                    told.result()
-            except TimeoutError:
-                name = self.plan.encoder.name
-                self.fail(Fault(Blame.ENCODER, f"encoder {name} hung when {when}"))
-            finally:
-                told.cancel()
-
-    def fail(self, fault: Fault) -> None:
-        """Something is wrong with it. Only the first fault counts."""
-        if not self._over.done():
+    def _fail(self, fault: Fault) -> None:
+        if not self._ended.done():
             self._end()
-            self._on_fault(fault)
+            self._events.failed(fault)
 
     def _end(self) -> None:
-        if not self._over.done():
-            self._over.set_result(None)
-
-    def draw(self) -> str:
-        """The pipeline as a DOT graph."""
-        text = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
-        return str(text)
-
-    # --- on the loop, called back ---
+        if not self._ended.done():
+            self._ended.set_result(None)
 
     def _read_bus(self) -> None:
-        while (message := self._bus.pop_filtered(_INTERESTING)) is not None:
+        while (message := self._bus.pop_filtered(_MESSAGES)) is not None:
             if message.type == Gst.MessageType.ERROR:
                 _log.debug("%s: %s", message.src.get_path_string(), message.parse_error())
-                self.fail(faults.from_message(message, self._parts, self.plan))
+                self._fail(faults.from_message(message, self._parts, self.plan))
             elif message.type == Gst.MessageType.WARNING:
                 _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
             else:
-                self.fail(faults.ended(self.plan))
+                self._source_ended()
 
-    def _first_picture(self) -> None:
-        if not self._over.done():
-            self._on_first_picture()
-
-    def _loop_failed(self) -> None:
-        self.fail(faults.ended(self.plan))
-
-    def _request_key_frame(self) -> None:
-        """For a viewer that joined. While one request is still under way, its key frame serves both."""
-        if self._over.done():
-            return  # A viewer that joined a listener that is being stopped.
-        if self._key_frame is None or self._key_frame.done():
-            element, sink_pad = self._parts.encoder, self._parts.sink.get_static_pad("sink")
-            call = partial(settings.request_key_frame, element, self.plan.encoder, sink_pad)
-            self._key_frame = asyncio.create_task(
-                self._tell_encoder(call, "it was asked for a key frame"), name="key frame"
-            )
-
-    async def _supervise(self) -> None:
-        """Looks at the counters ten times a second until the pipeline is stopped."""
-        timeouts = self._timeouts
-        watchdogs = Watchdogs(
-            time.monotonic(),
-            first_frame_s=timeouts.start_s,
-            source_s=timeouts.source_silence_s,
-            encoder_s=timeouts.encoder_silence_s,
-        )
+    async def _watch(self) -> None:
+        """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
+        watchdogs = Watchdogs(time.monotonic(), self._timeouts)
         reading = statistics.read(self._framing, self._parts.sink)
         while True:
-            await asyncio.sleep(_LOOK_EVERY_S)
+            await asyncio.sleep(_CHECK_INTERVAL_S)
             now = time.monotonic()
-            silent = watchdogs.look(self._parts.rate.get_property("in"), self._framing.pictures, now)
+            silent = watchdogs.check(self._parts.rate.get_property("in"), self._framing.frames, now)
             if silent:
-                self.fail(faults.from_silence(silent, watchdogs.silence_s(silent, now), self.plan))
+                self._fail(faults.from_silence(silent, watchdogs.silence_s(silent, now), self.plan))
                 return
-            if now - reading.at >= MEASURE_EVERY_S:
+            if now - reading.at >= _WINDOW_S:
                 reading = self._measure(reading)
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)
-        self.measurement = statistics.measure(before, now, self._framing.last_picture_at)
-        if self._controller and self.plan.encoder.spelling.live_bitrate:
-            self._follow(self._controller, statistics.link_report(before, now))
-        self._on_measured()
+        self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
+        if self.plan.adaptive:
+            self._adapt_bitrate(statistics.link_report(before, now))
+        self._events.measured()
         return now
 
-    def _follow(self, controller: BitrateController, link: statistics.LinkReport | None) -> None:
-        if self._new_bitrate and not self._new_bitrate.done():
-            return  # First the encoder has to take the last one.
-        decision = controller.decide(link, time.monotonic())
-        if decision.bitrate_kbps == self.bitrate_kbps:
-            self.bitrate_reason = decision.reason
+    # --- calls into the encoder's driver ---
+
+    def _request_key_frame(self) -> None:
+        """Requests a key frame for a new viewer; one that is already requested serves both."""
+        if self._ended.done() or self._is_pending("key frame"):
+            return
+        sink_pad = self._parts.sink.get_static_pad("sink")
+        call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, sink_pad)
+        self._spawn("key frame", self._call_driver(call, "it was asked for a key frame"))
+
+    def _adapt_bitrate(self, link: LinkReport | None) -> None:
+        if self._is_pending("bit rate"):
+            return  # The encoder has yet to apply the previous one.
+        decision = self._controller.decide(link, time.monotonic())
+        if decision.bitrate_kbps == self._bitrate.bitrate_kbps:
+            self._bitrate = decision
         else:
-            self._new_bitrate = asyncio.create_task(self._set_bitrate(decision), name="bit rate")
+            self._spawn("bit rate", self._set_bitrate(decision))
 
     async def _set_bitrate(self, decision: Decision) -> None:
         _log.info("bit rate: %s", decision.reason)
         encoder, plan = self._parts.encoder, self.plan
 
-        def change() -> None:
-            if plan is self.plan:  # Not another profile meanwhile: its figures count.
-                settings.set_bitrate_live(encoder, plan.encoder, decision.bitrate_kbps, plan.gop_frames)
+        def apply() -> None:
+            if plan is self.plan:  # Otherwise another profile was set in the meantime: its bit rate applies.
+                properties.set_bitrate(encoder, plan.encoder, decision.bitrate_kbps, plan.gop_frames)
 
-        await self._tell_encoder(change, "its bit rate was changed")
+        await self._call_driver(apply, "its bit rate was changed")
         if plan is self.plan:
-            self.bitrate_kbps, self.bitrate_reason = decision.bitrate_kbps, decision.reason
+            self._bitrate = decision
 
-    async def _stop_watching(self) -> None:
-        self._loop.remove_reader(self._bus_fd)
-        for task in (self._watch, self._key_frame, self._new_bitrate):
-            if task:
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
+    def _spawn(self, name: str, work: Coroutine[Any, Any, None]) -> None:
+        self._tasks[name] = asyncio.create_task(work, name=name)
+
+    def _is_pending(self, name: str) -> bool:
+        return name in self._tasks and not self._tasks[name].done()
+
+    async def _call_driver(self, call: Callable[[], None], when: str) -> None:
+        """Makes a call that may block in the encoder's driver: one at a time, none after the end."""
+        async with self._driver_lock:
+            if self._ended.done():
+                return
+            calling = asyncio.create_task(in_thread(call, _DRIVER_DEADLINE_S), name=f"encoder: {when}")
+            try:
+                # Does not delay the reaction to another failure in the meantime.
+                await asyncio.wait((calling, self._ended), return_when=asyncio.FIRST_COMPLETED)
+                if calling.done():
+                    calling.result()
+            except TimeoutError:
+                self._fail(faults.encoder_hung(self.plan, when))
+            finally:
+                calling.cancel()
 
 
-def _to_null(element: Any) -> None:
-    # Locked, so that nothing of the pipeline starts it again meanwhile.
+def _stop_element(element: Any) -> None:
+    # Locked, so that a state change of the pipeline does not restart it.
     element.set_locked_state(True)
     element.set_state(Gst.State.NULL)
+
+
+async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
+    """Stops and frees a pipeline; False when that does not finish in time."""
+
+    def stop() -> None:
+        last_reference[0].set_state(Gst.State.NULL)
+        # Freed here, in this thread: libsrt frees the port for good, and cleans up, when the last element is
+        # freed, and both take their time.
+        last_reference.clear()
+
+    try:
+        await in_thread(stop, deadline_s)
+    except TimeoutError:
+        return False
+    return True

@@ -1,9 +1,9 @@
-"""Fills in what a source leaves open that knows nothing of its pictures: shared memory, a socket, a raw file.
+"""Square pixels for sources of untyped bytes: shared memory, a socket, a raw file.
 
-Such an element sends bytes, and the caps written behind it are all that is known of them. They rarely name
-the shape of a pixel. GStreamer leaves it open as long as nobody asks, but scaling asks, offers any shape, and
-a capsfilter that would have to choose fails ("Filter caps do not completely specify the output format").
-Square is what such caps mean.
+The caps written behind such an element are all that is known of its frames, and they rarely state the pixel
+aspect ratio. GStreamer leaves it open until videoscale negotiates it, and a capsfilter that would have to
+choose one then fails ("Filter caps do not completely specify the output format"). Such caps mean square
+pixels.
 """
 
 from collections.abc import Iterator
@@ -12,19 +12,19 @@ from typing import Any, Final
 from common.gst import Gst
 
 _SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
-_PASSING_ON: Final = frozenset({"queue", "queue2", "identity"})
+_TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 
 
 def fill_in(source: Any) -> None:
-    """Makes caps behind a source of mere bytes complete. Others say themselves what they send.
+    """Completes the caps behind sources of untyped bytes; other sources state their caps themselves.
 
     Args:
-        source: a bin that is not yet started.
+        source: bin that is not yet started.
     """
     for capsfilter in _capsfilters(source):
-        if _gets_mere_bytes(capsfilter):
+        if _follows_untyped_source(capsfilter):
             square = capsfilter.get_property("caps").intersect(Gst.Caps.from_string(_SQUARE))
-            # Empty where the caps name another shape, or something that is not a picture.
+            # Empty where the caps state another aspect ratio, or are not raw video.
             if not square.is_empty():
                 capsfilter.set_property("caps", square)
 
@@ -35,12 +35,13 @@ def _capsfilters(source: Any) -> Iterator[Any]:
         yield step[1]
 
 
-def _gets_mere_bytes(element: Any) -> bool:
+def _follows_untyped_source(element: Any) -> bool:
+    """Whether only transparent elements separate this one from a source that can't state its caps."""
     pad = element.get_static_pad("sink").get_peer()
     while pad is not None and (before := pad.get_parent_element()) is not None:
         if before.numsinkpads == 0:
             return bool(pad.query_caps(None).is_any())
-        if before.get_factory().get_name() not in _PASSING_ON:
+        if before.get_factory().get_name() not in _TRANSPARENT:
             return False
         pad = before.get_static_pad("sink").get_peer()
     return False

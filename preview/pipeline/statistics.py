@@ -1,31 +1,30 @@
-"""Reads srtsink's statistics, and makes figures of a window out of two readings.
+"""Statistics of the stream and its viewers, from two readings of srtsink's counters.
 
-`stats` must never be read inside the signal `caller-removed`: srtsink emits it under the lock that the
-reading takes. Here it is only read from the loop.
+srtsink's property `stats` must never be read inside its signal `caller-removed`, which is emitted under the
+lock that the reading takes. Here it is read from the event loop only.
 """
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
+from preview.pipeline.adaptive import LinkReport
 from preview.pipeline.framing import Framing
 from preview.values import Measurement
 
 
 @dataclass(frozen=True, slots=True)
 class Viewer:
-    """What the listener knows of one viewer. Counts since it connected.
+    """SRT statistics of one viewer; packet counts since it connected.
 
     Args:
-        key: tells viewers apart; never leaves this process.
-        rtt_ms: round trip.
+        rtt_ms: round-trip time.
         sent: packets sent.
         lost: packets reported lost.
         retransmitted: packets sent again.
-        dropped: packets given up because they were too late: the send buffer could not empty in time.
+        dropped: packets dropped because they were too late to send (SRTO_TLPKTDROP).
     """
 
-    key: str
     rtt_ms: float
     sent: int
     lost: int
@@ -33,81 +32,71 @@ class Viewer:
     dropped: int
 
 
-@dataclass(frozen=True, slots=True)
-class LinkReport:
-    """The worst of all viewers in a window; shares in percent of the packets sent to that viewer."""
-
-    rtt_ms: float
-    loss_percent: float
-    retransmitted_percent: float
-    dropped_percent: float
+_NEW: Final = Viewer(0.0, 0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """All counters at one moment."""
+    """All counters at one moment, in monotonic seconds; viewers by their address."""
 
     at: float
-    pictures: int
+    frames: int
     bytes: int
     viewers: dict[str, Viewer]
 
 
 def read(framing: Framing, sink: Any) -> Reading:
-    """Takes the counters of this moment."""
+    """Returns the counters of this moment."""
     stats = sink.get_property("stats")
+    # Without viewers the structure has no such field.
     callers = stats.get_value("callers") if stats is not None and stats.has_field("callers") else None
-    viewers = [_viewer(caller) for caller in callers or ()]
-    return Reading(time.monotonic(), framing.pictures, framing.bytes, {v.key: v for v in viewers})
+    viewers = {_address(caller): _viewer(caller) for caller in callers or ()}
+    return Reading(time.monotonic(), framing.frames, framing.bytes, viewers)
 
 
-def measure(before: Reading, now: Reading, last_picture_at: float) -> Measurement:
-    """The figures of the window between two readings."""
+def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
+    """Returns the statistics of the window between two readings."""
     seconds = max(now.at - before.at, 1e-3)
     link = link_report(before, now)
     return Measurement(
-        fps=(now.pictures - before.pictures) / seconds,
+        fps=(now.frames - before.frames) / seconds,
         bitrate_kbps=(now.bytes - before.bytes) * 8 / 1000 / seconds,
         viewer_count=len(now.viewers),
-        last_frame_age_ms=max(0, round((now.at - last_picture_at) * 1000)),
+        last_frame_age_ms=max(0, round((now.at - last_frame_at) * 1000)),
         worst_rtt_ms=link.rtt_ms if link else None,
         worst_loss_percent=link.loss_percent if link else None,
     )
 
 
 def link_report(before: Reading, now: Reading) -> LinkReport | None:
-    """The worst link of the window, None without viewers."""
+    """Returns the worst figures of all viewers in the window; None without viewers."""
     if not now.viewers:
         return None
-    reports = [_window(before.viewers.get(key), viewer) for key, viewer in now.viewers.items()]
+    windows = [(before.viewers.get(address, _NEW), viewer) for address, viewer in now.viewers.items()]
     return LinkReport(
-        rtt_ms=max(report.rtt_ms for report in reports),
-        loss_percent=max(report.loss_percent for report in reports),
-        retransmitted_percent=max(report.retransmitted_percent for report in reports),
-        dropped_percent=max(report.dropped_percent for report in reports),
+        rtt_ms=max(after.rtt_ms for _, after in windows),
+        loss_percent=max(_share(a.lost - b.lost, a.sent - b.sent) for b, a in windows),
+        retransmitted_percent=max(
+            _share(a.retransmitted - b.retransmitted, a.sent - b.sent) for b, a in windows
+        ),
+        dropped_percent=max(_share(a.dropped - b.dropped, a.sent - b.sent) for b, a in windows),
     )
 
 
-def _window(before: Viewer | None, now: Viewer) -> LinkReport:
-    sent = now.sent - (before.sent if before else 0)
+def _share(count: int, sent: int) -> float:
+    return min(100.0, 100.0 * count / sent) if sent > 0 else 0.0
 
-    def share(count: int) -> float:
-        return min(100.0, 100.0 * count / sent) if sent > 0 else 0.0
 
-    return LinkReport(
-        rtt_ms=now.rtt_ms,
-        loss_percent=share(now.lost - (before.lost if before else 0)),
-        retransmitted_percent=share(now.retransmitted - (before.retransmitted if before else 0)),
-        dropped_percent=share(now.dropped - (before.dropped if before else 0)),
-    )
+def _address(caller: Any) -> str:
+    address = caller.get_value("caller-address")
+    return f"{address.get_address().to_string()}:{address.get_port()}" if address else ""
 
 
 def _viewer(caller: Any) -> Viewer:
-    address = caller.get_value("caller-address")
     return Viewer(
-        key=f"{address.get_address().to_string()}:{address.get_port()}" if address else "",
         rtt_ms=float(caller.get_value("rtt-ms")),
         sent=int(caller.get_value("packets-sent")),
+        # srtsink's name is misleading: it counts loss reports.
         lost=int(caller.get_value("packets-sent-lost")),
         retransmitted=int(caller.get_value("packets-retransmitted")),
         dropped=int(caller.get_value("packets-sent-dropped")),

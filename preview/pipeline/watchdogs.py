@@ -1,14 +1,17 @@
-"""Notices silence. Pure: told counts and times, says what is silent.
+"""Watchdogs for frames that stop without an error. Pure: evaluates counts and times.
 
-A camera whose sensor stalls and an encoder whose driver sleeps give no error: frames just stop.
+A camera whose sensor stalls (v4l2src polls without a timeout) and an encoder whose driver sleeps post no
+error.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
+from preview.config import TimeoutSettings
+
 
 class Silent(Enum):
-    """Who stopped delivering."""
+    """Part that stopped delivering."""
 
     SOURCE = "source"
     ENCODER = "encoder"
@@ -17,56 +20,56 @@ class Silent(Enum):
 @dataclass(slots=True)
 class _Counter:
     count: int
-    moved_at: float
+    changed_at: float
 
-    def see(self, count: int, now: float) -> None:
+    def update(self, count: int, now: float) -> None:
         if count != self.count:
             self.count = count
-            self.moved_at = now
+            self.changed_at = now
 
 
 class Watchdogs:
-    """One after the source, one after the encoder.
+    """One watchdog behind the source, one behind the encoder.
 
     Args:
         now: monotonic seconds at the start.
-        first_frame_s: how long the source may take for its first frame.
-        source_s: how long it may pause later.
-        encoder_s: how long the encoder may take for its first picture once it has frames, and pause later.
+        timeouts: `start_s` until the source's first frame, `source_silence_s` between later ones, and
+            `encoder_silence_s` without a frame of the encoder while it gets frames, also before its first.
     """
 
-    def __init__(self, now: float, *, first_frame_s: float, source_s: float, encoder_s: float) -> None:
-        self._first_frame_s = first_frame_s
-        self._source_s = source_s
-        self._encoder_s = encoder_s
-        self._frames = _Counter(0, now)
-        self._pictures = _Counter(0, now)
+    def __init__(self, now: float, timeouts: TimeoutSettings) -> None:
+        self._first_frame_s = timeouts.start_s
+        self._source_s = timeouts.source_silence_s
+        self._encoder_s = timeouts.encoder_silence_s
+        self._captured = _Counter(0, now)
+        self._encoded = _Counter(0, now)
 
-    def look(self, frames: int, pictures: int, now: float) -> Silent | None:
-        """Takes the counts of this moment.
+    def check(self, captured: int, encoded: int, now: float) -> Silent | None:
+        """Evaluates the counts of this moment.
 
         Args:
-            frames: frames that came from the source so far.
-            pictures: encoded pictures so far.
+            captured: frames from the source so far.
+            encoded: encoded frames so far.
             now: monotonic seconds.
 
         Returns:
-            Who is silent beyond its limit, the source first: without frames no encoder can deliver.
+            The part that exceeds its limit, the source first: without frames no encoder can deliver.
         """
-        idle_before = self._frames.count == 0 or now - self._frames.moved_at > self._encoder_s
-        self._frames.see(frames, now)
-        self._pictures.see(pictures, now)
-        if self._frames.moved_at == now and idle_before:
-            # The encoder had nothing to do until now.
-            self._pictures.moved_at = now
-        if now - self._frames.moved_at > (self._source_s if frames else self._first_frame_s):
+        was_idle = self._captured.count == 0 or now - self._captured.changed_at > self._encoder_s
+        self._captured.update(captured, now)
+        self._encoded.update(encoded, now)
+        if self._captured.changed_at == now and was_idle:
+            # The encoder had no frames until now: its time starts here.
+            self._encoded.changed_at = now
+        silence_s = now - self._captured.changed_at
+        if silence_s > (self._source_s if captured else self._first_frame_s):
             return Silent.SOURCE
-        source_alive = frames > 0 and now - self._frames.moved_at <= self._encoder_s
-        if source_alive and now - self._pictures.moved_at > self._encoder_s:
+        source_delivers = captured > 0 and silence_s <= self._encoder_s
+        if source_delivers and now - self._encoded.changed_at > self._encoder_s:
             return Silent.ENCODER
         return None
 
     def silence_s(self, silent: Silent, now: float) -> float:
-        """For how long it has been silent."""
-        counter = self._frames if silent is Silent.SOURCE else self._pictures
-        return now - counter.moved_at
+        """Returns for how many seconds a part has delivered nothing."""
+        counter = self._captured if silent is Silent.SOURCE else self._encoded
+        return now - counter.changed_at

@@ -1,100 +1,81 @@
-"""Domain values to messages and back: the only place of the service that knows both."""
+"""Maps domain values to messages and back: the only module of the service that knows both."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import Final
 
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import Encoder
+from preview.encoders.selection import Verdict
 from preview.lifecycle import State
-from preview.selection import Verdict
-from preview.status import Status, StreamStatus
-from preview.values import Codec, EncoderChoice, Measurement, Profile, Wish
+from preview.values import ActualState, Codec, DesiredState, Profile, StreamState
 
 STATES: Final[Mapping[State, pb.LifecycleState.ValueType]] = MappingProxyType(
-    {
-        State.DISABLED: pb.LIFECYCLE_STATE_DISABLED,
-        State.STARTING: pb.LIFECYCLE_STATE_STARTING,
-        State.RUNNING: pb.LIFECYCLE_STATE_RUNNING,
-        State.STOPPING: pb.LIFECYCLE_STATE_STOPPING,
-        State.FAULTED: pb.LIFECYCLE_STATE_FAULTED,
-    }
+    {state: pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}") for state in State}
 )
 PROFILES: Final[Mapping[Profile, pb.Profile.ValueType]] = MappingProxyType(
-    {
-        Profile.LOW_BW: pb.PROFILE_LOW_BW,
-        Profile.BALANCED: pb.PROFILE_BALANCED,
-        Profile.HIGH_QUALITY: pb.PROFILE_HIGH_QUALITY,
-    }
+    {profile: pb.Profile.Value(f"PROFILE_{profile.name}") for profile in Profile}
 )
 CODECS: Final[Mapping[Codec, pb.Codec.ValueType]] = MappingProxyType(
-    {Codec.H264: pb.CODEC_H264, Codec.H265: pb.CODEC_H265}
+    {codec: pb.Codec.Value(f"CODEC_{codec.name}") for codec in Codec}
 )
 _PROFILES_BACK: Final = {message: profile for profile, message in PROFILES.items()}
 
-_SHORTEST_PASSPHRASE: Final = 10
-_LONGEST_PASSPHRASE: Final = 79
+# SRTO_PASSPHRASE takes 10 to 79 bytes (libsrt's API documentation).
+_MIN_PASSPHRASE_BYTES: Final = 10
+_MAX_PASSPHRASE_BYTES: Final = 79
 
 
-def wish(desired: pb.DesiredState) -> Wish:
-    """What the gateway wants.
+def desired_state(message: pb.DesiredState) -> DesiredState:
+    """Returns the desired state of a message.
 
     Raises:
-        InvalidRequestError: enabled with a profile we don't know, or a passphrase that SRT does not take.
+        InvalidRequestError: enabled with an unknown profile, or a passphrase of a length that SRT rejects.
     """
-    profile = _PROFILES_BACK.get(desired.profile)
-    if profile is None and desired.enabled:
+    profile = _PROFILES_BACK.get(message.profile)
+    if profile is None and message.enabled:
         raise InvalidRequestError(
-            f"profile {desired.profile} is not known; known are {', '.join(p.name for p in Profile)}"
+            f"profile {message.profile} is not known; known are {', '.join(p.name for p in Profile)}"
         )
-    size = len(desired.passphrase.encode())
-    if size and not _SHORTEST_PASSPHRASE <= size <= _LONGEST_PASSPHRASE:
+    size = len(message.passphrase.encode())
+    if size and not _MIN_PASSPHRASE_BYTES <= size <= _MAX_PASSPHRASE_BYTES:
         raise InvalidRequestError(
-            f"a passphrase of {size} bytes is no SRT passphrase; "
-            f"it takes {_SHORTEST_PASSPHRASE} to {_LONGEST_PASSPHRASE}"
+            f"the passphrase has {size} bytes; SRT takes {_MIN_PASSPHRASE_BYTES} to {_MAX_PASSPHRASE_BYTES}"
         )
-    return Wish(desired.revision, desired.enabled, profile or Profile.BALANCED, desired.passphrase)
+    return DesiredState(message.revision, message.enabled, profile or Profile.BALANCED, message.passphrase)
 
 
-def actual(status: Status) -> pb.ActualState:
-    """What is."""
-    counters = status.counters
+def actual_state(actual: ActualState) -> pb.ActualState:
+    """Returns the message of an actual state; where names agree, fields are copied by name."""
     return pb.ActualState(
-        instance_id=status.instance_id,
-        applied_revision=status.applied_revision,
-        state=STATES[status.state],
-        profile=PROFILES[status.profile],
-        last_error=status.last_error,
-        stream=_stream(status.stream) if status.stream else None,
-        encoder=_encoder(status.encoder) if status.encoder else None,
-        measurement=_measurement(status.measurement) if status.measurement else None,
-        counters=pb.Counters(
-            starts=counters.starts,
-            restarts=counters.restarts,
-            faults=counters.faults,
-            fallbacks=counters.fallbacks,
-        ),
-        listener=pb.Listener(port=status.port, latency_ms=status.latency_ms),
+        instance_id=actual.instance_id,
+        applied_revision=actual.applied_revision,
+        state=STATES[actual.state],
+        profile=PROFILES[actual.profile],
+        last_error=actual.last_error,
+        stream=_stream(actual.stream) if actual.stream else None,
+        encoder=pb.Encoder(**asdict(actual.encoder)) if actual.encoder else None,
+        measurement=pb.Measurement(**asdict(actual.measurement)) if actual.measurement else None,
+        counters=pb.Counters(**asdict(actual.counters)),
+        listener=pb.Listener(port=actual.port, latency_ms=actual.latency_ms),
     )
 
 
 def candidate(encoder: Encoder, verdict: Verdict) -> pb.EncoderCandidate:
-    """One encoder and what came of trying it."""
+    """Returns the message of an encoder and its trial."""
     return pb.EncoderCandidate(
         name=encoder.name,
         family=encoder.family,
         element=encoder.element,
         codec=CODECS[encoder.codec],
         hardware=encoder.hardware,
-        present=verdict.present,
-        proven=verdict.proven,
-        reason=verdict.reason,
-        first_byte_ms=verdict.first_byte_ms,
+        **asdict(verdict),
     )
 
 
-def _stream(stream: StreamStatus) -> pb.Stream:
+def _stream(stream: StreamState) -> pb.Stream:
     return pb.Stream(
         width_px=stream.target.width_px,
         height_px=stream.target.height_px,
@@ -103,24 +84,4 @@ def _stream(stream: StreamStatus) -> pb.Stream:
         codec=CODECS[stream.codec],
         encrypted=stream.encrypted,
         bitrate_reason=stream.bitrate_reason,
-    )
-
-
-def _encoder(choice: EncoderChoice) -> pb.Encoder:
-    return pb.Encoder(
-        name=choice.name,
-        hardware=choice.hardware,
-        wanted=choice.wanted,
-        fallback_reason=choice.fallback_reason,
-    )
-
-
-def _measurement(measured: Measurement) -> pb.Measurement:
-    return pb.Measurement(
-        fps=measured.fps,
-        bitrate_kbps=measured.bitrate_kbps,
-        viewer_count=measured.viewer_count,
-        last_frame_age_ms=measured.last_frame_age_ms,
-        worst_rtt_ms=measured.worst_rtt_ms,
-        worst_loss_percent=measured.worst_loss_percent,
     )

@@ -1,4 +1,4 @@
-"""The service's methods: receive, map, call, map, reply."""
+"""PreviewService: receives, maps, calls, maps, replies."""
 
 import asyncio
 from collections.abc import AsyncIterator, Sequence
@@ -10,62 +10,56 @@ import grpc
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
-from preview.encoders.probe import Prober
-from preview.manager import Manager
+from preview.encoders.selection import Prober
 from preview.rpc import mapping
+from preview.supervisor import Supervisor
 
 SERVICE: Final = pb.DESCRIPTOR.services_by_name["PreviewService"].full_name
 
-_SIGN_OF_LIFE_S: Final = 2.0
-_SIGN_OF_LIFE_WITH_PIPELINE_S: Final = 0.5
+_HEARTBEAT_S: Final = 2.0
+_HEARTBEAT_WITH_PIPELINE_S: Final = 0.5
 
 
 class PreviewServicer(pb_grpc.PreviewServiceServicer):
     """PreviewService.
 
     Args:
-        manager: the preview.
-        prober: the encoders' trials.
-        encoders: all there are, in the order of preference.
+        supervisor: the preview.
+        prober: runs the trials of encoders.
+        encoders: all encoders, in order of preference.
     """
 
-    def __init__(self, manager: Manager, prober: Prober, encoders: Sequence[Encoder]) -> None:
-        self._manager = manager
+    def __init__(self, supervisor: Supervisor, prober: Prober, encoders: Sequence[Encoder]) -> None:
+        self._supervisor = supervisor
         self._prober = prober
         self._encoders = tuple(encoders)
 
     def register(self, server: grpc.aio.Server) -> None:
-        """Has the server offer the methods."""
+        """Adds the methods to a server."""
         pb_grpc.add_PreviewServiceServicer_to_server(self, server)
 
     async def ApplyDesiredState(  # noqa: N802  # the schema names it
         self, request: pb.ApplyDesiredStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ApplyDesiredStateResponse:
-        """Takes the wish in."""
-        status = self._manager.apply(mapping.wish(request.desired))
-        return pb.ApplyDesiredStateResponse(actual=mapping.actual(status))
+        """Applies a desired state; returns the actual state at that moment."""
+        actual = self._supervisor.apply(mapping.desired_state(request.desired))
+        return pb.ApplyDesiredStateResponse(actual=mapping.actual_state(actual))
 
     async def WatchActualState(  # noqa: N802  # the schema names it
         self, _request: pb.WatchActualStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchActualStateResponse]:
-        """Tells what is, now and on every change; whoever reads slowly skips what is outdated."""
-        self._manager.watcher_came()
-        try:
+        """Streams the actual state, now and on every change; a slow reader skips outdated states."""
+        with self._supervisor.watched():
             while True:
-                changed, status = self._manager.changed, self._manager.status()
-                yield pb.WatchActualStateResponse(actual=mapping.actual(status))
-                pause_s = _SIGN_OF_LIFE_WITH_PIPELINE_S if status.stream else _SIGN_OF_LIFE_S
+                changed, actual = self._supervisor.changed, self._supervisor.actual()
+                yield pb.WatchActualStateResponse(actual=mapping.actual_state(actual))
+                heartbeat_s = _HEARTBEAT_WITH_PIPELINE_S if actual.stream else _HEARTBEAT_S
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(changed.wait(), pause_s)
-        finally:
-            self._manager.watcher_left()
+                    await asyncio.wait_for(changed.wait(), heartbeat_s)
 
     async def ListEncoders(  # noqa: N802  # the schema names it
         self, _request: pb.ListEncodersRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ListEncodersResponse:
-        """Tries what was not tried yet, and tells."""
-        return pb.ListEncodersResponse(
-            encoders=[
-                mapping.candidate(encoder, await self._prober.verdict(encoder)) for encoder in self._encoders
-            ]
-        )
+        """Returns all encoders with the results of their trials; runs those that are still missing."""
+        verdicts = [(encoder, await self._prober.verdict(encoder)) for encoder in self._encoders]
+        return pb.ListEncodersResponse(encoders=[mapping.candidate(*each) for each in verdicts])

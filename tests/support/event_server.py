@@ -6,13 +6,14 @@ from typing import Any, Self
 
 import grpc
 
+from common.broadcast import Broadcast
 from common.rpc import new_server
 from console.client import EventPosition
+from gateway.rpc.event_stream import EventStream
 from gateway.rpc.mapping.events import position_from
-from gateway.rpc.subscribing import EventStreams
-from gateway.status.event import ModeChanged, News
-from gateway.status.events import EventLog
-from gateway.status.faults.fault import Severity
+from gateway.status.event import Event, ModeChanged
+from gateway.status.event_log import EventLog
+from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 
 
@@ -39,7 +40,8 @@ class EventServer:
         """So many things happen at once."""
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
-            self._log.add(News(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
+            self._log.add(Event(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
+        self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
 
     async def restart(self) -> None:
@@ -59,11 +61,12 @@ class EventServer:
     async def _start(self) -> None:
         self._runs += 1
         self._log = EventLog(f"run {self._runs}", self._kept)
-        streams = EventStreams(self._log)
+        self._appended = Broadcast()
+        stream = EventStream(self._log, self._appended)
 
         def subscribe(request: SubscribeEventsRequest, _context: Any) -> Any:
             after = position_from(request.after) if request.HasField("after") else None
-            return streams.events(after, Severity.INFO)
+            return stream.responses(after, Severity.INFO)
 
         handler = grpc.unary_stream_rpc_method_handler(
             _as_generator(subscribe), SubscribeEventsRequest.FromString, None

@@ -10,11 +10,11 @@ from typing import Any
 import grpc
 
 from common.free import free_tcp_port
-from gateway.access.authority import Pair
-from gateway.access.bundle import Bundle
+from gateway.access.ca import KeyPair
 from gateway.access.credential import Credential, Kind
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keeping import Keeper, Wanted
+from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
 from gateway.app import serve
 from gateway.config import GatewaySettings
@@ -28,7 +28,7 @@ class Login:
     """What one caller shows."""
 
     token: str | None = None
-    client: Pair | None = None
+    client: KeyPair | None = None
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
         return () if self.token is None else (("authorization", f"Bearer {self.token}"),)
@@ -48,12 +48,12 @@ class Robot:
     channels: list[grpc.aio.Channel] = field(default_factory=list)
 
     @property
-    def keeper(self) -> Keeper:
-        return Keeper(self.directory, "lab")
+    def admin(self) -> CredentialAdmin:
+        return CredentialAdmin(self.directory, "lab")
 
     @property
-    def authority(self) -> bytes:
-        return self.directory.read_authority().certificate
+    def ca(self) -> bytes:
+        return self.directory.ca.read().certificate
 
     @property
     def audit_file(self) -> Path:
@@ -62,14 +62,14 @@ class Robot:
     def add(
         self, role: Role, kind: Kind = Kind.TOKEN, name: str = "anna", **wanted: Any
     ) -> "tuple[Credential, Login]":
-        credential, bundle = self.keeper.add(Wanted(name, role, kind, **wanted))
+        credential, bundle = self.admin.add(CredentialRequest(name, role, kind, **wanted))
         return credential, login_of(bundle)
 
-    def channel(self, login: Login = NOTHING, authority: bytes | None = None) -> grpc.aio.Channel:
+    def channel(self, login: Login = NOTHING, ca: bytes | None = None) -> grpc.aio.Channel:
         """A connection of its own; closed with the gateway."""
         client = login.client
         credentials = grpc.ssl_channel_credentials(
-            authority or self.authority,
+            ca or self.ca,
             private_key=client.key if client else None,
             certificate_chain=client.certificate if client else None,
         )
@@ -80,14 +80,14 @@ class Robot:
         return channel
 
 
-def login_of(bundle: Bundle) -> Login:
+def login_of(bundle: LoginBundle) -> Login:
     return Login(bundle.token or None, bundle.client)
 
 
 def new_robot(path: Path) -> Robot:
     """Credentials alone; nothing runs yet."""
     robot = Robot(CredentialDirectory(path))
-    robot.keeper.begin(HOSTS)
+    robot.admin.initialize(HOSTS)
     return robot
 
 

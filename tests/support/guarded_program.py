@@ -14,8 +14,8 @@ from console.client import Credentials, GatewayClient, PreviewState, Unreachable
 from console.robots import read_credentials, read_robots_file
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
 from tests.support.guarded_gateway import HOSTS
 from tests.support.robotctl import robotctl, robotctl_process
@@ -33,7 +33,7 @@ class Guarded:
     """A guarded gateway in another process, and a laptop.
 
     Args:
-        keeper: adds and revokes, as on the robot.
+        admin: adds and revokes, as on the robot.
         target: the gateway's address.
         home: the laptop's configuration directory.
         own: an admin's credentials, for the test itself.
@@ -41,7 +41,7 @@ class Guarded:
         kind: of all credentials here.
     """
 
-    keeper: Keeper
+    admin: CredentialAdmin
     target: str
     home: Path
     own: Credentials
@@ -50,7 +50,7 @@ class Guarded:
 
     def log_in(self, person: str, role: Role) -> dict[str, Any]:
         """Hands a new login over, which the laptop keeps from now on; what `robotctl login --json` said."""
-        _, bundle = self.keeper.add(Wanted(person, role, self.kind))
+        _, bundle = self.admin.add(CredentialRequest(person, role, self.kind))
         file = self.home / f"{person}.login"
         file.write_text(bundle.text(), encoding="utf-8")
         done = self.robotctl("login", ROBOT, self.target, str(file), "--json")
@@ -110,9 +110,9 @@ def guarded_program(
         settings: keys of the gateway's configuration.
     """
     credentials, port = CredentialDirectory(directory / "credentials"), free_tcp_port()
-    keeper = Keeper(credentials, ROBOT)
-    keeper.begin(HOSTS)
-    _, bundle = keeper.add(Wanted("the-test", Role.ADMIN, kind))
+    admin = CredentialAdmin(credentials, ROBOT)
+    admin.initialize(HOSTS)
+    _, bundle = admin.add(CredentialRequest("the-test", Role.ADMIN, kind))
     config = directory / "gateway.yaml"
     values = {
         "name": "lab-1",
@@ -131,7 +131,7 @@ def guarded_program(
     with log_file.open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
     own = parse_login(bundle.text()).credentials
-    robot = Guarded(keeper, f"127.0.0.1:{port}", home, own, log_file, kind)
+    robot = Guarded(admin, f"127.0.0.1:{port}", home, own, log_file, kind)
     try:
         wait_until(lambda: process.poll() is not None or robot.answers(), "the gateway is up", _UP_WITHIN_S)
         assert process.poll() is None, robot.log()

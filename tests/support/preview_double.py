@@ -1,9 +1,9 @@
-"""A double of the preview service: the real schema on a real Unix socket, and no video behind it.
+"""A double of the preview service: the real schema on a real Unix socket, without video.
 
     python -m tests.support.preview_double SOCKET [BEHAVIOUR]
 
-It takes a wish in and reaches it at once, unless its behaviour says otherwise. Every run is another process
-of the service to the gateway: it makes an instance id of its own and counts from 0.
+It reaches a desired state at once, unless its behaviour says otherwise. To the gateway every run is another
+process of the service: it has an instance id of its own and counts from 0.
 """
 
 import asyncio
@@ -30,13 +30,13 @@ SIGN_OF_LIFE_S = 0.5
 
 
 class Behaviour(StrEnum):
-    """What becomes of an enabled wish."""
+    """Outcome of an enabled desired state."""
 
     WORKS = "works"
     FAULTS = "faults"
     STAYS_STARTING = "stays-starting"
     REFUSES = "refuses"
-    SPEAKS_STRANGELY = "speaks-strangely"
+    REPORTS_AN_UNKNOWN_STATE = "reports-an-unknown-state"
 
 
 _REACHES = {
@@ -47,23 +47,33 @@ _REACHES = {
 
 
 class PreviewDouble(PreviewServiceServicer):
-    """Remembers every wish it was given in `wishes`."""
+    """A service in this process.
+
+    Attributes:
+        applied: every desired state that it was sent.
+        thawed: while it is not set, no call is answered, though connections are accepted.
+        reports_end: has the next stream of reports end after its first message.
+    """
 
     def __init__(self, behaviour: Behaviour = Behaviour.WORKS) -> None:
         self.behaviour = behaviour
-        self.wishes: list[pb.DesiredState] = []
+        self.applied: list[pb.DesiredState] = []
+        self.thawed = asyncio.Event()
+        self.thawed.set()
+        self.reports_end = False
         self._changed = asyncio.Event()
         self.actual = pb.ActualState(
             instance_id=uuid.uuid4().hex,
             state=pb.LIFECYCLE_STATE_DISABLED,
             listener=pb.Listener(port=7100, latency_ms=125),
         )
-        if behaviour is Behaviour.SPEAKS_STRANGELY:
+        if behaviour is Behaviour.REPORTS_AN_UNKNOWN_STATE:
             self.actual.state = 42  # type: ignore[assignment]  # the point of it
 
     async def ApplyDesiredState(self, request: pb.ApplyDesiredStateRequest, context: Any) -> Any:  # noqa: N802  # grpc's name
+        await self.thawed.wait()
         desired = request.desired
-        self.wishes.append(desired)
+        self.applied.append(desired)
         if self.behaviour is Behaviour.REFUSES and desired.enabled:
             await context.abort(grpc.StatusCode.INVALID_ARGUMENT, "the double refuses")
         self.actual.applied_revision = desired.revision
@@ -87,13 +97,17 @@ class PreviewDouble(PreviewServiceServicer):
 
     async def WatchActualState(self, request: Any, context: Any) -> AsyncIterator[Any]:  # type: ignore[override]  # noqa: N802
         while True:
+            await self.thawed.wait()
             self._changed.clear()
             yield pb.WatchActualStateResponse(actual=self.actual)
+            if self.reports_end:
+                self.reports_end = False
+                return
             try:
                 async with asyncio.timeout(SIGN_OF_LIFE_S):
                     await self._changed.wait()
             except TimeoutError:
-                pass  # time for a sign of life
+                pass  # time for a heartbeat
 
     async def ListEncoders(self, request: Any, context: Any) -> Any:  # noqa: N802  # grpc's name
         return pb.ListEncodersResponse()

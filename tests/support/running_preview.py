@@ -1,4 +1,4 @@
-"""A preview service of its own for a test: the real program, spoken to over its real socket."""
+"""A preview service for a test: the real program, called over its real socket."""
 
 import json
 import os
@@ -21,7 +21,7 @@ from tests.support.waiting import wait_until
 ROOT = Path(__file__).parents[2]
 DOUBLES_DIR = Path(__file__).parent / "encoder_doubles"
 PATIENCE_S = 20.0
-# Small pictures: the machine has other things to do.
+# Small frames save CPU time.
 SMALL = {"width_px": 320, "height_px": 240}
 PROFILES = {
     "low_bw": SMALL | {"fps": 15, "bitrate_kbps": 300, "floor_kbps": 100},
@@ -35,9 +35,9 @@ class RunningPreview:
 
     Args:
         directory: for its configuration, socket and log.
-        settings: keys of the configuration that differ from the test's own: a moving picture, x264, small.
+        settings: keys of the configuration that differ from the test's own: test pattern, x264, small frames.
         doubles: hardware encoders to pretend, element -> how it fails (see encoder_doubles).
-        small: whether profiles are smaller than the service's own.
+        small: whether frames are smaller than those of the service's own profiles.
     """
 
     def __init__(
@@ -100,32 +100,33 @@ class RunningPreview:
         return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:"))) / 1024
 
     def start_again(self) -> None:
-        """What a container engine does when the process has ended."""
+        """Restarts the process after its end, as a container engine does."""
         assert self.process.poll() is not None
         self.process = self._spawn()
 
-    def wish(
-        self, profile: "pb.Profile.ValueType | None" = pb.PROFILE_BALANCED, passphrase: str = ""
+    def enable(
+        self, profile: pb.Profile.ValueType = pb.PROFILE_BALANCED, passphrase: str = ""
     ) -> pb.ActualState:
-        """A new wish; without a profile: off."""
+        """Applies a new revision that enables the preview."""
         self.revision += 1
-        desired = pb.DesiredState(
-            revision=self.revision,
-            enabled=profile is not None,
-            profile=profile or pb.PROFILE_UNSPECIFIED,
-            passphrase=passphrase,
+        return self.apply(
+            pb.DesiredState(revision=self.revision, enabled=True, profile=profile, passphrase=passphrase)
         )
-        return self.apply(desired)
+
+    def disable(self) -> pb.ActualState:
+        """Applies a new revision that disables the preview."""
+        self.revision += 1
+        return self.apply(pb.DesiredState(revision=self.revision))
 
     def apply(self, desired: pb.DesiredState) -> pb.ActualState:
-        """Applies a wish as it is."""
+        """Applies a desired state as it is."""
         request = pb.ApplyDesiredStateRequest(desired=desired)
         return self.stub.ApplyDesiredState(request, timeout=PATIENCE_S, wait_for_ready=True).actual
 
     def wait_for(
         self, holds: Callable[[pb.ActualState], object], what: str, within_s: float = PATIENCE_S
     ) -> pb.ActualState:
-        """Watches the service until its state will do."""
+        """Watches the service until a condition of its state holds."""
         deadline = time.monotonic() + within_s
         last: pb.ActualState | None = None
         call = self.stub.WatchActualState(pb.WatchActualStateRequest(), timeout=within_s, wait_for_ready=True)
@@ -143,18 +144,18 @@ class RunningPreview:
         raise AssertionError(f"not within {within_s:g} s: {what}; last: {last}")
 
     def running(self, *, revision: int | None = None) -> pb.ActualState:
-        """Waits until pictures flow."""
+        """Waits until frames flow."""
         return self.wait_for(
             lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING and a.applied_revision >= (revision or 0),
             "running",
         )
 
     def disabled(self) -> pb.ActualState:
-        """Waits until nothing is left."""
+        """Waits until no pipeline is left."""
         return self.wait_for(lambda a: a.state == pb.LIFECYCLE_STATE_DISABLED, "disabled")
 
     def faulted(self, words: str = "") -> pb.ActualState:
-        """Waits for a fault that says `words`."""
+        """Waits for a fault whose text contains `words`."""
         return self.wait_for(
             lambda a: a.state == pb.LIFECYCLE_STATE_FAULTED and words in a.last_error, f"faulted: {words}"
         )

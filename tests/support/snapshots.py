@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from console.client import OverlaySnapshot
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
-from console.monitor.link import Link, Phase
-from console.monitor.state import MonitorState, Request
+from console.monitor.link import Link, LinkState
+from console.monitor.monitor_state import MonitorState, PreviewRequest
 from omniseer.gateway.v1 import overlay_pb2
 from tests.support.gateway_double import healthy_status
 
@@ -30,10 +30,10 @@ def snapshot(change: Callable[[overlay_pb2.OverlaySnapshot], object] = lambda ma
 
 
 def heard(
-    taken: OverlaySnapshot | None = None, *, received_s: float = NOW_S, request: Request | None = None
+    taken: OverlaySnapshot | None = None, *, received_s: float = NOW_S, request: PreviewRequest | None = None
 ) -> MonitorState:
     """A robot that answers."""
-    link = Link(phase=Phase.CONNECTED, since_s=received_s - 60, answer_ms=3)
+    link = Link(state=LinkState.CONNECTED, since_s=received_s - 60, answer_ms=3)
     return MonitorState(link, taken or snapshot(), received_s, request)
 
 

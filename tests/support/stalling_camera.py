@@ -1,4 +1,4 @@
-"""A camera that stops without a word: raw pictures over TCP, until the test says otherwise."""
+"""A camera that stalls without an error: raw frames over TCP, until the test stops them."""
 
 import socket
 import threading
@@ -10,7 +10,7 @@ _PERIOD_S = 1 / 30
 
 
 class StallingCamera:
-    """Serves whoever connects; `description` is the source for it."""
+    """Serves one connection at a time; `description` is the source for it."""
 
     def __init__(self) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -36,11 +36,11 @@ class StallingCamera:
         self._server.close()
 
     def stall(self) -> None:
-        """The connection stays, pictures don't come."""
+        """Stops the frames; the connection stays."""
         self._stalled.set()
 
     def go_on(self) -> None:
-        """Pictures come again."""
+        """Continues the frames."""
         self._stalled.clear()
 
     def _serve(self) -> None:
@@ -50,15 +50,15 @@ class StallingCamera:
             except TimeoutError:
                 continue
             with connection:
-                self._send_pictures(connection)
+                self._send_frames(connection)
 
-    def _send_pictures(self, connection: socket.socket) -> None:
+    def _send_frames(self, connection: socket.socket) -> None:
         connection.settimeout(5)
         shade = 0
         try:
             while not self._over.wait(_PERIOD_S):
                 if self._stalled.is_set():
-                    # Whoever gave up is noticed, so that the next one can be served.
+                    # A client that gave up is noticed, so that the next one can be served.
                     connection.setblocking(False)
                     try:
                         if connection.recv(1) == b"":

@@ -1,18 +1,18 @@
-"""A viewer that looks on in the background and notes when pictures came."""
+"""A viewer that watches a stream in the background and records when frames came."""
 
 import threading
 from itertools import pairwise
-from types import TracebackType
 from typing import Self
 
+from common.backoff import Backoff
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoPictureError
-from console.receiver.receiver import Receiver, Reconnect
+from console.receiver.errors import NoFrameError, StreamError
+from console.receiver.receiver import Receiver
 from tests.support.waiting import wait_until
 
 
 class Watcher:
-    """Watches a stream on this machine until it is left; calls again when the connection is lost.
+    """Watches a stream on this machine until its block ends; connects again when the connection is lost.
 
     Args:
         port: the listener's.
@@ -23,46 +23,49 @@ class Watcher:
     def __init__(self, port: int, passphrase: str = "", latency_ms: int = 20) -> None:
         self.arrivals_s: list[float] = []
         self.codecs: list[str] = []
-        self._receiver = Receiver(
-            StreamAddress("127.0.0.1", port, latency_ms=latency_ms, passphrase=passphrase),
-            reconnect=Reconnect(),
-            queue_size=8,
-        )
-        self._over = threading.Event()
+        self.reconnects = 0
+        """How often it had to connect again."""
+        self._address = StreamAddress("127.0.0.1", port, latency_ms=latency_ms, passphrase=passphrase)
+        self._backoff = Backoff(first_s=0.1, longest_s=2.0)
+        self._closing = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="watcher")
 
     def __enter__(self) -> Self:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._over.set()
+    def __exit__(self, *_error: object) -> None:
+        self._closing.set()
         self._thread.join(10)
-        self._receiver.close()
-
-    @property
-    def reconnects(self) -> int:
-        """How often it had to call again."""
-        return self._receiver.reconnects
 
     @property
     def longest_pause_s(self) -> float:
-        """The longest time between two pictures so far."""
+        """The longest time between two frames so far."""
         arrivals = list(self.arrivals_s)
         return max((after - before for before, after in pairwise(arrivals)), default=0.0)
 
     def wait_for_pictures(self, count: int) -> None:
-        """Waits for `count` more pictures."""
-        wanted = len(self.arrivals_s) + count
-        wait_until(lambda: len(self.arrivals_s) >= wanted, f"{count} more pictures", 20)
+        """Waits for `count` more frames."""
+        expected = len(self.arrivals_s) + count
+        wait_until(lambda: len(self.arrivals_s) >= expected, f"{count} more frames", 20)
 
     def _watch(self) -> None:
-        while not self._over.is_set():
+        while not self._closing.is_set():
             try:
-                frame = self._receiver.next_frame(timeout_s=0.2)
-            except NoPictureError:
+                with Receiver(self._address, queue_size=8) as receiver:
+                    self._take_frames(receiver)
+            except StreamError as error:
+                if error.final:
+                    raise
+                self._closing.wait(self._backoff.next_s())
+                self.reconnects += not self._closing.is_set()
+
+    def _take_frames(self, receiver: Receiver) -> None:
+        while not self._closing.is_set():
+            try:
+                frame = receiver.next_frame(timeout_s=0.2)
+            except NoFrameError:
                 continue
+            self._backoff.reset()
             self.arrivals_s.append(frame.arrival_s)
             self.codecs.append(frame.codec)

@@ -1,38 +1,37 @@
-"""Which function reads which message type."""
+"""The readers by message type and source."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from common.errors import ExitCode, UserError
 from gateway.config import SourceSettings
-from gateway.status.board import SourceKind
-from gateway.status.values import Battery, Detections, Diagnostics, Mode, Odometry, Velocity, Vision
+from gateway.status.sources import SourceSpec, ValueT
 
-Value = Odometry | Vision | Detections | Battery | Diagnostics | Mode | Velocity
-Reader = Callable[[Any, SourceSettings], Value | None]
-"""Turns a message into a value; None when the message holds nothing that can be used."""
-_ReaderT = TypeVar("_ReaderT", bound=Reader)
+Reader = Callable[[Any, SourceSettings], ValueT | None]
+"""Converts a message into a value; None if the message holds nothing usable."""
+_ReaderT = TypeVar("_ReaderT", bound=Callable[..., Any])
 
-_readers: dict[tuple[str, SourceKind], Reader] = {}
+_readers: dict[tuple[str, SourceSpec[Any]], Reader[Any]] = {}
 _headers_and_lists: set[str] = set()
 
 
 def reads(
-    message_type: str, kind: SourceKind, *, header_and_list: bool = False
+    message_type: str, *specs: SourceSpec[Any], header_and_list: bool = False
 ) -> Callable[[_ReaderT], _ReaderT]:
-    """Registers the decorated function for a message type ("nav_msgs/msg/Odometry") and what it tells.
+    """Registers the decorated function for a message type and the sources that may have it.
 
     Args:
         message_type: package/msg/Name.
-        kind: what it tells.
-        header_and_list: whether the message is a std_msgs/Header, one list and nothing else; such lists are
-            cut to what is wanted before they are decoded.
+        specs: the sources; their value type is what the function returns.
+        header_and_list: whether the message consists of a std_msgs/Header and one list; such lists are
+            truncated before deserialisation.
     """
 
     def register(reader: _ReaderT) -> _ReaderT:
-        if (message_type, kind) in _readers:
-            raise ValueError(f"two readers for {message_type} as {kind.value}")
-        _readers[message_type, kind] = reader
+        for spec in specs:
+            if (message_type, spec) in _readers:
+                raise ValueError(f"two readers for {message_type} as {spec.kind}")
+            _readers[message_type, spec] = reader
         if header_and_list:
             _headers_and_lists.add(message_type)
         return reader
@@ -40,23 +39,27 @@ def reads(
     return register
 
 
-def reader_for(source: SourceSettings) -> Reader:
-    """The reader of a configured source.
+def reader_for(source: SourceSettings) -> Reader[Any]:
+    """Returns the reader of a configured source.
 
     Raises:
-        UserError: no reader is known for this type; the line names those that are.
+        UserError: the type has no reader; the line names the types that have one.
     """
-    reader = _readers.get((source.type, source.kind))
+    reader = _readers.get((source.type, source.spec))
     if reader is None:
-        known = sorted(name for name, kind in _readers if kind is source.kind)
         raise UserError(
-            f"source '{source.name}' ({source.topic}) has type {source.type}, which no reader knows",
-            f"Use one of {', '.join(known)}, or add a reader (gateway/ros/readers)",
+            f"source '{source.name}' ({source.topic}) has type {source.type}, which no reader supports",
+            f"Use one of {', '.join(types_of(source.spec))}, or add a reader (docs/adding-a-source.md)",
             exit_code=ExitCode.USAGE,
         )
     return reader
 
 
+def types_of(spec: SourceSpec[Any]) -> list[str]:
+    """Returns the message types that a source can be read from, sorted."""
+    return sorted(message_type for message_type, registered in _readers if registered is spec)
+
+
 def is_header_and_list(source: SourceSettings) -> bool:
-    """Whether the source's messages are a header, one list and nothing else."""
+    """Returns whether the source's messages consist of a header and one list."""
     return source.type in _headers_and_lists

@@ -1,1 +1,1 @@
-"""Between the domain and the contract; nothing else in the gateway knows the contract's messages."""
+"""Conversion between the domain and the contract's messages, which no other package of the gateway knows."""

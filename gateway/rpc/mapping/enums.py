@@ -1,75 +1,49 @@
-"""Every enum of the domain and its value in the contract. The tables are total; a test walks them."""
+"""Every enum of the domain and its value in the contract. A test checks that the tables are total."""
 
 from collections.abc import Mapping
-from typing import Final
+from enum import Enum
+from typing import Any, Final, TypeVar
 
 from common.errors import InvalidRequestError
 from gateway.status.event import ControlResult
-from gateway.status.events import GapReason
-from gateway.status.faults.fault import Severity
+from gateway.status.event_log import GapReason
+from gateway.status.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.preview import Codec, PreviewState, Profile
-from gateway.status.sources import SourceState
+from gateway.status.source_view import SourceState
 from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2
 
-PREVIEW_STATES: Final[Mapping[PreviewState, states_pb2.PreviewState.ValueType]] = {
-    PreviewState.DISABLED: states_pb2.PREVIEW_DISABLED,
-    PreviewState.STARTING: states_pb2.PREVIEW_STARTING,
-    PreviewState.RUNNING: states_pb2.PREVIEW_RUNNING,
-    PreviewState.STOPPING: states_pb2.PREVIEW_STOPPING,
-    PreviewState.FAULTED: states_pb2.PREVIEW_FAULTED,
-}
-PROFILES: Final[Mapping[Profile | None, preview_pb2.PreviewProfile.ValueType]] = {
-    None: preview_pb2.PREVIEW_PROFILE_UNSPECIFIED,
-    Profile.LOW_BW: preview_pb2.PREVIEW_PROFILE_LOW_BW,
-    Profile.BALANCED: preview_pb2.PREVIEW_PROFILE_BALANCED,
-    Profile.HIGH_QUALITY: preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY,
-}
-CODECS: Final[Mapping[Codec | None, preview_pb2.VideoCodec.ValueType]] = {
-    None: preview_pb2.VIDEO_CODEC_UNSPECIFIED,
-    Codec.H264: preview_pb2.VIDEO_CODEC_H264,
-    Codec.H265: preview_pb2.VIDEO_CODEC_H265,
-}
-HEALTH_STATES: Final[Mapping[HealthState, states_pb2.RobotHealthState.ValueType]] = {
-    HealthState.OK: states_pb2.ROBOT_HEALTH_OK,
-    HealthState.DEGRADED: states_pb2.ROBOT_HEALTH_DEGRADED,
-}
-SEVERITIES: Final[Mapping[Severity, fault_pb2.FaultSeverity.ValueType]] = {
-    Severity.INFO: fault_pb2.FAULT_SEVERITY_INFO,
-    Severity.WARNING: fault_pb2.FAULT_SEVERITY_WARNING,
-    Severity.ERROR: fault_pb2.FAULT_SEVERITY_ERROR,
-}
-SOURCE_STATES: Final[Mapping[SourceState, source_pb2.SourceState.ValueType]] = {
-    SourceState.WAITING: source_pb2.SOURCE_STATE_WAITING,
-    SourceState.SILENT: source_pb2.SOURCE_STATE_SILENT,
-    SourceState.RECEIVING: source_pb2.SOURCE_STATE_RECEIVING,
-    SourceState.STALE: source_pb2.SOURCE_STATE_STALE,
-    SourceState.QOS_MISMATCH: source_pb2.SOURCE_STATE_QOS_MISMATCH,
-    SourceState.WRONG_TYPE: source_pb2.SOURCE_STATE_WRONG_TYPE,
-    SourceState.TYPE_MISSING: source_pb2.SOURCE_STATE_TYPE_MISSING,
-}
-CONTROL_RESULTS: Final[Mapping[ControlResult, event_pb2.ControlResult.ValueType]] = {
-    ControlResult.ACCEPTED: event_pb2.CONTROL_RESULT_ACCEPTED,
-    ControlResult.REFUSED: event_pb2.CONTROL_RESULT_REFUSED,
-    ControlResult.FAILED: event_pb2.CONTROL_RESULT_FAILED,
-}
-GAP_REASONS: Final[Mapping[GapReason, event_pb2.EventGapReason.ValueType]] = {
-    GapReason.NO_LONGER_KEPT: event_pb2.EVENT_GAP_REASON_NO_LONGER_KEPT,
-    GapReason.NEW_RUN: event_pb2.EVENT_GAP_REASON_NEW_RUN,
-}
+_MemberT = TypeVar("_MemberT", bound=Enum)
+
+
+def _by_name(domain: type[_MemberT], wire: Any, prefix: str) -> dict[_MemberT, Any]:
+    """Returns the value of the same name for each member. Raises ValueError, at import, if there is none."""
+    return {member: wire.Value(f"{prefix}_{member.name}") for member in domain}
+
+
+PREVIEW_STATES: Final = _by_name(PreviewState, states_pb2.PreviewState, "PREVIEW")
+PROFILES: Final[Mapping[Profile | None, Any]] = {None: preview_pb2.PREVIEW_PROFILE_UNSPECIFIED} | _by_name(
+    Profile, preview_pb2.PreviewProfile, "PREVIEW_PROFILE"
+)
+CODECS: Final[Mapping[Codec | None, Any]] = {None: preview_pb2.VIDEO_CODEC_UNSPECIFIED} | _by_name(
+    Codec, preview_pb2.VideoCodec, "VIDEO_CODEC"
+)
+HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")
+SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
+SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
+CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
+GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
-
-
 _SEVERITY_OF: Final[Mapping[int, Severity]] = {number: severity for severity, number in SEVERITIES.items()}
 
 
 def least_severity_from(number: int) -> Severity:
-    """The least severity a client wants to hear of; the schema's rules let no unknown number through."""
+    """Returns the minimum severity that a client requests; the schema's rules reject unknown numbers."""
     return _SEVERITY_OF.get(number, Severity.INFO)
 
 
 def profile_from(number: int) -> Profile | None:
-    """The profile a client asks for; None for "keep the current one".
+    """Returns the profile that a client requests; None to keep the current one.
 
     Raises:
         InvalidRequestError: the contract has no such profile.

@@ -1,4 +1,4 @@
-"""Events, as the contract tells them."""
+"""Events as messages of the contract."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -10,49 +10,49 @@ from gateway.status.event import (
     ClientLeft,
     ControlAction,
     EncoderFallback,
-    Event,
     FaultCleared,
     FaultRaised,
+    LoggedEvent,
     ModeChanged,
     PreviewChanged,
 )
-from gateway.status.events import Gap, Position
+from gateway.status.event_log import Gap, Position
 from omniseer.gateway.v1 import event_pb2 as pb
 
 _NS_PER_S: Final = 1_000_000_000
 
 
-def event_message(event: Event, run_id: str) -> pb.Event:
-    """One event of this run."""
-    news = event.news
-    field, payload = _PAYLOADS[type(news.detail)]
+def event_message(logged: LoggedEvent, run_id: str) -> pb.Event:
+    """Returns one event of this run."""
+    event = logged.event
+    field, payload = _PAYLOADS[type(event.detail)]
     message = pb.Event(
         run_id=run_id,
-        sequence=event.sequence,
-        monotonic_ns=int(event.at_s * _NS_PER_S),
-        wall_clock_unix_ms=event.unix_ms,
-        severity=SEVERITIES[news.severity],
-        component=news.component,
-        message=news.message,
+        sequence=logged.sequence,
+        monotonic_ns=int(logged.at_s * _NS_PER_S),
+        wall_clock_unix_ms=logged.unix_ms,
+        severity=SEVERITIES[event.severity],
+        component=event.component,
+        message=event.message,
     )
-    getattr(message, field).CopyFrom(payload(news.detail, event.at_s))
+    getattr(message, field).CopyFrom(payload(event.detail, logged.at_s))
     return message
 
 
 def gap_message(gap: Gap) -> pb.EventGap:
-    """Events are missing."""
+    """Returns the notice that events are missing."""
     return pb.EventGap(
         reason=GAP_REASONS[gap.reason], missed_count=gap.missed, position=position_message(gap.position)
     )
 
 
 def position_message(position: Position) -> pb.EventPosition:
-    """A place in the order of events."""
+    """Returns the position in the event log."""
     return pb.EventPosition(run_id=position.run_id, sequence=position.sequence)
 
 
 def position_from(message: pb.EventPosition) -> Position:
-    """The place a client wants to go on from."""
+    """Returns the position after which a client resumes."""
     return Position(message.run_id, message.sequence)
 
 
@@ -95,4 +95,4 @@ _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
     ControlAction: ("control_action", _control),
     ModeChanged: ("robot_mode_changed", lambda detail, _: pb.RobotModeChanged(mode=detail.mode)),
 }
-"""Total: a test walks every kind of event, and every payload of the schema."""
+"""Total: a test checks every kind of event, and every payload of the schema."""

@@ -1,12 +1,12 @@
-"""What is wrong, as the contract tells it."""
+"""Faults as messages of the contract."""
 
 from gateway.rpc.mapping.enums import SEVERITIES
-from gateway.status.faults.fault import Fault
+from gateway.status.fault import Fault
 from omniseer.gateway.v1 import fault_pb2 as pb
 
 
 def fault_message(fault: Fault, now_s: float) -> pb.Fault:
-    """One fault at `now_s`."""
+    """Returns one fault with its ages at `now_s`."""
     condition = fault.condition
     return pb.Fault(
         id=condition.fault_id,

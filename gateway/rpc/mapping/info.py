@@ -1,8 +1,8 @@
-"""The gateway program itself, as the contract tells it."""
+"""The gateway process as messages of the contract."""
 
 from collections.abc import Mapping
 
-from gateway.rpc.tally import Counts
+from gateway.rpc.interceptors.stats import MethodStats
 from gateway.status.runtime import Runtime
 from gateway.status.snapshot import Snapshot
 from omniseer.gateway.v1 import gateway_info_pb2 as pb
@@ -10,7 +10,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse
 
 
 def gateway_facts(runtime: Runtime) -> pb.GatewayFacts:
-    """What comes with every status."""
+    """Returns the part that every status carries."""
     return pb.GatewayFacts(
         revision=runtime.revision,
         boot_id=runtime.boot_id,
@@ -23,9 +23,9 @@ def gateway_facts(runtime: Runtime) -> pb.GatewayFacts:
 
 
 def gateway_info(
-    snapshot: Snapshot, methods: Mapping[str, Counts], wall_clock_unix_ms: int, configuration_json: str
+    snapshot: Snapshot, methods: Mapping[str, MethodStats], wall_clock_unix_ms: int, configuration_json: str
 ) -> GetGatewayInfoResponse:
-    """Everything about the gateway program."""
+    """Returns everything about the gateway process."""
     return GetGatewayInfoResponse(
         gateway_name=snapshot.identity.name,
         gateway_version=snapshot.identity.version,

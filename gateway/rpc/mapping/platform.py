@@ -1,25 +1,27 @@
-"""The robot's computer and batteries as the contract tells them."""
+"""The robot's computer and batteries as messages of the contract."""
 
 from typing import Final
 
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
+from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Battery, Compute, Network
 from omniseer.gateway.v1 import platform_pb2 as pb
 
-# How operators know the two batteries; no address of any kind.
+# The batteries under the names that operators use; never a topic or a device.
 _TRACTION: Final = "robot"
 _ONBOARD: Final = "computer"
 
 
 def platform_status(snapshot: Snapshot) -> pb.PlatformStatus:
-    """All of it, each part with its own freshness."""
+    """Returns all parts, each with its own freshness."""
     return pb.PlatformStatus(
-        compute=_compute(snapshot.compute),
-        network=_network(snapshot.network),
+        compute=_compute(snapshot[COMPUTE]),
+        network=_network(snapshot[NETWORK]),
         power=pb.PowerStatus(
-            lipo_battery=_battery(snapshot.battery, _TRACTION),
-            onboard_battery=_battery(snapshot.onboard_battery, _ONBOARD),
+            lipo_battery=_battery(snapshot[BATTERY], _TRACTION),
+            onboard_battery=_battery(snapshot[ONBOARD_BATTERY], _ONBOARD),
         ),
     )
 
@@ -29,9 +31,7 @@ def _compute(sample: Sample[Compute]) -> pb.ComputeStatus:
     if value is None:
         return pb.ComputeStatus()
     return pb.ComputeStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         cpu_percent=value.cpu_percent,
         cpu_temperature_available=value.cpu_temperature_c is not None,
         cpu_temperature_c=value.cpu_temperature_c or 0.0,
@@ -50,9 +50,7 @@ def _network(sample: Sample[Network]) -> pb.NetworkStatus:
     if value is None:
         return pb.NetworkStatus()
     return pb.NetworkStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         connected=value.connected,
         interface_name=value.interface_name,
         wifi_signal_available=value.wifi_signal_dbm is not None,
@@ -67,9 +65,7 @@ def _battery(sample: Sample[Battery], source: str) -> pb.BatteryStatus:
     if value is None:
         return pb.BatteryStatus(source=source)
     return pb.BatteryStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         source=source,
         present=value.present,
         voltage_available=value.voltage_v is not None,

@@ -1,10 +1,11 @@
-"""The live preview as the contract tells it."""
+"""The live preview as messages of the contract."""
 
 from typing import Final
 
 from common.bind import bracketed
-from gateway.rpc.caller import Caller
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
+from gateway.rpc.mapping.freshness import freshness_fields
+from gateway.rpc.recipient import Recipient
 from gateway.status.freshness import Sample
 from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
@@ -20,15 +21,17 @@ _NO_STREAM: Final = Stream(
 )
 
 
-def preview_status(preview: PreviewView, measured: Sample[Measurement], caller: Caller) -> pb.PreviewStatus:
-    """The preview as `caller` may see it."""
+def preview_status(
+    preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
+) -> pb.PreviewStatus:
+    """Returns the preview; the passphrase only if the recipient may see it."""
     stream = preview.stream or _NO_STREAM
     encoder = preview.encoder
     return pb.PreviewStatus(
         state=PREVIEW_STATES[preview.state],
         profile=PROFILES[preview.profile],
         last_error=preview.last_error,
-        endpoint=_endpoint(preview.listener, stream, preview.passphrase, caller)
+        endpoint=_endpoint(preview.listener, stream, preview.passphrase, recipient)
         if preview.listener
         else None,
         encoder=_encoder(encoder, stream) if encoder else None,
@@ -41,17 +44,18 @@ def preview_status(preview: PreviewView, measured: Sample[Measurement], caller: 
     )
 
 
-def _endpoint(listener: Listener, stream: Stream, passphrase: str, caller: Caller) -> pb.StreamEndpoint:
+def _endpoint(listener: Listener, stream: Stream, passphrase: str, recipient: Recipient) -> pb.StreamEndpoint:
     encrypted = stream.encrypted or bool(passphrase)
+    host = recipient.robot_host
     return pb.StreamEndpoint(
         transport=pb.STREAM_TRANSPORT_SRT,
-        host=caller.robot_host,
+        host=host,
         port=listener.port,
-        uri=f"srt://{bracketed(caller.robot_host)}:{listener.port}?mode=caller&latency={listener.latency_ms}",
+        uri=f"srt://{bracketed(host)}:{listener.port}?mode=caller&latency={listener.latency_ms}",
         latency_ms=listener.latency_ms,
         codec=CODECS[stream.codec],
         container=pb.STREAM_CONTAINER_MPEG_TS,
-        passphrase=passphrase if caller.may_watch else "",
+        passphrase=passphrase if recipient.sees_passphrase else "",
         encrypted=encrypted,
     )
 
@@ -71,15 +75,12 @@ def _video(stream: Stream) -> pb.VideoFormat:
 
 
 def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
-    freshness = sample.freshness
     return pb.StreamMeasurement(
-        available=freshness.available,
-        stale=freshness.stale,
-        age_ms=freshness.age_ms,
+        **freshness_fields(sample.freshness),
         fps=measurement.fps,
         bitrate_kbps=measurement.bitrate_kbps,
         viewer_count=measurement.viewer_count,
-        last_frame_age_ms=measurement.last_frame_age_ms + freshness.age_ms,
+        last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
     )

@@ -1,52 +1,65 @@
-"""The whole status, and the overlay, as the contract tells them."""
+"""The whole status, and the overlay, as messages of the contract."""
 
 import math
 from typing import Final
 
-from gateway.rpc.caller import Caller
-from gateway.rpc.mapping.enums import HEALTH_STATES
+from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
 from gateway.rpc.mapping.faults import fault_message
+from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
-from gateway.rpc.mapping.sources import source_status
+from gateway.rpc.recipient import Recipient
 from gateway.status.command import Command
-from gateway.status.events import OperatorEvent
+from gateway.status.event_log import OperatorEvent
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
+from gateway.status.source_view import SourceView
+from gateway.status.sources import (
+    DETECTIONS,
+    DIAGNOSTICS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    MUX_INPUTS,
+    ODOMETRY,
+    VISION,
+)
 from gateway.status.values import Detection, Detections, Mode, Odometry, Vision
-from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
+from omniseer.gateway.v1 import overlay_pb2, source_pb2, system_status_pb2
 
-# Who gave a command that can't be attributed.
-_NOBODY: Final = "unknown"
+NOT_MAPPED: Final = frozenset({DIAGNOSTICS, EFFECTIVE_COMMAND, *MUX_INPUTS.values()})
+"""Sources whose values have no field of their own: they become faults, or the attributed command."""
+
+_UNATTRIBUTED: Final = "unknown"
+"""The source of a command that can't be attributed."""
 
 
-def system_status(snapshot: Snapshot, caller: Caller) -> system_status_pb2.SystemStatus:
-    """Everything but detections and events.
+def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2.SystemStatus:
+    """Returns everything but detections and events.
 
-    `teleop` stays unset: this gateway has no such values, and unset reads as "not available".
+    `teleop` stays unset, which means "not available".
     """
     return system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
         gateway_version=snapshot.identity.version,
-        preview=preview_status(snapshot.preview, snapshot.preview_measured, caller),
-        vision=_vision(snapshot.vision),
+        preview=preview_status(snapshot.preview, snapshot.preview_measured, recipient),
+        vision=_vision(snapshot[VISION]),
         health=_health(snapshot),
         platform=platform_status(snapshot),
         effective_command=_command(snapshot.command),
-        mission=_mission(snapshot.mode),
+        mission=_mission(snapshot[MODE]),
         insecure=snapshot.identity.insecure,
         faults=[fault_message(fault, snapshot.at_s) for fault in snapshot.faults],
-        sources=[source_status(source) for source in snapshot.sources],
+        sources=[_source(source) for source in snapshot.sources],
         gateway=gateway_facts(snapshot.gateway),
     )
 
 
-def overlay_snapshot(snapshot: Snapshot, caller: Caller) -> overlay_pb2.OverlaySnapshot:
-    """Everything, from the same instant."""
+def overlay_snapshot(snapshot: Snapshot, recipient: Recipient) -> overlay_pb2.OverlaySnapshot:
+    """Returns status, detections and events of one instant."""
     return overlay_pb2.OverlaySnapshot(
-        status=system_status(snapshot, caller),
-        detections=_detections(snapshot.detections),
+        status=system_status(snapshot, recipient),
+        detections=detections_message(snapshot[DETECTIONS]),
         events=[_event(event, snapshot.at_s) for event in snapshot.events],
     )
 
@@ -56,20 +69,19 @@ def _vision(sample: Sample[Vision]) -> system_status_pb2.VisionStatus:
     if value is None:
         return system_status_pb2.VisionStatus()
     return system_status_pb2.VisionStatus(
-        available=True,
-        stale=sample.freshness.stale,
+        **freshness_fields(sample.freshness),
         producer_fps=value.producer_fps,
         consumer_fps=value.consumer_fps,
         last_infer_ms=value.last_infer_ms,
         infer_error_count=value.infer_error_count,
         capture_fatal_error_count=value.capture_fatal_error_count,
-        age_ms=sample.freshness.age_ms,
     )
 
 
 def _health(snapshot: Snapshot) -> system_status_pb2.RobotHealth:
-    health, freshness = snapshot.health, snapshot.odometry.freshness
-    motion = snapshot.odometry.value or Odometry(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
+    health, odometry = snapshot.health, snapshot[ODOMETRY]
+    freshness = odometry.freshness
+    motion = odometry.value or Odometry(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
     return system_status_pb2.RobotHealth(
         state=HEALTH_STATES[health.state],
         ready=health.ready,
@@ -90,13 +102,11 @@ def _command(sample: Sample[Command]) -> system_status_pb2.EffectiveCommand:
     if command is None:
         return system_status_pb2.EffectiveCommand()
     return system_status_pb2.EffectiveCommand(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         vx_mps=command.velocity.vx_mps,
         vy_mps=command.velocity.vy_mps,
         wz_rad_s=command.velocity.wz_rad_s,
-        active_source=command.source.value if command.source else _NOBODY,
+        active_source=command.source.value if command.source else _UNATTRIBUTED,
     )
 
 
@@ -104,21 +114,18 @@ def _mission(sample: Sample[Mode]) -> system_status_pb2.MissionStatus:
     if sample.value is None:
         return system_status_pb2.MissionStatus()
     return system_status_pb2.MissionStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         mode=sample.value.name,
     )
 
 
-def _detections(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatus:
+def detections_message(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatus:
+    """Returns the detections; an empty message, which reads "not available", before the first."""
     value = sample.value
     if value is None:
         return overlay_pb2.DetectionOverlayStatus()
     return overlay_pb2.DetectionOverlayStatus(
-        available=True,
-        stale=sample.freshness.stale,
-        age_ms=sample.freshness.age_ms,
+        **freshness_fields(sample.freshness),
         source_width_px=value.source_width_px,
         source_height_px=value.source_height_px,
         detection_count=value.count,
@@ -136,6 +143,16 @@ def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
         bbox_center_y_px=item.center_y_px,
         bbox_width_px=item.width_px,
         bbox_height_px=item.height_px,
+    )
+
+
+def _source(source: SourceView) -> source_pb2.SourceStatus:
+    return source_pb2.SourceStatus(
+        name=source.name,
+        state=SOURCE_STATES[source.state],
+        **freshness_fields(source.freshness),
+        required=source.required,
+        detail=source.detail,
     )
 
 

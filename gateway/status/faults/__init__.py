@@ -1,1 +1,1 @@
-"""What is wrong with the robot, since when, and what to do: rules that find it, a book of its life."""
+"""The fault rules, one module per part of the robot, and the tracker of raised and cleared faults."""

@@ -1,23 +1,23 @@
-"""Faults that the robot's components report of themselves."""
+"""Faults that the robot's components report about themselves (REP-107)."""
 
 import re
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.status.faults.fault import Condition, Severity
+from gateway.status.fault import Condition, Severity
 from gateway.status.freshness import Sample
 from gateway.status.values import DiagnosticItem, DiagnosticLevel, Diagnostics
 
 _SEVERITIES: Final = {DiagnosticLevel.ERROR: Severity.ERROR, DiagnosticLevel.STALE: Severity.WARNING}
-"""Levels that are faults."""
-_LONGEST_ID: Final = 64
-_LONGEST_TEXT: Final = 200
+"""The levels that are faults."""
+_MAX_ID_LENGTH: Final = 64
+_MAX_TEXT_LENGTH: Final = 200
 
 
 def diagnostics_faults(diagnostics: Sample[Diagnostics]) -> Iterator[Condition]:
-    """One fault per component, the worst where two components have the same id.
+    """Yields one condition per component; the most severe one where two components share an id.
 
-    A component that stops reporting stays as it was: nobody has said that it is well again.
+    A component that stops reporting keeps its last state: silence is no sign of recovery.
     """
     if diagnostics.value is None:
         return
@@ -34,24 +34,22 @@ def diagnostics_faults(diagnostics: Sample[Diagnostics]) -> Iterator[Condition]:
 
 
 def _condition(item: DiagnosticItem, severity: Severity) -> Condition:
-    component = _words(item.component) or "a component without a name"
-    said = _words(item.message)
-    if item.level is DiagnosticLevel.STALE:
-        said = said or "nothing is heard of it"
+    component = _one_line(item.component) or "a component without a name"
+    no_text = "has stopped reporting" if item.level is DiagnosticLevel.STALE else "reports an error"
     return Condition(
         f"diagnostics.{_slug(item.component)}",
         severity,
         component,
-        f"{component}: {said or 'reports an error'}",
-        "Look at that component's log on the robot",
+        f"{component}: {_one_line(item.message) or no_text}",
+        "Check the log of that component on the robot",
     )
 
 
 def _slug(name: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:_LONGEST_ID] or "unnamed"
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:_MAX_ID_LENGTH] or "unnamed"
 
 
-def _words(text: str) -> str:
-    """One printable line. Slashes join the names of the robot's own programs: operators don't need them."""
+def _one_line(text: str) -> str:
+    """Returns printable text. Slashes join the names of ROS nodes, which operators don't need."""
     printable = "".join(letter if letter.isprintable() and letter != "/" else " " for letter in text)
-    return " ".join(printable.split())[:_LONGEST_TEXT]
+    return " ".join(printable.split())[:_MAX_TEXT_LENGTH]

@@ -1,21 +1,21 @@
-"""Limits with hysteresis: a fault is raised at one value and over at another, so that noise makes no news."""
+"""Limits with hysteresis: raised at one value and cleared at another, so that noise raises no events."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """From which value on something is wrong, and from which it is well again.
+    """A threshold with hysteresis.
 
-    Where `raise_at` is the larger one, large values are wrong (heat); where it is the smaller one, small
-    values are (a battery's charge).
+    An upper limit if `raise_at` is the larger value (temperature), a lower limit if it is the smaller one
+    (state of charge).
     """
 
     raise_at: float
     clear_at: float
 
     def broken(self, value: float, *, was_broken: bool) -> bool:
-        """Whether `value` is wrong, given what was said before."""
+        """Returns whether `value` violates the limit, given the previous verdict."""
         threshold = self.clear_at if was_broken else self.raise_at
         if self.raise_at > self.clear_at:
             return value > threshold if was_broken else value >= threshold
@@ -24,7 +24,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class PlatformLimits:
-    """What the robot's computer and batteries should stay within."""
+    """The limits of the robot's computer and batteries."""
 
     temperature_c: Limit
     memory_percent: Limit

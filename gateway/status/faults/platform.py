@@ -2,132 +2,119 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
-from gateway.status.faults.fault import Condition, Severity
+from gateway.status.fault import Condition, Severity
 from gateway.status.faults.limits import Limit, PlatformLimits
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
+from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Battery
 
-_COMPONENT = "computer"
+_COMPUTER: Final = "computer"
+_COOL_DOWN: Final = "Check fan and dust, reduce the load (preview profile), let it cool down"
 
 
 @dataclass(frozen=True, slots=True)
-class _Watched:
-    """A figure with its limit, and what to say when it breaks it. The value is None when it is not known."""
+class _Check:
+    """A measured value, None if unknown, with its limit and the condition of its violation."""
 
     value: float | None
     limit: Limit
-    condition: Condition
+    fault_id: str
+    component: str
+    message: str
+    remedy: str
+
+    def condition(self) -> Condition:
+        return Condition(self.fault_id, Severity.WARNING, self.component, self.message, self.remedy)
 
 
 def platform_faults(
     snapshot: Snapshot, limits: PlatformLimits, active: frozenset[str]
 ) -> Iterator[Condition]:
-    """What is wrong now; a figure that is not known (or too old) neither raises a fault nor ends one."""
-    for watched in (*_compute(snapshot, limits), *_network(snapshot, limits), *_power(snapshot, limits)):
-        condition = watched.condition
-        was_broken = condition.fault_id in active
-        if watched.value is None:
-            broken = was_broken
-        else:
-            broken = watched.limit.broken(watched.value, was_broken=was_broken)
-        if broken:
-            yield condition
+    """Yields the present conditions. An unknown or stale value neither raises nor clears a fault."""
+    for check in _checks(snapshot, limits):
+        was_broken = check.fault_id in active
+        if was_broken if check.value is None else check.limit.broken(check.value, was_broken=was_broken):
+            yield check.condition()
     yield from _throttling(snapshot, active)
-    if snapshot.compute.freshness.stale or snapshot.network.freshness.stale:
+    if snapshot[COMPUTE].freshness.stale or snapshot[NETWORK].freshness.stale:
         yield Condition(
             "platform.stale",
             Severity.WARNING,
-            _COMPONENT,
-            "the computer's own figures are not renewed",
-            "Its file system may hang: look at the configured platform.disk_path, then restart the gateway",
+            _COMPUTER,
+            "the values of the robot's computer are no longer updated",
+            "Its file system may hang: check the configured platform.disk_path, then restart the gateway",
         )
 
 
-def _compute(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[_Watched]:
-    compute = snapshot.compute.value if snapshot.compute.freshness.fresh else None
-    yield _Watched(
+def _checks(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[_Check]:
+    compute = snapshot[COMPUTE].value if snapshot[COMPUTE].freshness.fresh else None
+    network = snapshot[NETWORK].value if snapshot[NETWORK].freshness.fresh else None
+    yield _Check(
         compute.cpu_temperature_c if compute else None,
         limits.temperature_c,
-        Condition(
-            "platform.temperature",
-            Severity.WARNING,
-            _COMPONENT,
-            f"the processor is hot: {limits.temperature_c.raise_at:g} °C or more",
-            "Look at fan and dust, take load off (preview profile), let it cool down",
-        ),
+        "platform.temperature",
+        _COMPUTER,
+        f"the processor is hot: {limits.temperature_c.raise_at:g} °C or more",
+        _COOL_DOWN,
     )
-    yield _Watched(
+    yield _Check(
         compute.ram_used_percent if compute else None,
         limits.memory_percent,
-        Condition(
-            "platform.memory",
-            Severity.WARNING,
-            _COMPONENT,
-            f"memory is nearly used up: {limits.memory_percent.raise_at:g} % or more",
-            "Find the largest program on the robot (top, then M) and restart it",
-        ),
+        "platform.memory",
+        _COMPUTER,
+        f"memory is nearly full: {limits.memory_percent.raise_at:g} % or more",
+        "Find the largest program on the robot (top, then M) and restart it",
     )
-    yield _Watched(
+    yield _Check(
         compute.disk_used_percent if compute else None,
         limits.disk_percent,
-        Condition(
-            "platform.disk",
-            Severity.WARNING,
-            _COMPONENT,
-            f"the disk is nearly full: {limits.disk_percent.raise_at:g} % or more",
-            "Move recordings and logs off the robot",
-        ),
+        "platform.disk",
+        _COMPUTER,
+        f"the disk is nearly full: {limits.disk_percent.raise_at:g} % or more",
+        "Move recordings and logs off the robot",
+    )
+    yield _Check(
+        network.wifi_signal_dbm if network else None,
+        limits.wifi_signal_dbm,
+        "platform.wifi",
+        "network",
+        f"the Wi-Fi signal is weak: {limits.wifi_signal_dbm.raise_at:g} dBm or less",
+        "Move the robot closer to the access point, or select a smaller preview profile",
+    )
+    charge = f"is low: {limits.battery_percent.raise_at:g} % or less"
+    yield _Check(
+        _charge_percent(snapshot[BATTERY]),
+        limits.battery_percent,
+        "battery.low",
+        "power",
+        f"the robot's battery {charge}",
+        "Bring the robot to its charger",
+    )
+    yield _Check(
+        _charge_percent(snapshot[ONBOARD_BATTERY]),
+        limits.battery_percent,
+        "platform.battery_low",
+        "power",
+        f"the computer's battery {charge}",
+        "Connect its power supply",
     )
 
 
 def _throttling(snapshot: Snapshot, active: frozenset[str]) -> Iterator[Condition]:
-    compute = snapshot.compute
-    known = compute.value.thermal_throttled if compute.value and compute.freshness.fresh else None
+    compute = snapshot[COMPUTE]
+    throttled = compute.value.thermal_throttled if compute.value and compute.freshness.fresh else None
     fault_id = "platform.throttled"
-    if known or (known is None and fault_id in active):
+    if throttled or (throttled is None and fault_id in active):
         yield Condition(
-            fault_id,
-            Severity.WARNING,
-            _COMPONENT,
-            "the processor is slowed down by heat",
-            "Look at fan and dust, take load off (preview profile), let it cool down",
+            fault_id, Severity.WARNING, _COMPUTER, "the processor is slowed down by heat", _COOL_DOWN
         )
 
 
-def _network(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[_Watched]:
-    network = snapshot.network.value if snapshot.network.freshness.fresh else None
-    yield _Watched(
-        network.wifi_signal_dbm if network else None,
-        limits.wifi_signal_dbm,
-        Condition(
-            "platform.wifi",
-            Severity.WARNING,
-            "network",
-            f"the Wi-Fi signal is weak: {limits.wifi_signal_dbm.raise_at:g} dBm or less",
-            "Bring the robot nearer to the access point, or take a smaller preview profile",
-        ),
-    )
-
-
-def _power(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[_Watched]:
-    below = f"{limits.battery_percent.raise_at:g} % or less"
-    for fault_id, sample, name, remedy in (
-        ("battery.low", snapshot.battery, "the robot's battery", "Bring the robot to its charger"),
-        (
-            "platform.battery_low",
-            snapshot.onboard_battery,
-            "the computer's battery",
-            "Connect its power supply",
-        ),
-    ):
-        condition = Condition(fault_id, Severity.WARNING, "power", f"{name} is low: {below}", remedy)
-        yield _Watched(_charge(sample), limits.battery_percent, condition)
-
-
-def _charge(sample: Sample[Battery]) -> float | None:
-    """Charge in percent; a battery that charges, or is not there, is not low."""
+def _charge_percent(sample: Sample[Battery]) -> float | None:
+    """Returns the state of charge; 100 for a battery that is charging or absent, which can't be low."""
     battery = sample.value
     if battery is None or sample.freshness.stale:
         return None

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from gateway.status.faults.fault import Condition, Severity
+from gateway.status.fault import Condition, Severity
 from gateway.status.preview import Encoder, PreviewState, PreviewView
 
 UNREACHABLE: Final = "preview.unreachable"
@@ -13,31 +13,31 @@ _COMPONENT: Final = "preview"
 
 
 def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: bool) -> Iterator[Condition]:
-    """What is wrong now.
+    """Yields the present conditions.
 
     Args:
-        preview: as the gateway knows it.
-        active: ids of faults that are active: a preview that tries again has not recovered yet.
-        settled: whether the gateway has run long enough for the preview service to have been found.
+        preview: the state to examine.
+        active: ids of the active faults: a preview that is starting again has not recovered yet.
+        settled: whether the startup grace has elapsed.
     """
     if not preview.service_reachable:
-        # An operator who wants the preview is told of its silence once, not as a fault of its own as well.
-        wanted = preview.state is PreviewState.FAULTED
-        if wanted or settled:
+        # While the preview is requested, its own state is FAULTED: one fault, not two.
+        requested = preview.state is PreviewState.FAULTED
+        if requested or settled:
             yield Condition(
                 UNREACHABLE,
-                Severity.ERROR if wanted else Severity.WARNING,
+                Severity.ERROR if requested else Severity.WARNING,
                 _COMPONENT,
-                "the preview service does not answer: there can be no video",
+                "the preview service does not answer: video is not available",
                 "Start or restart robot-preview on the robot; the gateway connects by itself",
             )
-    elif preview.state is PreviewState.FAULTED or _tries_again(preview, active):
+    elif preview.state is PreviewState.FAULTED or _retrying(preview, active):
         yield _faulted(preview.last_error)
     if preview.encoder and preview.encoder.fallback_reason:
         yield _fallback(preview.encoder)
 
 
-def _tries_again(preview: PreviewView, active: frozenset[str]) -> bool:
+def _retrying(preview: PreviewView, active: frozenset[str]) -> bool:
     return preview.state is PreviewState.STARTING and FAULTED in active
 
 
@@ -47,16 +47,16 @@ def _faulted(last_error: str) -> Condition:
         Severity.ERROR,
         _COMPONENT,
         f"the preview does not work: {last_error}" if last_error else "the preview does not work",
-        "The robot tries again by itself; to try at once type: robotctl preview on",
+        "The robot retries by itself; to retry at once type: robotctl preview on",
     )
 
 
 def _fallback(encoder: Encoder) -> Condition:
-    instead = "" if encoder.hardware else " on the robot's own processor"
+    in_software = "" if encoder.hardware else " on the robot's own processor"
     return Condition(
         FALLBACK,
         Severity.WARNING,
         _COMPONENT,
-        f"{encoder.name} encodes{instead} instead of {encoder.wanted}: {encoder.fallback_reason}",
+        f"{encoder.name} encodes{in_software} instead of {encoder.wanted}: {encoder.fallback_reason}",
         "Type on the robot: robot-preview encoders",
     )

@@ -1,72 +1,71 @@
-"""Faults of the robot's sources: what should come and does not."""
+"""Faults of the sources: expected and not received."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from gateway.status.board import SourceKind
-from gateway.status.faults.fault import Condition, Severity
-from gateway.status.sources import SourceState, SourceView
+from gateway.status.fault import Condition, Severity
+from gateway.status.source_view import SourceState, SourceView
 
 
 @dataclass(frozen=True, slots=True)
-class _Trouble:
-    """What a state of a source is as a fault; the sentence is the source's own."""
+class _FaultOfState:
+    """Suffix of the fault id and remedy; the message is the source's own detail."""
 
     suffix: str
     remedy: str
 
 
-TROUBLES: Final[Mapping[SourceState, _Trouble | None]] = {
+STATE_FAULTS: Final[Mapping[SourceState, _FaultOfState | None]] = {
     SourceState.RECEIVING: None,
-    SourceState.WAITING: _Trouble(
-        "missing", "Start the program that makes it; check that it runs in the gateway's ROS domain"
+    SourceState.WAITING: _FaultOfState(
+        "missing", "Start the program that publishes it; check that it runs in the gateway's ROS domain"
     ),
-    SourceState.SILENT: _Trouble(
-        "silent", "Look at the program that makes it: it is there and does not send"
+    SourceState.SILENT: _FaultOfState(
+        "silent", "Check the program that publishes it: it is running but sends nothing"
     ),
-    SourceState.STALE: _Trouble("stale", "Look at the program that makes it, and at the load of the robot"),
-    SourceState.QOS_MISMATCH: _Trouble(
+    SourceState.STALE: _FaultOfState(
+        "stale", "Check the program that publishes it, and the load of the robot"
+    ),
+    SourceState.QOS_MISMATCH: _FaultOfState(
         "qos_mismatch", "Change reliability or durability of this source in the gateway's configuration"
     ),
-    SourceState.WRONG_TYPE: _Trouble(
+    SourceState.WRONG_TYPE: _FaultOfState(
         "wrong_type", "Correct the type of this source in the gateway's configuration"
     ),
-    SourceState.TYPE_MISSING: _Trouble("type_missing", "Type on the robot: robot-gateway doctor"),
+    SourceState.TYPE_MISSING: _FaultOfState("type_missing", "Type on the robot: robot-gateway doctor"),
 }
-"""Total: every state of a source, and what fault it is."""
+"""Total: the fault of each state; None for the one that is none."""
 
-_NEED_TIME: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
+_STARTUP_STATES: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
 """States in which every source begins."""
-_MAY_BE_QUIET: Final = frozenset({SourceKind.MODE, SourceKind.EFFECTIVE_COMMAND, SourceKind.MUX_INPUT})
-"""Sources that speak only when there is something to say."""
 
 
 def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator[Condition]:
-    """What is wrong now.
+    """Yields the conditions of the configured sources.
 
     Args:
         sources: every configured source.
-        settled: whether the gateway has run long enough for every source to have come.
+        settled: whether the startup grace has elapsed.
     """
     for source in sources:
-        trouble = TROUBLES[source.state]
-        if trouble and _counts(source, settled=settled):
+        fault = STATE_FAULTS[source.state]
+        if fault and _is_fault(source, settled=settled):
             yield Condition(
-                f"{source.name}.{trouble.suffix}",
+                f"{source.name}.{fault.suffix}",
                 Severity.ERROR if source.required else Severity.WARNING,
-                source.words,
+                source.spec.display_name,
                 source.detail,
-                trouble.remedy,
+                fault.remedy,
             )
 
 
-def _counts(source: SourceView, *, settled: bool) -> bool:
-    if source.state in _NEED_TIME and not settled:
+def _is_fault(source: SourceView, *, settled: bool) -> bool:
+    if source.state in _STARTUP_STATES and not settled:
         return False
     if source.state is SourceState.WAITING:
-        # Not every robot has everything that the configuration knows.
+        # Not every robot has all the sources that the default configuration lists.
         return source.required
     if source.state in {SourceState.SILENT, SourceState.STALE}:
-        return source.required or source.kind not in _MAY_BE_QUIET
+        return source.required or not source.spec.quiet
     return True

@@ -18,7 +18,7 @@ from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from console.receiver.receiver import Receiver
 from console.robots.login import parse_login
-from gateway.access.authority import new_authority
+from gateway.access.ca import new_ca
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
 from tests.support.engine import ROOT
 from tests.support.robotctl import robotctl
@@ -138,16 +138,16 @@ def test_init_says_by_which_names_to_call_and_what_to_type_next(guarded: Guarded
     assert guarded.begun.returncode == 0, guarded.begun.stderr
     assert guarded.begun.stdout == ""
     said = guarded.begun.stderr
-    good_for = re.search(r"The certificate is good for (.+)\.$", said, re.MULTILINE)
-    assert good_for, said
+    valid_for = re.search(r"The certificate is valid for (.+)\.$", said, re.MULTILINE)
+    assert valid_for, said
     # The robot's own name, not the container's.
-    assert {"127.0.0.1", "localhost", socket.gethostname().partition(".")[0]} <= set(good_for[1].split(", "))
+    assert {"127.0.0.1", "localhost", socket.gethostname().partition(".")[0]} <= set(valid_for[1].split(", "))
     assert f"{ADD.partition('anna')[0]}NAME" in said
     assert "In the gateway's configuration" not in said, "compose has said it already"
 
     again = typed(guarded.deployment, INIT)
     assert again.returncode == 1
-    assert again.stderr.splitlines()[-1].endswith("with --again all of them are thrown away")
+    assert again.stderr.splitlines()[-1].endswith("with --again all of them are discarded")
 
 
 def test_a_login_is_all_that_goes_to_standard_output_and_works_on_a_laptop(
@@ -181,7 +181,7 @@ def test_it_is_healthy_by_a_socket_that_nobody_else_can_enter(guarded: Guarded) 
 
 def test_nobody_gets_in_who_is_not_known(guarded: Guarded) -> None:
     robot, anna = guarded.deployment, guarded.anna
-    foreign = new_authority("another robot", 1).certificate
+    foreign = new_ca("another robot", 1).certificate
     assert anna.token
     slip = anna.token[:-2] + ("AA" if anna.token[-2] != "A" else "BA")
     assert reason(robot, Credentials(ca_certificate=anna.ca_certificate)) == "CREDENTIAL_MISSING"

@@ -15,7 +15,7 @@ from common.reasons import Reason
 from console.client.refusal import refusal_in
 from gateway.access.credential import Kind
 from gateway.access.role import Role
-from gateway.rpc.method_roles import ROLES
+from gateway.rpc.methods import ROLES
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot
@@ -95,7 +95,7 @@ async def test_each_token_gives_its_role_and_nothing_else_gives_any(tmp_path: Pa
     over = robot.add(Role.ADMIN, days=1e-9)[1]
     early = robot.add(Role.ADMIN, begins_s=tomorrow)[1]
     revoked, revoked_login = robot.add(Role.ADMIN)
-    robot.keeper.revoke(revoked.credential_id)
+    robot.admin.revoke(revoked.credential_id)
     foreign = other.add(Role.ADMIN)[1]
     right = tokens[Role.ADMIN][1].token or ""
     wrong = Login(right[:-1] + ("A" if right[-1] != "A" else "B"))
@@ -111,7 +111,7 @@ async def test_each_token_gives_its_role_and_nothing_else_gives_any(tmp_path: Pa
         )
     for login in (wrong, foreign, Login(""), Login("x" * 5000), Login("rgt-000000000000." + "A" * 43)):
         for path in PATHS:
-            # A fresh gateway every few calls has not locked anybody out yet.
+            # A fresh gateway every few calls has no lockouts yet.
             async with guarded_gateway(robot) as robot:
                 assert await answered(robot.channel(), path, login) == (
                     UNAUTHENTICATED,
@@ -126,7 +126,7 @@ async def test_each_certificate_gives_its_role_and_nothing_else_gives_any(tmp_pa
     over = robot.add(Role.ADMIN, Kind.CERTIFICATE, days=1e-9)[1]
     early = robot.add(Role.ADMIN, Kind.CERTIFICATE, begins_s=tomorrow, days=2)[1]
     revoked, revoked_login = robot.add(Role.ADMIN, Kind.CERTIFICATE)
-    robot.keeper.revoke(revoked.credential_id)
+    robot.admin.revoke(revoked.credential_id)
     foreign = other.add(Role.ADMIN, Kind.CERTIFICATE)[1]
     token = robot.add(Role.ADMIN)[1]
     async with guarded_gateway(robot, security={"tls": {"client_certificates": True}}) as robot:
@@ -178,13 +178,13 @@ async def test_the_local_socket_is_for_health_checks_and_asks_for_the_rest(tmp_p
         assert await called(local, ping, login) == (OK, "")
 
 
-async def test_neither_plaintext_nor_another_robots_authority_gets_anywhere(tmp_path: Path) -> None:
+async def test_neither_plaintext_nor_another_robots_ca_gets_anywhere(tmp_path: Path) -> None:
     robot, other = new_robot(tmp_path / "a"), new_robot(tmp_path / "b")
     login = robot.add(Role.ADMIN)[1]
     ping = f"/{SERVICE.full_name}/Ping"
     async with guarded_gateway(robot) as robot:
         # The client finds out before it shows anything.
-        assert (await called(robot.channel(login, authority=other.authority), ping, login))[0] is UNAVAILABLE
+        assert (await called(robot.channel(login, ca=other.ca), ping, login))[0] is UNAVAILABLE
         async with grpc.aio.insecure_channel(f"127.0.0.1:{robot.port}") as plain:
             assert (await called(plain, ping, login))[0] is UNAVAILABLE
         assert (await called(robot.channel(), ping, login))[0] is OK

@@ -100,7 +100,7 @@ def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(
     with running(ground) as log:
         assert operator(ground, "login", "lab", target, str(login)).returncode == 0
         assert operator(ground, "status", "--json").returncode == 0
-        # The wish is taken note of; that there is no preview service is another matter.
+        # The request is accepted, although there is no preview service.
         assert "preview" in operator(ground, "preview", "on").stderr
 
         (ground / "ben.login").write_text(printed)
@@ -122,7 +122,7 @@ def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(
         guess(ground, target, login.read_text())
         wait_until(lambda: "is locked out" in log.read_text(), "who guesses is locked out")
 
-    # What everything that has run has written, but for what is made to hold a secret.
+    # What everything that has run has written, but for files that are meant to hold a secret.
     kept = {login, ground / "ben.login", *(ground / "config").rglob("token"), *ground.rglob("*-key.pem")}
     written = [path for path in ground.rglob("*") if path.is_file() and path not in kept]
     assert {log, ground / "credentials/audit.jsonl", ground / "credentials/credentials.json"} <= set(written)
@@ -176,8 +176,8 @@ def test_what_is_there_is_not_thrown_away_by_mistake(ground: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("revoke", "nobody"), "no credential in force"),
-        (("rotate", "nobody"), "no credential in force"),
+        (("revoke", "nobody"), "no valid credential"),
+        (("rotate", "nobody"), "no valid credential"),
         (("add", "../x", "--role", "viewer"), "can't be the name"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What the robot's keeper changes counts without a restart, for open streams as well."""
+"""Changes of credentials take effect without a restart, for open streams as well."""
 
 import asyncio
 import json
@@ -13,8 +13,8 @@ import pytest
 
 from common.reasons import Reason
 from console.client.refusal import refusal_in
-from gateway.access.attempts import FREE
 from gateway.access.credential import Kind
+from gateway.access.refusal_limiter import BURST
 from gateway.access.role import Role
 from gateway.access.token import new_token
 from gateway.rpc.mapping.enums import SEVERITIES
@@ -57,7 +57,7 @@ async def test_a_new_token_counts_soon_and_a_revoked_one_no_more(tmp_path: Path)
         calls = stub(robot)
         credential, login = robot.add(Role.VIEWER)
         await until(lambda: ping(calls, login), "")
-        robot.keeper.revoke(credential.credential_id)
+        robot.admin.revoke(credential.credential_id)
         await until(lambda: ping(calls, login), Reason.CREDENTIAL_REVOKED)
 
 
@@ -88,7 +88,7 @@ async def test_a_rotated_token_goes_over_without_a_gap(tmp_path: Path) -> None:
     _, old = robot.add(Role.VIEWER)
     async with guarded_gateway(robot):
         calls = stub(robot)
-        _, bundle = robot.keeper.rotate("anna", overlap_s=3600)
+        _, bundle = robot.admin.rotate("anna", overlap_s=3600)
         new = Login(bundle.token)
         await until(lambda: ping(calls, new), "")
         assert await ping(calls, old) == ""
@@ -110,7 +110,7 @@ async def test_open_streams_end_with_the_credential_and_no_others_do(
         await ending.read()
         await staying.read()
         if how == "revoked":
-            robot.keeper.revoke(credential.credential_id)
+            robot.admin.revoke(credential.credential_id)
         with pytest.raises(grpc.aio.AioRpcError) as caught:
             await asyncio.wait_for(to_its_end(ending), 10)
         assert caught.value.code() is grpc.StatusCode.UNAUTHENTICATED
@@ -131,7 +131,7 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
         )
         calls = stub(robot)
 
-        async def told(detail: str) -> bool:
+        async def reported(detail: str) -> bool:
             events = calls.SubscribeEvents(SubscribeEventsRequest(), metadata=admin.metadata(), timeout=5)
             found = False
             async for answer in events:
@@ -141,9 +141,9 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
             events.cancel()
             return found
 
-        await until(lambda: told("client_joined"), True)
-        robot.keeper.revoke(credential.credential_id)
-        await until(lambda: told("client_left"), True)
+        await until(lambda: reported("client_joined"), True)
+        robot.admin.revoke(credential.credential_id)
+        await until(lambda: reported("client_left"), True)
         unread.cancel()
 
 
@@ -159,7 +159,7 @@ async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: 
         ]
         for stream in streams:
             await stream.read()
-        robot.keeper.revoke(credential.credential_id)
+        robot.admin.revoke(credential.credential_id)
         # Some leave before they are sent away, some at the same moment, some after.
         for stream in streams:
             stream.cancel()
@@ -176,7 +176,7 @@ async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path:
         stream = before.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
         await stream.read()
         old = await shown_certificate(robot.port)
-        robot.keeper.rotate_server(None)
+        robot.admin.rotate_server(None)
 
         async def changed() -> bool:
             return await shown_certificate(robot.port) != old
@@ -188,23 +188,20 @@ async def test_a_new_server_certificate_is_shown_and_nobody_is_cut_off(tmp_path:
         stream.cancel()
 
 
-async def test_a_new_authority_ends_what_the_old_one_has_signed_and_leaves_tokens(tmp_path: Path) -> None:
+async def test_a_new_ca_ends_what_the_old_one_has_signed_and_leaves_tokens(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, token = robot.add(Role.VIEWER)
     robot.add(Role.VIEWER, Kind.CERTIFICATE, name="ben")
     async with guarded_gateway(robot):
-        old_authority = robot.authority
-        over = robot.keeper.rotate_authority(None)
+        old_ca = robot.ca
+        over = robot.admin.rotate_ca(None)
         assert [each.name for each in over] == ["ben"]
 
-        async def with_new_authority() -> str:
+        async def with_new_ca() -> str:
             return await ping(stub(robot), token)
 
-        await until(with_new_authority, "")
-        assert (
-            await ping(RobotGatewayStub(robot.channel(token, authority=old_authority)), token)
-            == "UNAVAILABLE"
-        )
+        await until(with_new_ca, "")
+        assert await ping(RobotGatewayStub(robot.channel(token, ca=old_ca)), token) == "UNAVAILABLE"
 
 
 async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> None:
@@ -223,7 +220,7 @@ async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> 
 async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
-    # Longer than the server's certificate lasts, shorter than the authority does.
+    # Longer than the server's certificate lasts, shorter than the CA does.
     _, client = robot.add(Role.VIEWER, Kind.CERTIFICATE)
     async with guarded_gateway(robot, faults={"expiry_days": 900}):
         calls = stub(robot)
@@ -285,15 +282,15 @@ async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path:
                     await calls.SetPreviewMode(
                         SetPreviewModeRequest(enabled=True), metadata=refused.metadata(), timeout=5
                     )
-        expected = ["ben", *["a stranger"] * FREE, "ben"]
+        expected = ["ben", *["a stranger"] * BURST, "ben"]
 
-        told = []
+        seen = []
         async with asyncio.timeout(20):
-            while len(told) < len(expected):
+            while len(seen) < len(expected):
                 answer = await events.read()
                 if answer.event.HasField("control_action"):
-                    told.append(answer.event.control_action.who or "a stranger")
-        assert told == expected
+                    seen.append(answer.event.control_action.who or "a stranger")
+        assert seen == expected
         events.cancel()
     records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
     assert [each["who"] or "a stranger" for each in records] == expected

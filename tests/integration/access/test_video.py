@@ -1,4 +1,4 @@
-"""Who has proved who they are gets the stream's passphrase, from wherever they call; nobody else does."""
+"""Authenticated callers get the stream's passphrase, from any address; others do not."""
 
 import ipaddress
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 from common.free import free_tcp_port
 from gateway.access.role import Role
-from gateway.platform.hosts import hosts_found
+from gateway.platform.hosts import find_hosts
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetOverlaySnapshotRequest,
     GetSystemStatusRequest,
@@ -27,7 +27,7 @@ from tests.support.running_gateway import Operator, running_gateway
 @pytest.fixture
 def own_address() -> str:
     """By which this machine is called as if from another one."""
-    for host in hosts_found():
+    for host in find_hosts():
         try:
             address = ipaddress.ip_address(host)
         except ValueError:
@@ -39,7 +39,7 @@ def own_address() -> str:
 
 async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Path, own_address: str) -> None:
     robot, double = new_robot(tmp_path / "c"), PreviewDouble()
-    robot.keeper.rotate_server((*HOSTS, own_address))
+    robot.admin.rotate_server((*HOSTS, own_address))
     robot.host = own_address
     shown = robot.add(Role.OPERATOR)[1].metadata()
     server = await serve_double(robot.directory.path / "preview.sock", double)
@@ -55,7 +55,7 @@ async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Pa
             await eventually(
                 switched, lambda reply: reply.preview.state == PREVIEW_RUNNING, "the preview is running"
             )
-            passphrase = double.wishes[-1].passphrase
+            passphrase = double.applied[-1].passphrase
             assert len(passphrase) >= 10
             status = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=shown, timeout=5)
             overlay = await calls.GetOverlaySnapshot(GetOverlaySnapshotRequest(), metadata=shown, timeout=5)
@@ -90,12 +90,12 @@ async def test_who_is_let_in_no_more_knows_a_passphrase_that_is_worth_nothing(tm
             await calls.SetPreviewMode(SetPreviewModeRequest(enabled=True), metadata=shown, timeout=5)
             await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=bens.metadata(), timeout=5)
 
-            async def wishes() -> list[Any]:
-                return list(double.wishes)
+            async def applied() -> list[Any]:
+                return list(double.applied)
 
-            (before,) = await eventually(wishes, len, "the wish has arrived")
-            robot.keeper.revoke(ben.credential_id)
-            known = await eventually(wishes, lambda seen: len(seen) > 1, "another wish")
+            (before,) = await eventually(applied, len, "the request has arrived")
+            robot.admin.revoke(ben.credential_id)
+            known = await eventually(applied, lambda seen: len(seen) > 1, "another request")
             assert [each.enabled for each in known] == [True, True]
             assert known[1].passphrase not in {"", before.passphrase}
             assert (await status()).preview.endpoint.passphrase == known[1].passphrase
@@ -124,7 +124,7 @@ async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, o
                 lambda reply: reply.preview.state == PREVIEW_RUNNING,
                 "the preview is running",
             )
-            assert (await near.status()).preview.endpoint.passphrase == double.wishes[-1].passphrase
+            assert (await near.status()).preview.endpoint.passphrase == double.applied[-1].passphrase
             endpoint = (await far.status()).preview.endpoint
             assert endpoint.encrypted
             assert not endpoint.passphrase

@@ -10,11 +10,14 @@ from pathlib import Path
 import grpc
 import pytest
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from common.bind import bind_tcp, bind_unix
 from common.health import Health
 from common.healthcheck import state_of
+from common.reasons import Reason
 from common.rpc import new_server
+from console.client.refusal import refusal_in
 
 SERVING, NOT_SERVING = HealthCheckResponse.SERVING, HealthCheckResponse.NOT_SERVING
 
@@ -52,6 +55,14 @@ async def test_the_whole_serves_whatever_its_parts_do() -> None:
         assert await ask(target, "preview") == "SERVING"
 
 
+async def test_an_unknown_service_is_not_found_with_the_reason_for_programs() -> None:
+    async with serving(Health()) as target, grpc.aio.insecure_channel(target) as channel:
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await HealthStub(channel).Check(HealthCheckRequest(service="nothing"))
+    assert caught.value.code() is grpc.StatusCode.NOT_FOUND
+    assert refusal_in(caught.value.trailing_metadata()).reason == Reason.UNKNOWN_SERVICE
+
+
 async def test_watchers_learn_every_change_and_unknown_names_once_they_are_known() -> None:
     health = Health()
     async with serving(health) as target, grpc.aio.insecure_channel(target) as channel:
@@ -65,7 +76,7 @@ async def test_watchers_learn_every_change_and_unknown_names_once_they_are_known
         assert (await watch.read()).status == NOT_SERVING
         health.set_serving("preview", serving=False)
         health.set_serving("preview", serving=True)
-        assert (await watch.read()).status == SERVING, "the same again is no news"
+        assert (await watch.read()).status == SERVING, "the same status again is not sent"
         watch.cancel()
 
 

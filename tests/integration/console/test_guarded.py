@@ -66,7 +66,7 @@ def test_a_login_that_is_revoked_ends_the_watching_with_one_line(robot: Guarded)
         *("watch", "--robot", ROBOT), columns=200, extra={"XDG_CONFIG_HOME": str(robot.home)}
     ) as screen:
         screen.wait_to_see("q quit")
-        robot.keeper.revoke("carl")
+        robot.admin.revoke("carl")
         screen.wait_to_see("error: ")
         assert screen.process.wait(ENDS_WITHIN_S) == 1
         (said,) = [line for line in screen.lines() if line.startswith("error: ")]

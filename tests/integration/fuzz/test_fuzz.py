@@ -40,8 +40,8 @@ def test_every_target_is_tried() -> None:
 def test_a_defect_is_found_and_can_be_tried_again(tmp_path: Path) -> None:
     # Requests as they would be checked by somebody who knows four profiles and expects no other.
     careless = (
-        "import sys, gateway.rpc.requests as requests\n"
-        "requests.hold_to_rules = lambda request: {0: 0, 1: 1, 2: 2, 3: 3}[getattr(request, 'profile', 0)]\n"
+        "import sys, gateway.rpc.interceptors.validation as validation\n"
+        "validation.validate = lambda request: {0: 0, 1: 1, 2: 2, 3: 3}[getattr(request, 'profile', 0)]\n"
         "from fuzz.worker import main\n"
         "main(sys.argv[1:])\n"
     )

@@ -23,7 +23,7 @@ from console.client import (
 )
 from console.client.options import Backoff, ClientOptions
 from console.client.results import ControlResult, EventKind, GapReason
-from gateway.rpc.staying import STAYS_AFTER_S
+from gateway.rpc.interceptors.presence import JOINED_AFTER_S
 from omniseer.gateway.v1.event_pb2 import EVENT_GAP_REASON_NEW_RUN, EVENT_GAP_REASON_NO_LONGER_KEPT
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 from tests.support.bad_links import Relay
@@ -84,7 +84,7 @@ async def test_who_comes_to_stay_and_leaves_is_told(operator: Operator) -> None:
             watching = other.watch_status()
             await anext(watching)
             joined = await until(events, EventKind.CLIENT_JOINED)
-            assert time.monotonic() - began_s > STAYS_AFTER_S * 0.9
+            assert time.monotonic() - began_s > JOINED_AFTER_S * 0.9
         left = await until(events, EventKind.CLIENT_LEFT)
         assert left.client_address == joined.client_address != own.client_address
 

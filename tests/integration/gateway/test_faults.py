@@ -36,7 +36,7 @@ async def test_a_preview_service_that_is_not_there_is_a_fault_until_it_comes(tmp
             await server.stop(None)
     assert by_id(overlay.status)["preview.unreachable"].HasField("cleared_age_ms")
     messages = [event.message for event in overlay.events]
-    assert messages == [f"warning: {fault.message}", f"over: {fault.message}"]
+    assert messages == [f"warning: {fault.message}", f"cleared: {fault.message}"]
 
 
 async def test_a_limit_that_the_computer_breaks_is_found_while_nobody_asks(
@@ -50,7 +50,7 @@ async def test_a_limit_that_the_computer_breaks_is_found_while_nobody_asks(
         async with running_gateway(
             tmp_path / "p.sock", faults=faults, platform={"interval_ms": 100}
         ) as operator:
-            await eventually(log, lambda it: "event: warning: memory is nearly used up" in it, "the event")
+            await eventually(log, lambda it: "event: warning: memory is nearly full" in it, "the event")
             status = await operator.status()
     assert by_id(status)["platform.memory"].active
     assert status.gateway.requests_served == 0, "somebody asked before"

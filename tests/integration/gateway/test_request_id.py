@@ -31,8 +31,8 @@ def test_what_an_operator_asks_is_found_in_both_logs(tmp_path: Path) -> None:
         ours = (gateway_dir / "gateway.log").read_text()
     wishes = [line for line in lines if line["message"].startswith("wish ")]
     assert [line["message"].partition(": ")[2] for line in wishes] == ["on, balanced", "off"]
-    assert re.search(r"wish \d+: on, BALANCED \[request shift-7\]", ours)
+    assert re.search(r"revision \d+ requested: on, BALANCED \[request shift-7\]", ours)
     assert wishes[0]["request_id"] == "shift-7"
-    made_here = re.search(r"wish \d+: off \[request ([0-9a-f]{16})\]", ours)
+    made_here = re.search(r"revision \d+ requested: off \[request ([0-9a-f]{16})\]", ours)
     assert made_here, ours
     assert wishes[1]["request_id"] == made_here[1]

@@ -12,16 +12,13 @@ from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import String
 
 from gateway.config import DEFAULT_SOURCES, SourceSettings
-from gateway.status.board import SourceKind
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from tests.support.eventually import eventually
 from tests.support.running_gateway import Operator, running_gateway
 from tests.support.talker import Talker, talking
 
 pytestmark = pytest.mark.ros
-MODE = SourceSettings(
-    kind=SourceKind.MODE, topic="/mission/mode", type="std_msgs/msg/String", stale_after_ms=60_000
-)
+MODE = SourceSettings(kind="mode", topic="/mission/mode", type="std_msgs/msg/String", stale_after_ms=60_000)
 SOURCES = (*(source for source in DEFAULT_SOURCES if not source.required), MODE)
 KEYBOARD, NAVIGATION = "/cmd_vel_keyboard", "/cmd_vel_nav"
 MUX = "/mecanum_drive_controller/reference"

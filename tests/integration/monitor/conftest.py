@@ -12,5 +12,5 @@ __all__ = ["application", "own_settings"]
 
 @pytest.fixture(autouse=True)
 def desk(application: QApplication, own_settings: Path) -> None:
-    """A light desktop on which nobody has worked yet."""
+    """A light desktop without saved settings."""
     in_colours(LIGHT)

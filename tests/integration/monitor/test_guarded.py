@@ -1,4 +1,4 @@
-"""The monitor window at a robot that asks who calls: roles, a login that is over, and a new one."""
+"""The monitor window at a robot with authentication: roles, a revoked login, and a new one."""
 
 import re
 import time
@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from tests.support.guarded_program import Guarded, guarded_program, guarded_video
@@ -19,11 +19,11 @@ from tests.support.qt import keep_picture, let_pass, press, until
 
 pytestmark = pytest.mark.gst
 
-TOLD_WITHIN_S = 10.0
+SHOWN_WITHIN_S = 10.0
 """Revoking counts within a second on the robot, a new login within half a second here; machines are busy."""
 WATCHED_S = 4.0
 MOST_ATTEMPTS = 2
-"""In WATCHED_S: at once, the next after 5 s, when it took longer. As if nobody answered it would be 4."""
+"""In WATCHED_S: at once, the next after 5 s. With the backoff of a silent robot it would be 4."""
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,9 @@ class Person:
     window: MonitorWindow
 
     def link_is(self, word: str) -> None:
-        until(lambda: self.window.header.link.word.text() == word, f"the connection is {word}", TOLD_WITHIN_S)
+        until(
+            lambda: self.window.header.link.word.text() == word, f"the connection is {word}", SHOWN_WITHIN_S
+        )
 
     def preview_is(self, word: str) -> None:
         until(lambda: self.window.preview.state.word.text() == word, f"the preview is {word}")
@@ -49,15 +51,15 @@ class Person:
         press(self.window, Qt.Key.Key_P)
 
     def notes(self) -> str:
-        return " ".join(line.text.text() for line in self.window.preview.notes.shown)  # type: ignore[attr-defined]
+        return " ".join(line.text.text() for line in self.window.preview.notes.shown)
 
     def events(self) -> str:
         return "\n".join(self.window.side.events.lines)
 
-    def pictures_come(self) -> None:
+    def video_moves(self) -> None:
         painted: list[float] = []
         connection = self.window.video.painted.connect(lambda: painted.append(time.monotonic()))
-        until(lambda: len(painted) >= 15, "15 pictures are painted")
+        until(lambda: len(painted) >= 15, "15 frames are painted")
         self.window.video.painted.disconnect(connection)
 
 
@@ -76,29 +78,29 @@ def test_an_operator_sees_everything_and_switches(robot: Guarded) -> None:
         assert anna.window.header.name.text() == "lab-1"
         anna.press_p()
         anna.preview_is("RUNNING")
-        anna.pictures_come()
+        anna.video_moves()
         until(lambda: "anna" in anna.events(), "who switched it on is an event")
         anna.press_p()
         anna.preview_is("DISABLED")
 
 
-def test_a_viewer_is_told_what_is_missing_and_goes_on_watching(robot: Guarded) -> None:
+def test_a_viewer_sees_which_role_is_missing_and_goes_on_watching(robot: Guarded) -> None:
     robot.switch_on()
     robot.log_in("ben", Role.VIEWER)
     with in_front_of(robot) as ben:
         ben.preview_is("RUNNING")
         ben.press_p()
         until(lambda: "ben is viewer, and SetPreviewMode needs operator" in ben.notes(), "what is missing")
-        ben.pictures_come()
+        ben.video_moves()
         ben.link_is("connected")
         ben.preview_is("RUNNING")
         keep_picture(ben.window, "viewer-only")
 
 
-def test_a_login_that_is_over_is_told_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
+def test_a_revoked_login_is_reported_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
     robot.log_in("carla", Role.OPERATOR)
     with in_front_of(robot) as carla:
-        robot.keeper.revoke("carla")
+        robot.admin.revoke("carla")
         carla.link_is("not allowed")
         banner = carla.window.banner
         assert banner.isVisible()
@@ -115,7 +117,7 @@ def test_a_login_that_is_over_is_told_without_hammering_and_a_new_one_taken_over
         carla.link_is("connected")
         assert not banner.isVisible()
         carla.press_p()
-        until(lambda: carla.notes().strip(), "the robot answers a wish again")
+        until(lambda: carla.notes().strip(), "the robot answers a request again")
         robot.switch_off()
         carla.preview_is("DISABLED")
         until(lambda: "the-test" in carla.events(), "events go on")
@@ -141,7 +143,7 @@ def test_another_certificate_is_taken_over_like_another_token(tmp_path: Path) ->
     with guarded_program(tmp_path / "robot", tmp_path / "laptop", Kind.CERTIFICATE) as robot:
         robot.log_in("emma", Role.OPERATOR)
         with in_front_of(robot) as emma:
-            robot.keeper.revoke("emma")
+            robot.admin.revoke("emma")
             emma.link_is("not allowed")
             assert "the certificate of emma" in emma.window.banner.text.text()
             robot.log_in("emma", Role.OPERATOR)

@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 
 from console.client import PreviewProfile
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import PreviewPanel
+from console.window.programs import monitor
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
@@ -176,13 +176,13 @@ def test_q_closes(desk_work: Desk) -> None:
     until(lambda: not desk_work.window.isVisible(), "the window is closed")
 
 
-def test_a_gateway_that_hangs_is_told_and_the_window_lives_on(desk_work: Desk) -> None:
+def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Desk) -> None:
     desk_work.gateway.hold.clear()
     until(lambda: desk_work.window.header.link.word.text() == "unreachable", "the silence is noticed")
     assert desk_work.window.banner.isVisible()
     assert not desk_work.preview.switch.isEnabled()
     desk_work.press(Qt.Key.Key_F11)
-    until(desk_work.window.isFullScreen, "the window still does what it is told")
+    until(desk_work.window.isFullScreen, "the window still reacts")
     desk_work.gateway.hold.set()
     desk_work.click(desk_work.window.banner.button)
     desk_work.free()
@@ -209,8 +209,8 @@ def test_what_the_robot_says_is_never_markup(desk_work: Desk) -> None:
         id="x", severity=3, component="<b>battery</b>", message=text, remedy="<a href='x'>y</a>", active=True
     )
     faults = desk_work.window.side.faults
-    until(lambda: text in faults.shown[0].message.text(), "the fault")  # type: ignore[attr-defined]
-    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText  # type: ignore[attr-defined]
+    until(lambda: text in faults.shown[0].message.text(), "the fault")
+    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText
 
 
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:

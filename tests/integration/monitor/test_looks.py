@@ -1,4 +1,4 @@
-"""Readable in light and dark, told apart without colours, as large as a small laptop's screen allows."""
+"""Readable in light and dark, distinguishable without colours, as large as a small laptop's screen allows."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -9,13 +9,13 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
-from console.window.look import draw_shape
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
-from console.window.remembered import Remembered
+from console.window.programs import monitor
+from console.window.theme import draw_shape
+from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until
 from tests.support.snapshots import event
@@ -26,7 +26,7 @@ SMALL_LAPTOP = (1366, 768)
 
 
 def troubled() -> GatewayDouble:
-    """Something of every tone."""
+    """Something of every style."""
     made = GatewayDouble()
     made.status.vision.stale, made.status.vision.age_ms = True, 3400
     made.status.faults.add(
@@ -88,24 +88,24 @@ def test_a_desktop_that_turns_dark_takes_the_window_along(window: MonitorWindow)
     until(lambda: brightness(line.palette().color(QPalette.ColorRole.Window)) < bright / 4, "a dark line")
 
 
-def drawn(tone: Tone) -> QImage:
+def drawn(style: SeverityStyle) -> QImage:
     image = QImage(32, 32, QImage.Format.Format_RGB32)
     image.fill(LIGHT)
     painter = QPainter(image)
-    draw_shape(painter, QRectF(2, 2, 28, 28), tone, QApplication.palette())
+    draw_shape(painter, QRectF(2, 2, 28, 28), style, QApplication.palette())
     painter.end()
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
-@pytest.mark.parametrize(("one", "other"), list(combinations(Tone, 2)))
-def test_shapes_differ_without_any_colour(desk: None, one: Tone, other: Tone) -> None:
+@pytest.mark.parametrize(("one", "other"), list(combinations(SeverityStyle, 2)))
+def test_shapes_differ_without_any_colour(desk: None, one: SeverityStyle, other: SeverityStyle) -> None:
     first, second = drawn(one), drawn(other)
     differing = sum(
         abs(QColor(first.pixel(x, y)).red() - QColor(second.pixel(x, y)).red()) > 60
         for x in range(32)
         for y in range(32)
     )
-    assert differing > 90, f"only {differing} of 1024 pixels tell {one} from {other}"
+    assert differing > 90, f"only {differing} of 1024 pixels differ between {one} and {other}"
 
 
 def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) -> None:
@@ -146,8 +146,8 @@ def test_it_opens_as_it_was_left(desk: None) -> None:
         b"",
     ],
 )
-def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, content: bytes) -> None:
-    file = Path(Remembered().file)
+def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, content: bytes) -> None:
+    file = Path(WindowSettings().file)
     assert file.is_relative_to(own_settings)
     file.parent.mkdir(parents=True)
     file.write_bytes(content)
@@ -156,7 +156,7 @@ def test_a_broken_settings_file_is_no_trouble(own_settings: Path, desk: None, co
     assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
 
 
-def test_a_settings_file_that_can_not_be_written_is_no_trouble(own_settings: Path, desk: None) -> None:
-    file = Path(Remembered().file)
+def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path, desk: None) -> None:
+    file = Path(WindowSettings().file)
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

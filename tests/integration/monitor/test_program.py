@@ -87,10 +87,10 @@ def test_a_signal_closes_it_in_the_middle_of_a_call(tmp_path: Path, number: sign
         gateway.hold.clear()
         asked = len(gateway.calls)
         wait_until(lambda: len(gateway.calls) > asked, "a call hangs")
-        told_s = time.monotonic()
+        signalled_s = time.monotonic()
         process.send_signal(number)
         assert process.wait(20) == 0
-        assert time.monotonic() - told_s < ENDS_WITHIN_S
+        assert time.monotonic() - signalled_s < ENDS_WITHIN_S
         gateway.hold.set()
         assert process.stderr
         assert process.stderr.read() == ""
@@ -105,7 +105,7 @@ def test_a_robot_that_takes_the_call_and_never_says_a_word_is_no_obstacle(tmp_pa
         with opened(f"127.0.0.1:{deaf.getsockname()[1]}", tmp_path) as process:
             connection, _ = deaf.accept()
             with connection:
-                told_s = time.monotonic()
+                signalled_s = time.monotonic()
                 process.terminate()
                 assert process.wait(20) == 0
-                assert time.monotonic() - told_s < ENDS_WITHIN_S
+                assert time.monotonic() - signalled_s < ENDS_WITHIN_S

@@ -1,6 +1,6 @@
 """The window with a whole robot behind it: real messages, real gateway, real video; each of them fails.
 
-Pictures of every situation are kept in artifacts/monitor; docs/images has the good ones.
+Frames of every situation are kept in artifacts/monitor; docs/images has the good ones.
 """
 
 import statistics
@@ -16,9 +16,8 @@ from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
 from console.window.lines import ComponentLine, FaultWidget
-from console.window.monitor_program import monitor
 from console.window.monitor_window import MonitorWindow
-from console.window.preview_panel import NoteLine
+from console.window.programs import monitor
 from tests.support.qt import keep_picture, let_pass, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
@@ -40,7 +39,6 @@ class Watch:
     def line(self, name: str) -> ComponentLine:
         """The line of a component."""
         for line in self.window.side.components.shown:
-            assert isinstance(line, ComponentLine)
             if line.name.text() == name:
                 return line
         raise LookupError(name)
@@ -49,12 +47,10 @@ class Watch:
         until(lambda: name in self.names() and self.line(name).mark.text() == mark, f"{name} is {mark}")
 
     def names(self) -> list[str]:
-        return [line.name.text() for line in self.window.side.components.shown]  # type: ignore[attr-defined]
+        return [line.name.text() for line in self.window.side.components.shown]
 
     def faults(self) -> list[FaultWidget]:
-        shown = self.window.side.faults.shown
-        assert all(isinstance(line, FaultWidget) for line in shown)
-        return list(shown)  # type: ignore[arg-type]
+        return list(self.window.side.faults.shown)
 
     def fault_says(self, words: str) -> FaultWidget:
         return until(lambda: next((f for f in self.faults() if words in f.message.text()), None), words)
@@ -68,8 +64,8 @@ class Watch:
     def preview_is(self, word: str) -> None:
         until(lambda: self.window.preview.state.word.text() == word, f"the preview is {word}")
 
-    def picture_moves(self) -> None:
-        """Pictures are painted, one after the other."""
+    def video_moves(self) -> None:
+        """Frames are painted, one after the other."""
         painted = 0
 
         def count() -> None:
@@ -77,7 +73,7 @@ class Watch:
             painted += 1
 
         connection = self.window.video.painted.connect(count)
-        until(lambda: painted >= 15, "15 pictures are painted")
+        until(lambda: painted >= 15, "15 frames are painted")
         self.window.video.painted.disconnect(connection)
 
     def key(self, key: Qt.Key) -> None:
@@ -111,7 +107,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
 
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
     boxes_are_drawn(watch)
     until(lambda: watch.window.plots.all[0].value_text.endswith(" fps"), "the video's rate is plotted")
     let_pass(8)  # what the plots show shall be worth a picture
@@ -130,22 +126,23 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     watch.preview_is("FAULTED")
     watch.fault_says("preview service")
     reason = watch.window.preview.notes.shown[0]
-    assert isinstance(reason, NoteLine)
     until(reason.text.text, "the reason is shown")
     watch.mark_is("Video", "STALE")
     keep_picture(watch.window, "preview-faulted")
     watch.robot.preview.start_again()
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
 
-    until(lambda: all(fault.mark.text() in ("over", "none") for fault in watch.faults()), "nothing is wrong")
+    until(
+        lambda: all(fault.mark.text() in ("cleared", "none") for fault in watch.faults()), "nothing is wrong"
+    )
 
     watch.robot.kill_gateway()
     watch.link_is("unreachable")
     assert watch.window.banner.isVisible()
     assert not watch.window.preview.switch.isEnabled()
     watch.mark_is("Motion", "STALE")
-    watch.picture_moves()  # the stream does not need the gateway
+    watch.video_moves()  # the stream does not need the gateway
     let_pass(3)
     keep_picture(watch.window, "unreachable")
 
@@ -156,10 +153,10 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     watch.health_is("OK")
     assert not watch.window.banner.isVisible()
     until(
-        lambda: any("started again" in line for line in watch.window.side.events.lines),
+        lambda: any("restarted" in line for line in watch.window.side.events.lines),
         "the restart is an event",
     )
-    watch.picture_moves()
+    watch.video_moves()
     let_pass(2)
     keep_picture(watch.window, "reconnected")
 
@@ -181,7 +178,7 @@ def boxes_are_drawn(watch: Watch) -> None:
 def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -> None:
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
-    watch.picture_moves()
+    watch.video_moves()
     delay, painted = LoopDelay(), []
     watch.window.video.painted.connect(lambda: painted.append(time.monotonic()))
     delay.start()
@@ -189,7 +186,7 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     p99_ms = statistics.quantiles(delay.stop(), n=100)[98]
     assert len(painted) > 60, "real video"
     assert p99_ms < LOOP_DELAY_P99_MS
-    # Everything hangs, and nobody waits for it.
+    # Everything hangs, and closing does not wait for it.
     assert watch.robot.gateway
     watch.robot.gateway.kill()
     closed_s = time.monotonic()

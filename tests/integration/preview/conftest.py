@@ -10,6 +10,6 @@ from tests.support.running_preview import RunningPreview
 
 @pytest.fixture
 def preview(tmp_path: Path) -> Iterator[RunningPreview]:
-    """A service with a moving picture and x264."""
+    """A service with a test pattern and x264."""
     with RunningPreview(tmp_path) as preview:
         yield preview

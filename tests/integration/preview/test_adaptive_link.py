@@ -17,7 +17,7 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
         LossyRelay(preview.port) as relay,
         Watcher(relay.port) as watcher,
     ):
-        preview.wish()
+        preview.enable()
         preview.running()
         watcher.wait_for_pictures(30)
         relay.loss = 0.4
@@ -39,7 +39,7 @@ def test_unless_it_is_asked_to_the_bit_rate_stays(tmp_path: Path) -> None:
         LossyRelay(preview.port, loss=0.4) as relay,
         Watcher(relay.port) as watcher,
     ):
-        preview.wish()
+        preview.enable()
         preview.running()
         watcher.wait_for_pictures(30)
         state = preview.wait_for(lambda a: a.measurement.worst_loss_percent > 8, "loss is reported")

@@ -47,7 +47,7 @@ async def test_the_api_hands_out_what_opens_the_stream_and_no_log_does(
                 assert off.preview.endpoint.passphrase == ""
         log = preview.log.read_text(encoding="utf-8")
     assert len(set(passphrases)) == 2, "each session has its own"
-    assert "wish" in log, "the service logs what it is told"
+    assert "desired state" in log, "the service logs requests"
     for passphrase in passphrases:
         assert len(passphrase) >= 10
         assert passphrase not in log

@@ -1,4 +1,4 @@
-"""Encoders that fail, each in its own way: what takes over, what status says, how long it is dark."""
+"""Encoders that fail, each in its own way: what takes over, what the status says, how long no frame comes."""
 
 import signal
 import time
@@ -15,7 +15,7 @@ from tests.support.watcher import Watcher
 pytestmark = pytest.mark.gst
 
 ORDER = {"encoders": {"order": ["mpp-h265", "va-h265", "x264"], "probe_timeout_s": 4}}
-DARK_AT_MOST_S = 2.0
+MAX_OUTAGE_S = 2.0
 """The promise; where others take the machine's cores, what is measured may take several times that."""
 SLOW_MACHINE = 4.0
 EXIT_HUNG = 70
@@ -36,7 +36,7 @@ EXIT_HUNG = 70
 def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: str, words: str) -> None:
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert (state.encoder.name, state.encoder.wanted) == ("va-h265", "mpp-h265")
         assert words in state.encoder.fallback_reason
@@ -47,7 +47,7 @@ def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: st
 
 def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, ORDER, {"vah265enc": "ok"}) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert state.encoder.name == "va-h265"
         assert state.encoder.fallback_reason == "there is no GStreamer element mpph265enc"
@@ -56,7 +56,7 @@ def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:
 def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "no-output", "vah265enc": "null-to-ready"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert state.encoder.name == "x264"
         assert not state.encoder.hardware
@@ -68,35 +68,35 @@ def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) ->
     [
         ("later null-to-ready", "can't be opened"),
         ("later ready-to-paused", "can't be opened"),
-        ("later no-output", "no picture"),
-        ("later empty", "no picture"),
+        ("later no-output", "no frame"),
+        ("later empty", "no frame"),
     ],
 )
 def test_an_encoder_that_fails_at_the_start_is_passed_over(tmp_path: Path, fault: str, words: str) -> None:
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        wished_at = time.monotonic()
-        preview.wish()
+        enabled_at = time.monotonic()
+        preview.enable()
         state = preview.running()
-        dark_s = time.monotonic() - wished_at
-        assert dark_s < DARK_AT_MOST_S * SLOW_MACHINE
+        outage_s = time.monotonic() - enabled_at
+        assert outage_s < MAX_OUTAGE_S * SLOW_MACHINE
         passed_over(state, "va-h265", words)
-        print(f"{fault}: pictures {dark_s:.2f} s after they were wanted, trials included")
+        print(f"{fault}: first frame {outage_s:.2f} s after the request, trials included")
 
 
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
         ("later error:40", "hardware fault"),
-        ("later hang:40", "no picture"),
-        ("later no-output:40", "no picture"),
-        ("later empty:40", "no picture"),
+        ("later hang:40", "no frame"),
+        ("later no-output:40", "no frame"),
+        ("later empty:40", "no frame"),
     ],
 )
-def test_a_viewer_has_its_picture_back(tmp_path: Path, fault: str, words: str) -> None:
+def test_a_viewer_gets_frames_again(tmp_path: Path, fault: str, words: str) -> None:
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(10)
@@ -107,49 +107,49 @@ def test_a_viewer_has_its_picture_back(tmp_path: Path, fault: str, words: str) -
         passed_over(state, "va-h265", words)
         # Another connection: the pipeline is rebuilt whole, its listener included.
         assert watcher.reconnects >= 1
-        assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
-        print(f"{fault}: {watcher.longest_pause_s:.2f} s without a picture")
+        assert watcher.longest_pause_s < MAX_OUTAGE_S * SLOW_MACHINE
+        print(f"{fault}: {watcher.longest_pause_s:.2f} s without a frame")
 
 
 def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp_path: Path) -> None:
     settings = ORDER | {"timeouts": {"stop_s": 1.0}}
     with RunningPreview(tmp_path, settings, {"mpph265enc": "later hang:5", "vah265enc": "ok"}) as preview:
-        preview.wish()
+        preview.enable()
         preview.wait_for(lambda a: a.encoder.name == "va-h265", "fallback")
         preview.running()
-        preview.wish(None)
+        preview.disable()
         assert preview.process.wait(20) == EXIT_HUNG
         preview.start_again()
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert state.encoder.name == "va-h265"
         assert "hung" in state.encoder.fallback_reason
         assert state.counters.faults == 0
 
 
-def test_a_driver_that_hangs_when_told_something_holds_nobody_up(tmp_path: Path) -> None:
+def test_a_driver_that_hangs_in_a_profile_change_blocks_nothing(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        preview.wish(pb.PROFILE_BALANCED)
+        preview.enable(pb.PROFILE_BALANCED)
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(10)
-            preview.wish(pb.PROFILE_LOW_BW)
+            preview.enable(pb.PROFILE_LOW_BW)
             # The loop answers while the driver does not.
             assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
             state = fallen_back(preview, watcher, "stuck")
         passed_over(state, "va-h265", "hung when the profile was changed")
         assert state.profile == pb.PROFILE_LOW_BW
         # Whatever the driver keeps, the port is not among it.
-        preview.wish(None)
+        preview.disable()
         preview.disabled()
         assert udp_port_is_free(preview.port)
 
 
-def test_a_driver_that_hangs_when_a_viewer_joins_holds_nobody_up(tmp_path: Path) -> None:
+def test_a_driver_that_hangs_when_a_viewer_joins_blocks_nothing(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "later deaf:60", "vah265enc": "ok"}
     with RunningPreview(tmp_path, ORDER, doubles) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(90)
@@ -159,11 +159,11 @@ def test_a_driver_that_hangs_when_a_viewer_joins_holds_nobody_up(tmp_path: Path)
         passed_over(state, "va-h265", "hung when it was asked for a key frame")
 
 
-def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_holds_nobody_up(tmp_path: Path) -> None:
+def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_blocks_nothing(tmp_path: Path) -> None:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
     settings = ORDER | {"adaptive": {"enabled": True}}
     with RunningPreview(tmp_path, settings, doubles) as preview, LossyRelay(preview.port, 0.0) as relay:
-        preview.wish()
+        preview.enable()
         preview.running()
         with Watcher(relay.port, latency_ms=120) as watcher:
             watcher.wait_for_pictures(10)
@@ -175,47 +175,47 @@ def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_holds_nobody_up(
 def fallen_back(preview: RunningPreview, watcher: Watcher, fault: str) -> pb.ActualState:
     """Waits for the other encoder.
 
-    The old pictures flow on until the first one is given up; the port is free then, although its driver
+    The old frames flow on until the first one is given up; the port is free then, although its driver
     keeps the call.
     """
     state = preview.wait_for(
         lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
     )
     watcher.wait_for_pictures(10)
-    assert watcher.longest_pause_s < DARK_AT_MOST_S * SLOW_MACHINE
-    print(f"{fault}: {watcher.longest_pause_s:.2f} s without a picture")
+    assert watcher.longest_pause_s < MAX_OUTAGE_S * SLOW_MACHINE
+    print(f"{fault}: {watcher.longest_pause_s:.2f} s without a frame")
     return state
 
 
 def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, ORDER, {"mpph265enc": "later crash:40", "vah265enc": "ok"}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         assert preview.process.wait(20) == -signal.SIGSEGV
         died_at = time.monotonic()
         # What the container engine and the gateway do.
         preview.start_again()
-        preview.wish()
+        preview.enable()
         state = preview.running()
-        # A new viewer: one that was connected hears nothing of the crash, and calls again only when its own
+        # A new viewer: one that was connected does not notice the crash, and reconnects only when its own
         # side of SRT gives up after 5 s.
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(1)
-        dark_s = watcher.arrivals_s[0] - died_at
+        outage_s = watcher.arrivals_s[0] - died_at
         assert state.encoder.name == "va-h265"
         assert "crashed while it was in use (Segmentation fault)" in state.encoder.fallback_reason
-        assert dark_s < DARK_AT_MOST_S * SLOW_MACHINE
-        print(f"crash: {dark_s:.2f} s without a picture")
+        assert outage_s < MAX_OUTAGE_S * SLOW_MACHINE
+        print(f"crash: {outage_s:.2f} s without a frame")
 
 
 def test_an_encoder_is_not_blamed_for_a_process_that_was_killed(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, ORDER, {"mpph265enc": "ok", "vah265enc": "ok"}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         preview.process.kill()
         preview.process.wait(20)
         preview.start_again()
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert state.encoder.name == "mpp-h265"
         assert not state.encoder.fallback_reason
@@ -224,7 +224,7 @@ def test_an_encoder_is_not_blamed_for_a_process_that_was_killed(tmp_path: Path) 
 def test_when_every_encoder_has_failed_they_are_tried_again(tmp_path: Path) -> None:
     settings = {"encoders": {"order": ["mpp-h265"]}}
     with RunningPreview(tmp_path, settings, {"mpph265enc": "later null-to-ready"}) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.wait_for(lambda a: a.counters.faults >= 2, "a second attempt")
         assert state.counters.fallbacks == 0
         assert "can't be opened" in state.last_error

@@ -52,7 +52,7 @@ def viewers(preview: RunningPreview, count: int) -> pb.ActualState:
 
 def test_a_viewer_that_joins_does_not_wait_for_the_next_key_frame(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, {"encoders": {"key_frame_interval_s": 30}}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         for _ in range(3):
             with Watcher(preview.port) as watcher:
@@ -61,7 +61,7 @@ def test_a_viewer_that_joins_does_not_wait_for_the_next_key_frame(tmp_path: Path
 
 
 def test_ten_viewers_at_once(preview: RunningPreview) -> None:
-    preview.wish()
+    preview.enable()
     preview.running()
     with ExitStack() as stack:
         for _ in range(9):
@@ -74,8 +74,8 @@ def test_ten_viewers_at_once(preview: RunningPreview) -> None:
     assert state.counters.faults == 0
 
 
-def test_a_viewer_that_freezes_or_dies_hurts_nobody_else(preview: RunningPreview) -> None:
-    preview.wish()
+def test_a_viewer_that_freezes_or_dies_does_not_disturb_the_others(preview: RunningPreview) -> None:
+    preview.enable()
     preview.running()
     with player(preview.port) as freezing, player(preview.port) as dying, Watcher(preview.port) as watcher:
         viewers(preview, 3)
@@ -91,7 +91,7 @@ def test_a_viewer_that_freezes_or_dies_hurts_nobody_else(preview: RunningPreview
 
 
 def test_comers_and_goers(preview: RunningPreview) -> None:
-    preview.wish()
+    preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher:
         watcher.wait_for_pictures(5)
@@ -104,7 +104,7 @@ def test_comers_and_goers(preview: RunningPreview) -> None:
 
 
 def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> None:
-    preview.wish()
+    preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher:
         watcher.wait_for_pictures(5)
@@ -122,13 +122,13 @@ def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> N
         assert grown_mib < 40, "150 MiB, were every connection kept"
         print(f"200 visits: {grown_mib:.1f} MiB more, pause of another {watcher.longest_pause_s:.2f} s")
     assert preview.running().counters == pb.Counters(starts=1)
-    preview.wish(None)
+    preview.disable()
     preview.disabled()
     assert udp_port_is_free(preview.port)
 
 
 def test_garbage_on_the_port_is_ignored(preview: RunningPreview) -> None:
-    preview.wish()
+    preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         watcher.wait_for_pictures(5)
@@ -144,9 +144,9 @@ def test_garbage_on_the_port_is_ignored(preview: RunningPreview) -> None:
 
 
 @pytest.mark.parametrize("key_length_bytes", [16, 32])
-def test_a_passphrase_lets_in_who_knows_it(tmp_path: Path, key_length_bytes: int) -> None:
+def test_a_passphrase_admits_only_viewers_that_know_it(tmp_path: Path, key_length_bytes: int) -> None:
     with RunningPreview(tmp_path, {"srt": {"key_length_bytes": key_length_bytes}}) as preview:
-        preview.wish(passphrase=PASSPHRASE)
+        preview.enable(passphrase=PASSPHRASE)
         state = preview.running()
         assert state.stream.encrypted
         for wrong in ("", "incorrect horse battery staple"):
@@ -159,12 +159,12 @@ def test_a_passphrase_lets_in_who_knows_it(tmp_path: Path, key_length_bytes: int
         assert PASSPHRASE not in preview.log.read_text(encoding="utf-8")
 
 
-def test_another_passphrase_shuts_out_who_had_the_old_one(preview: RunningPreview) -> None:
-    preview.wish(passphrase=PASSPHRASE)
+def test_another_passphrase_disconnects_viewers_with_the_old_one(preview: RunningPreview) -> None:
+    preview.enable(passphrase=PASSPHRASE)
     preview.running()
     with Receiver(StreamAddress("127.0.0.1", preview.port, 20, PASSPHRASE)) as old:
         old.next_frame(timeout_s=10)
-        preview.wish(passphrase="another horse battery")
+        preview.enable(passphrase="another horse battery")
         state = preview.running(revision=preview.revision)
         with pytest.raises(StreamError):
             watch_for_ever(old)
@@ -176,11 +176,11 @@ def test_another_passphrase_shuts_out_who_had_the_old_one(preview: RunningPrevie
 def test_a_port_that_is_taken_is_named_and_used_when_it_is_free(preview: RunningPreview) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", preview.port))
-        preview.wish()
+        preview.enable()
         state = preview.faulted(f"UDP port {preview.port} on 127.0.0.1 can't be used")
         assert f"sport = :{preview.port}" in state.last_error
         assert state.counters.fallbacks == 0
     freed_at = time.monotonic()
-    preview.wish()
+    preview.enable()
     preview.wait_for(lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING, "running")
     assert time.monotonic() - freed_at < 10

@@ -80,14 +80,14 @@ def test_without_plugins_the_preview_says_what_is_missing(
     monkeypatch.setenv("GST_PLUGIN_SYSTEM_PATH_1_0", str(tmp_path / "empty"))
     monkeypatch.setenv("GST_REGISTRY", str(tmp_path / "registry.bin"))
     with RunningPreview(tmp_path) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.faulted()
         assert "none of their GStreamer elements is installed" in state.last_error
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_with_everything_tidy(preview: RunningPreview, number: signal.Signals) -> None:
-    preview.wish()
+    preview.enable()
     preview.running()
     preview.process.send_signal(number)
     assert preview.process.wait(20) == 0

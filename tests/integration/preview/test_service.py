@@ -17,7 +17,7 @@ pytestmark = pytest.mark.gst
 WINDOW_ROUNDS = 10
 
 
-def test_nothing_is_there_until_it_is_wanted(preview: RunningPreview) -> None:
+def test_nothing_exists_until_it_is_enabled(preview: RunningPreview) -> None:
     state = preview.disabled()
     assert (state.applied_revision, state.last_error) == (0, "")
     assert not state.HasField("stream")
@@ -27,8 +27,8 @@ def test_nothing_is_there_until_it_is_wanted(preview: RunningPreview) -> None:
     assert udp_port_is_free(preview.port)
 
 
-def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPreview) -> None:
-    answer = preview.wish(pb.PROFILE_BALANCED)
+def test_enable_serves_frames_and_disable_frees_the_port(preview: RunningPreview) -> None:
+    answer = preview.enable(pb.PROFILE_BALANCED)
     assert answer.state == pb.LIFECYCLE_STATE_STARTING
     assert answer.applied_revision == 1
     state = preview.running()
@@ -43,7 +43,7 @@ def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPrevie
         assert measured.HasField("worst_loss_percent")
     gone = preview.wait_for(lambda a: a.measurement.viewer_count == 0, "no viewer").measurement
     assert not gone.HasField("worst_rtt_ms")
-    preview.wish(None)
+    preview.disable()
     after = preview.disabled()
     assert udp_port_is_free(preview.port)
     assert after.profile == pb.PROFILE_BALANCED
@@ -51,19 +51,19 @@ def test_enable_shows_pictures_and_disable_frees_the_port(preview: RunningPrevie
 
 
 def test_the_figures_are_those_of_the_stream(preview: RunningPreview) -> None:
-    preview.wish(pb.PROFILE_BALANCED)
+    preview.enable(pb.PROFILE_BALANCED)
     preview.running()
     state = preview.wait_for(lambda a: 20 < a.measurement.fps < 40, "a rate near 30")
     assert state.measurement.bitrate_kbps > 50
     assert state.measurement.last_frame_age_ms < 5000
 
 
-def test_the_same_wish_changes_nothing(preview: RunningPreview) -> None:
-    wish = pb.DesiredState(revision=7, enabled=True, profile=pb.PROFILE_BALANCED)
-    preview.apply(wish)
+def test_the_same_revision_changes_nothing(preview: RunningPreview) -> None:
+    desired = pb.DesiredState(revision=7, enabled=True, profile=pb.PROFILE_BALANCED)
+    preview.apply(desired)
     preview.running()
     other = pb.DesiredState(revision=7, enabled=False)
-    assert preview.apply(wish).state == pb.LIFECYCLE_STATE_RUNNING
+    assert preview.apply(desired).state == pb.LIFECYCLE_STATE_RUNNING
     assert preview.apply(other).state == pb.LIFECYCLE_STATE_RUNNING
     assert preview.running().counters.starts == 1
 
@@ -78,11 +78,13 @@ def test_an_unknown_profile_is_refused_and_changes_nothing(preview: RunningPrevi
 
 
 def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
-    for profile in (pb.PROFILE_BALANCED, None, pb.PROFILE_LOW_BW, None, pb.PROFILE_HIGH_QUALITY):
-        preview.wish(profile)
+    for profile in (pb.PROFILE_BALANCED, pb.PROFILE_LOW_BW):
+        preview.enable(profile)
+        preview.disable()
+    preview.enable(pb.PROFILE_HIGH_QUALITY)
     state = preview.wait_for(
         lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING and a.profile == pb.PROFILE_HIGH_QUALITY,
-        "the last wish",
+        "the last request",
     )
     assert state.applied_revision == 5
     assert state.counters.faults == 0
@@ -91,7 +93,7 @@ def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
 
 
 def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
-    preview.wish(pb.PROFILE_BALANCED)
+    preview.enable(pb.PROFILE_BALANCED)
     preview.running()
     with Watcher(preview.port) as watcher:
         watcher.wait_for_pictures(10)
@@ -100,7 +102,7 @@ def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
             (pb.PROFILE_LOW_BW, 15),
             (pb.PROFILE_BALANCED, 30),
         ):
-            preview.wish(profile)
+            preview.enable(profile)
             state = preview.wait_for(
                 lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5 and a.stream.fps == fps,
                 f"{fps} fps",
@@ -113,15 +115,15 @@ def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
     assert preview.running().counters.starts == 1
 
 
-def test_left_alone_it_stops_by_itself_and_the_same_wish_brings_it_back(tmp_path: Path) -> None:
+def test_unwatched_it_stops_by_itself_and_the_same_request_enables_it_again(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, {"timeouts": {"without_gateway_s": 1.0}}) as preview:
-        wish = pb.DesiredState(revision=4, enabled=True, profile=pb.PROFILE_BALANCED)
-        preview.apply(wish)
-        wait_until(lambda: "stopped by itself" in preview.log.read_text(encoding="utf-8"), "left alone")
+        desired = pb.DesiredState(revision=4, enabled=True, profile=pb.PROFILE_BALANCED)
+        preview.apply(desired)
+        wait_until(lambda: "stopped by itself" in preview.log.read_text(encoding="utf-8"), "unwatched")
         state = preview.disabled()
-        assert "nobody has watched" in state.last_error
+        assert "no gateway has watched it" in state.last_error
         assert state.applied_revision == 0
-        preview.apply(wish)
+        preview.apply(desired)
         assert preview.running().last_error == ""
 
 
@@ -144,7 +146,7 @@ def test_encoders_are_listed_in_the_order_of_preference(preview: RunningPreview)
 
 def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, {"encoders": {"order": ["x264", "x265"], "codec": "h265"}}) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.running()
         assert state.stream.codec == pb.CODEC_H265
         assert (state.encoder.name, state.encoder.wanted) == ("x265", "x265")
@@ -158,12 +160,12 @@ def test_again_and_again_leaves_nothing_behind(preview: RunningPreview) -> None:
     memory_mib: list[float] = []
 
     def one_round() -> None:
-        preview.wish(pb.PROFILE_LOW_BW)
+        preview.enable(pb.PROFILE_LOW_BW)
         preview.running(revision=preview.revision)
         record(preview.port, 0.0)
-        preview.wish(pb.PROFILE_BALANCED)
+        preview.enable(pb.PROFILE_BALANCED)
         preview.wait_for(lambda a: a.profile == pb.PROFILE_BALANCED, "another profile")
-        preview.wish(None)
+        preview.disable()
         preview.disabled()
         memory_mib.append(preview.resident_mib())
 

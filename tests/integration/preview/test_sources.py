@@ -1,4 +1,4 @@
-"""Sources, good and bad: what is seen, what status says."""
+"""Sources, good and bad: frames that arrive, faults that the status reports."""
 
 import importlib.util
 import os
@@ -67,7 +67,7 @@ def shared_memory(socket: Path, caps: str) -> Iterator[Path]:
 def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, container: str) -> None:
     film = clip(1.0, tmp_path / 'a film\'s "name".bin', container)
     with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(film)}}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(100)
@@ -82,7 +82,7 @@ def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, conta
 
 def test_real_footage_of_another_size_is_scaled(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(footage())}}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_pictures(30)
@@ -93,7 +93,7 @@ def test_any_description_will_do(tmp_path: Path) -> None:
         "videotestsrc is-live=true pattern=ball ! video/x-raw,format=RGB,width=400,height=300,framerate=20/1"
     )
     with RunningPreview(tmp_path, description(text)) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         state = preview.wait_for(lambda a: 15 < a.measurement.fps < 25, "the source's own rate")
         assert state.stream.width_px == 320
@@ -102,7 +102,7 @@ def test_any_description_will_do(tmp_path: Path) -> None:
 def test_a_faster_source_is_slowed_down(tmp_path: Path) -> None:
     text = "videotestsrc is-live=true ! video/x-raw,width=320,height=240,framerate=50/1"
     with RunningPreview(tmp_path, description(text)) as preview:
-        preview.wish(pb.PROFILE_LOW_BW)
+        preview.enable(pb.PROFILE_LOW_BW)
         preview.running()
         preview.wait_for(lambda a: 12 < a.measurement.fps < 18, "the profile's rate")
 
@@ -115,7 +115,7 @@ def test_a_faster_source_is_slowed_down(tmp_path: Path) -> None:
         "shmsrc socket-path={} is-live=true do-timestamp=true ! {},pixel-aspect-ratio=4/3",
     ],
 )
-def test_shared_memory_needs_no_more_words_than_for_gst_launch(tmp_path: Path, description_of: str) -> None:
+def test_shared_memory_needs_no_more_caps_than_for_gst_launch(tmp_path: Path, description_of: str) -> None:
     caps = "video/x-raw,format=NV12,width=400,height=300,framerate=30/1"
     with shared_memory(tmp_path / "camera", caps) as socket:
         text = description_of.format(socket, caps)
@@ -123,7 +123,7 @@ def test_shared_memory_needs_no_more_words_than_for_gst_launch(tmp_path: Path, d
         foreign = ["gst-launch-1.0", "-q", *few, "!", "videoconvert", "!", "fakesink"]
         subprocess.run(foreign, check=True, timeout=20)
         with RunningPreview(tmp_path, description(text)) as preview:
-            preview.wish()
+            preview.enable()
             preview.running()
             with Watcher(preview.port) as watcher:
                 watcher.wait_for_pictures(10)
@@ -142,21 +142,21 @@ def test_shared_memory_needs_no_more_words_than_for_gst_launch(tmp_path: Path, d
 )
 def test_a_description_that_makes_no_video_is_explained(tmp_path: Path, text: str, words: str) -> None:
     with RunningPreview(tmp_path, description(text)) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.faulted()
         assert words in state.last_error
         assert "Traceback" not in state.last_error
         assert state.counters.fallbacks == 0
-        preview.wish(None)
+        preview.disable()
         assert preview.disabled().counters.faults >= 1
 
 
-def test_a_source_that_stalls_without_a_word_is_noticed(tmp_path: Path) -> None:
+def test_a_source_that_stalls_without_an_error_is_noticed(tmp_path: Path) -> None:
     with StallingCamera() as camera, RunningPreview(tmp_path, description(camera.description)) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         camera.stall()
-        state = preview.faulted("has sent no picture for")
+        state = preview.faulted("has sent no frame for")
         assert state.counters.fallbacks == 0
         camera.go_on()
         assert preview.running().counters.restarts >= 1
@@ -165,8 +165,8 @@ def test_a_source_that_stalls_without_a_word_is_noticed(tmp_path: Path) -> None:
 def test_a_source_that_never_begins_is_noticed(tmp_path: Path) -> None:
     settings = description("appsrc is-live=true format=time ! video/x-raw,format=I420,width=320,height=240")
     with RunningPreview(tmp_path, settings | {"timeouts": {"start_s": 1.0}}) as preview:
-        preview.wish()
-        state = preview.faulted("has sent no picture for")
+        preview.enable()
+        state = preview.faulted("has sent no frame for")
         assert state.counters.fallbacks == 0
 
 
@@ -181,7 +181,7 @@ def test_a_source_that_can_not_be_stopped_ends_the_process(tmp_path: Path) -> No
     writer = os.open(pipe, os.O_RDWR)
     try:
         with RunningPreview(tmp_path, settings) as preview:
-            preview.wish()
+            preview.enable()
             assert preview.process.wait(20) == 70
             assert "hung when it was stopped" in preview.log.read_text(encoding="utf-8")
     finally:
@@ -191,7 +191,7 @@ def test_a_source_that_can_not_be_stopped_ends_the_process(tmp_path: Path) -> No
 def test_a_missing_film_is_named_and_found_when_it_is_there(tmp_path: Path) -> None:
     film = tmp_path / "film.mkv"
     with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(film)}}) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.faulted()
         assert state.last_error == (
             f"video file {film} can't be read: No such file or directory."
@@ -205,7 +205,7 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
     film = tmp_path / "film.mkv"
     film.write_text("This is a letter, not a film.\n" * 50, encoding="utf-8")
     with RunningPreview(tmp_path, {"source": {"kind": "file", "path": str(film)}}) as preview:
-        preview.wish()
+        preview.enable()
         assert f"video file {film}" in preview.faulted().last_error
 
 
@@ -220,19 +220,19 @@ def test_a_file_that_is_no_video_is_named(tmp_path: Path) -> None:
 )
 def test_a_camera_that_is_not_there_is_named(tmp_path: Path, source: dict[str, str], words: str) -> None:
     with RunningPreview(tmp_path, {"source": {"kind": "v4l2"} | source}) as preview:
-        preview.wish()
+        preview.enable()
         state = preview.faulted()
         assert words in state.last_error
         assert "Check that the camera is connected" in state.last_error or "Name a device" in state.last_error
 
 
-def test_a_fault_leaves_a_drawing_of_the_pipeline(tmp_path: Path) -> None:
+def test_a_fault_leaves_a_graph_of_the_pipeline(tmp_path: Path) -> None:
     with RunningPreview(tmp_path, description("videotestsrc num-buffers=5 is-live=true")) as preview:
-        preview.wish(passphrase="correct horse battery")
+        preview.enable(passphrase="correct horse battery")
         preview.faulted("has ended")
-        drawing = preview.runtime_dir / "last-fault.dot"
-        wait_until(drawing.exists, "a drawing")
-        text = wait_until(lambda: drawing.read_text(encoding="utf-8"), "a drawing")
+        graph = preview.runtime_dir / "last-fault.dot"
+        wait_until(graph.exists, "a graph")
+        text = wait_until(lambda: graph.read_text(encoding="utf-8"), "a graph")
         assert text.startswith("digraph")
         assert "GstSRTSink" in text
         assert "correct horse" not in text

@@ -27,7 +27,7 @@ def in_order(stream: Stream) -> None:
 @pytest.mark.parametrize("fps", [10, 12, 19, 24, 25])
 def test_at_rates_of_ones_own(tmp_path: Path, fps: int) -> None:
     with RunningPreview(tmp_path, {"profiles": {"balanced": {"fps": fps}}}) as preview:
-        preview.wish()
+        preview.enable()
         preview.running()
         stream = analyse(record(preview.port, SECONDS))
     in_order(stream)
@@ -37,13 +37,13 @@ def test_at_rates_of_ones_own(tmp_path: Path, fps: int) -> None:
 
 
 def test_while_the_profile_changes(preview: RunningPreview) -> None:
-    preview.wish(pb.PROFILE_HIGH_QUALITY)
+    preview.enable(pb.PROFILE_HIGH_QUALITY)
     preview.running()
     with ThreadPoolExecutor(1) as viewer:
         recording = viewer.submit(record, preview.port, 2 * SECONDS)
         preview.wait_for(lambda a: a.measurement.viewer_count == 1, "a viewer")
         for profile, fps in SWITCHES:
-            preview.wish(profile)
+            preview.enable(profile)
             preview.wait_for(lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5, f"{fps} fps")
         stream = analyse(recording.result())
     in_order(stream)

@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.gst, pytest.mark.timed]
 
 SECONDS = 4
 RARELY = 0.05
-"""A busy machine drops a picture before the encoder now and then, and nothing goes in its place."""
+"""A busy machine drops a frame before the encoder now and then, and nothing goes in its place."""
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_the_judges_have_nothing_to_say(
 ) -> None:
     settings = {"encoders": {"order": [encoder], "key_frame_interval_s": 1}}
     with RunningPreview(tmp_path, settings) as preview:
-        preview.wish(profile)
+        preview.enable(profile)
         preview.running()
         recording = record(preview.port, SECONDS)
     stream = analyse(recording)
@@ -42,10 +42,10 @@ def test_the_judges_have_nothing_to_say(
     assert share_beyond(stream.table_times_ms["PMT"], 100) <= RARELY
     assert share_beyond(stream.clock_times_ms, 40) <= RARELY
     assert stream.pictures[0].key, "a viewer that joins begins with a key frame"
-    keys = [picture for picture in stream.pictures if picture.key]
+    keys = [frame for frame in stream.pictures if frame.key]
     assert len(keys) >= SECONDS - 1
-    assert all(picture.headed for picture in keys)
-    assert all(picture.sized for picture in stream.pictures)
+    assert all(frame.headed for frame in keys)
+    assert all(frame.sized for frame in stream.pictures)
     file = tmp_path / "recording.ts"
     file.write_bytes(recording[: stream.whole_bytes])
     assert complaints(file) == ""

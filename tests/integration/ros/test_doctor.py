@@ -9,7 +9,6 @@ from common.findings import Finding, Verdict
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros import doctor
 from gateway.ros.doctor import ros_findings
-from gateway.status.board import SourceKind
 from tests.support.talker import Talker
 
 pytestmark = pytest.mark.ros
@@ -39,7 +38,7 @@ def test_guarantees_that_exclude_each_other(talker: Talker) -> None:
     strict = BATTERY.model_copy(update={"reliability": "reliable"})
     finding = examined(strict)["topic.battery"]
     assert finding.verdict is Verdict.WRONG
-    assert finding.what.endswith(": reliable is asked for, best effort is offered")
+    assert finding.what.endswith(": reliable is requested, best effort is offered")
     assert examined(BATTERY)["topic.battery"].verdict is Verdict.GOOD
 
 
@@ -51,9 +50,7 @@ def test_nobody_publishes(talker: Talker, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_type_that_is_not_installed_says_what_to_install(talker: Talker) -> None:
-    missing = SourceSettings(
-        kind=SourceKind.VISION, topic="/x", type="no_such_msgs/msg/Thing", stale_after_ms=1000
-    )
+    missing = SourceSettings(kind="vision", topic="/x", type="no_such_msgs/msg/Thing", stale_after_ms=1000)
     finding = examined(missing)["type.vision"]
     assert finding.verdict is Verdict.WRONG
     assert "topic.vision" not in examined(missing)

@@ -13,6 +13,7 @@ from common.free import free_domain
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
+from gateway.status.sources import BATTERY, ODOMETRY
 from tests.support.ros import simulated_robot
 from tests.support.talker import talking
 from tests.support.waiting import wait_until
@@ -98,7 +99,7 @@ def test_the_middleware_can_be_named(
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path):
-        wait_until(lambda: board.odometry, "odometry")
+        wait_until(lambda: board[ODOMETRY], "odometry")
 
 
 def test_robots_of_other_domains_are_not_heard(ros_domain: int, tmp_path: Path) -> None:
@@ -111,12 +112,12 @@ def test_robots_of_other_domains_are_not_heard(ros_domain: int, tmp_path: Path) 
                 talker.publisher("/battery", BatteryState)
                 wait_until(
                     lambda: (
-                        (seen := board.presence.get("battery"))
-                        and seen.offered_by == 1
+                        (seen := board.publishers.get(BATTERY))
+                        and seen.count == 1
                         and talker.publisher("/battery", BatteryState).publish(BatteryState()) is None
-                        and board.battery
+                        and board[BATTERY]
                     ),
                     "the talker of this domain alone",
                 )
-                assert board.odometry is None
-                assert board.presence["odometry"].offered_by == 0
+                assert board[ODOMETRY] is None
+                assert board.publishers[ODOMETRY].count == 0

@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
+from gateway.status.sources import DIAGNOSTICS, ODOMETRY
 from gateway.status.values import DiagnosticItem, DiagnosticLevel
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.ros import simulated_robot
@@ -132,17 +133,18 @@ def test_components_of_many_programs_that_speak_at_once_are_all_heard(talker: Ta
         for number in range(40):
             status = DiagnosticStatus(name=f"component {number}", level=DiagnosticStatus.WARN, message="w")
             publisher.publish(DiagnosticArray(status=[status]))
-        wait_until(lambda: board.diagnostics and len(board.diagnostics.value.items) == 40, "all forty")
+        wait_until(lambda: board[DIAGNOSTICS] and len(board[DIAGNOSTICS].value.items) == 40, "all forty")
         publisher.publish(DiagnosticArray())
         publisher.publish(DiagnosticArray(status=[DiagnosticStatus(name="component 7", message="well")]))
         wait_until(
             lambda: (
-                board.diagnostics
-                and DiagnosticItem("component 7", DiagnosticLevel.OK, "well") in board.diagnostics.value.items
+                board[DIAGNOSTICS]
+                and DiagnosticItem("component 7", DiagnosticLevel.OK, "well")
+                in board[DIAGNOSTICS].value.items
             ),
             "the newest word of one",
         )
-        assert len(board.diagnostics.value.items) == 40
+        assert len(board[DIAGNOSTICS].value.items) == 40
 
 
 def test_ten_thousand_components_leave_a_bounded_number(talker: Talker) -> None:
@@ -151,13 +153,14 @@ def test_ten_thousand_components_leave_a_bounded_number(talker: Talker) -> None:
     with intake(diagnostics, board) as running:
         many = [DiagnosticStatus(name=str(number)) for number in range(10_000)]
         talker.say(running, "/diagnostics", DiagnosticArray(status=many))
-        found = wait_until(lambda: board.diagnostics, "diagnostics")
+        found = wait_until(lambda: board[DIAGNOSTICS], "diagnostics")
         assert [item.component for item in found.value.items] == [str(number) for number in range(256)]
         talker.say(running, "/diagnostics", DiagnosticArray(status=[DiagnosticStatus(name="new")]))
         wait_until(
-            lambda: board.diagnostics and board.diagnostics.value.items[-1].component == "new", "the new one"
+            lambda: board[DIAGNOSTICS] and board[DIAGNOSTICS].value.items[-1].component == "new",
+            "the new one",
         )
-        assert len(board.diagnostics.value.items) == 256
+        assert len(board[DIAGNOSTICS].value.items) == 256
 
 
 def test_publishers_that_come_and_go_leave_nothing_behind(ros_domain: int, tmp_path: Path) -> None:
@@ -168,9 +171,9 @@ def test_publishers_that_come_and_go_leave_nothing_behind(ros_domain: int, tmp_p
         def once() -> None:
             with simulated_robot(tmp_path):
                 wait_until(
-                    lambda: board.odometry and time.monotonic() - board.odometry.at_s < 0.5, "odometry"
+                    lambda: board[ODOMETRY] and time.monotonic() - board[ODOMETRY].at_s < 0.5, "odometry"
                 )
-            wait_until(lambda: not any(each.offered_by for each in board.presence.values()), "an empty graph")
+            wait_until(lambda: not any(each.count for each in board.publishers.values()), "an empty graph")
 
         once()  # what the first robot brings stays: ports, shared memory
         files, threads = process.num_fds(), process.num_threads()

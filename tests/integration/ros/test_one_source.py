@@ -15,8 +15,9 @@ from gateway.config import DEFAULT_SOURCES
 from gateway.ros import source as source_module
 from gateway.ros.lifetime import ros_node
 from gateway.ros.source import Source
-from gateway.ros.subscribing import subscribe
+from gateway.ros.subscription import subscribe
 from gateway.status.board import Board
+from gateway.status.sources import DIAGNOSTICS, ODOMETRY
 from tests.support.talker import Talker
 from tests.support.waiting import wait_until
 
@@ -51,8 +52,8 @@ def test_a_burst_that_came_since_the_last_look_is_taken_whole(talker: Talker) ->
             publisher.publish(DiagnosticArray(status=[DiagnosticStatus(name=str(number))]))
         arrived(publisher)
         source.take()
-        assert board.diagnostics
-        assert [item.component for item in board.diagnostics.value.items] == [str(n) for n in range(40)]
+        assert board[DIAGNOSTICS]
+        assert [item.component for item in board[DIAGNOSTICS].value.items] == [str(n) for n in range(40)]
 
 
 def test_of_a_late_burst_the_newest_value_counts_with_its_own_age(talker: Talker) -> None:
@@ -66,9 +67,9 @@ def test_of_a_late_burst_the_newest_value_counts_with_its_own_age(talker: Talker
         # The messages wait unread for a while: this much older they are.
         wait_until(lambda: time.monotonic() - before_s > 0.5, "half a second")
         source.take()
-        assert board.odometry
-        assert board.odometry.value.vx_mps == 10.0
-        assert time.monotonic() - board.odometry.at_s > 0.3
+        assert board[ODOMETRY]
+        assert board[ODOMETRY].value.vx_mps == 10.0
+        assert time.monotonic() - board[ODOMETRY].at_s > 0.3
         assert source.counts.values == 1
 
 
@@ -81,7 +82,7 @@ def test_a_system_clock_that_jumps_costs_an_age_no_more_than_the_time_between_tw
         wait_until(lambda: time.monotonic() - created_s > 0.3, "a while since the subscription was made")
         looked_s = time.monotonic()
         source.take()
-        assert board.odometry is None
+        assert board[ODOMETRY] is None
         publisher.publish(Odometry())
         arrived(publisher)
         jumped = SimpleNamespace(
@@ -91,6 +92,6 @@ def test_a_system_clock_that_jumps_costs_an_age_no_more_than_the_time_between_tw
         )
         monkeypatch.setattr(source_module, "time", jumped)
         # After the first look, which decodes nothing but loads the decoder, the source may still be at rest.
-        wait_until(lambda: source.take() or board.odometry, "the message is taken")
-        assert board.odometry
-        assert looked_s <= board.odometry.at_s <= time.monotonic()
+        wait_until(lambda: source.take() or board[ODOMETRY], "the message is taken")
+        assert board[ODOMETRY]
+        assert looked_s <= board[ODOMETRY].at_s <= time.monotonic()

@@ -228,7 +228,7 @@ def test_a_mismatch_is_told_in_words_without_ros_names(talker: Talker, tmp_path:
             lambda: gateway.source("battery").state == source_pb2.SOURCE_STATE_WRONG_TYPE, "the wrong type"
         )
         detail = gateway.source("odometry").detail
-        assert "reliable is asked for, best effort is offered" in detail
+        assert "reliable is requested, best effort is offered" in detail
         wait_until(
             lambda: (
                 {"odometry.qos_mismatch", "battery.wrong_type"} <= {it.id for it in gateway.status().faults}

@@ -17,7 +17,8 @@ from yolo_msgs.msg import DetectionArray
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.intake import intake
 from gateway.ros.readers import registry
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
+from gateway.status.sources import BATTERY, DETECTIONS, ODOMETRY, VISION
 from gateway.status.values import Battery, Detection, Odometry, Vision
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
@@ -57,22 +58,22 @@ def test_every_default_source_arrives(talker: Talker) -> None:
             BatteryState(present=True, voltage=15.5, percentage=0.75, power_supply_status=2),
         )
         wait_until(
-            lambda: board.odometry and board.vision and board.detections and board.battery, "all values"
+            lambda: board[ODOMETRY] and board[VISION] and board[DETECTIONS] and board[BATTERY], "all values"
         )
-    assert board.odometry
-    assert board.odometry.value == Odometry(0.5, -0.25, 0.125)
-    assert board.vision
-    assert board.vision.value == Vision(30.0, 29.5, 18.25, 2**64 - 1, 3)
-    assert board.detections
-    assert board.detections.value.items == (Detection(2, "car", 0.5, "9", 640, 360, 100, 50),)
-    assert board.battery
-    assert board.battery.value == Battery(True, 15.5, 75.0, False)
+    assert board[ODOMETRY]
+    assert board[ODOMETRY].value == Odometry(0.5, -0.25, 0.125)
+    assert board[VISION]
+    assert board[VISION].value == Vision(30.0, 29.5, 18.25, 2**64 - 1, 3)
+    assert board[DETECTIONS]
+    assert board[DETECTIONS].value.items == (Detection(2, "car", 0.5, "9", 640, 360, 100, 50),)
+    assert board[BATTERY]
+    assert board[BATTERY].value == Battery(True, 15.5, 75.0, False)
 
 
 def test_the_other_type_of_detections(talker: Talker) -> None:
     board = Board()
     source = SourceSettings(
-        kind=SourceKind.DETECTIONS,
+        kind="detections",
         topic="/boxes",
         type="vision_msgs/msg/Detection2DArray",
         stale_after_ms=500,
@@ -82,7 +83,7 @@ def test_the_other_type_of_detections(talker: Talker) -> None:
     detection.bbox.center.position.x, detection.bbox.size_x, detection.bbox.size_y = 10.0, 20.0, 30.0
     with intake([source], board) as running:
         talker.say(running, "/boxes", Detection2DArray(detections=[detection]))
-        found = wait_until(lambda: board.detections, "detections")
+        found = wait_until(lambda: board[DETECTIONS], "detections")
     assert found.value.items == (Detection(0, "dog", 0.5, "4", 10, 0, 20, 30),)
 
 
@@ -91,11 +92,11 @@ def test_speeds_that_are_no_numbers_leave_the_last_good_value(talker: Talker) ->
     with intake(DEFAULT_SOURCES, board) as running:
         odometry = running.sources["odometry"]
         talker.say(running, "/odometry/filtered", driving(0.5))
-        good = wait_until(lambda: board.odometry, "the good value")
+        good = wait_until(lambda: board[ODOMETRY], "the good value")
         for number, bad in enumerate((math.nan, math.inf, -math.inf), start=1):
             talker.say(running, "/odometry/filtered", driving(bad))
             wait_until(lambda n=number: odometry.counts.without_value == n, "the bad one to be read")
-        assert board.odometry is good
+        assert board[ODOMETRY] is good
 
 
 def test_ten_thousand_detections_are_capped_and_counted(talker: Talker) -> None:
@@ -103,11 +104,11 @@ def test_ten_thousand_detections_are_capped_and_counted(talker: Talker) -> None:
     with intake(DEFAULT_SOURCES, board) as running:
         many = [YoloDetection(id=str(number)) for number in range(10_000)]
         talker.say(running, "/yolo/detections", DetectionArray(detections=many))
-        found = wait_until(lambda: board.detections, "detections")
+        found = wait_until(lambda: board[DETECTIONS], "detections")
         assert found.value.count == 10_000
         assert [item.track_id for item in found.value.items] == [str(number) for number in range(100)]
         talker.say(running, "/yolo/detections", DetectionArray())
-        wait_until(lambda: board.detections and board.detections.value.count == 0, "the empty picture")
+        wait_until(lambda: board[DETECTIONS] and board[DETECTIONS].value.count == 0, "the empty picture")
 
 
 def test_a_name_that_is_not_utf8_is_shown_all_the_same(talker: Talker) -> None:
@@ -116,7 +117,7 @@ def test_a_name_that_is_not_utf8_is_shown_all_the_same(talker: Talker) -> None:
         raw = serialize_message(DetectionArray(detections=[YoloDetection(class_name="XXXX")]))
         publisher = talker.meet(running, "/yolo/detections", DetectionArray)
         publisher.publish(raw.replace(b"XXXX", b"\xff\xfeab"))
-        found = wait_until(lambda: board.detections, "detections")
+        found = wait_until(lambda: board[DETECTIONS], "detections")
     assert found.value.items[0].class_name == "\ufffd\ufffdab"
 
 
@@ -128,29 +129,25 @@ def test_a_message_that_is_not_one_harms_nobody(talker: Talker) -> None:
         publisher = talker.meet(running, "/vision/perf", VisionPerfSummary)
         publisher.publish(serialize_message(VisionPerfSummary())[:30])
         wait_until(lambda: vision.counts.failures == 1, "the failure to be counted")
-        assert board.vision is None
+        assert board[VISION] is None
         talker.say(running, "/vision/perf", VisionPerfSummary(producer_fps=12.0))
-        found = wait_until(lambda: board.vision, "the next message")
+        found = wait_until(lambda: board[VISION], "the next message")
     assert found.value.producer_fps == 12.0
 
 
 def test_a_type_that_is_not_installed_leaves_the_others_alone(talker: Talker) -> None:
     board = Board()
     sources = [
-        source.model_copy(update={"type": "no_such_msgs/msg/Thing"})
-        if source.kind is SourceKind.VISION
-        else source
+        source.model_copy(update={"type": "no_such_msgs/msg/Thing"}) if source.kind == "vision" else source
         for source in DEFAULT_SOURCES
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(
-            registry._readers, ("no_such_msgs/msg/Thing", SourceKind.VISION), lambda message, source: None
-        )
+        patch.setitem(registry._readers, ("no_such_msgs/msg/Thing", VISION), lambda message, source: None)
         with intake(sources, board) as running:
             assert "vision" not in running.sources
             talker.say(running, "/odometry/filtered", driving(0.5))
-            wait_until(lambda: board.odometry, "odometry")
-    assert "install the ROS package no_such_msgs" in board.unusable["vision"]
+            wait_until(lambda: board[ODOMETRY], "odometry")
+    assert "install the ROS package no_such_msgs" in board.unusable[VISION]
 
 
 def test_a_topic_of_another_type_than_configured_does_no_harm(talker: Talker) -> None:
@@ -158,18 +155,18 @@ def test_a_topic_of_another_type_than_configured_does_no_harm(talker: Talker) ->
     with intake(DEFAULT_SOURCES, board) as running:
         talker.publisher("/battery", DiagnosticArray).publish(DiagnosticArray())
         talker.say(running, "/odometry/filtered", driving(0.5))
-        wait_until(lambda: board.odometry, "odometry")
-    assert board.battery is None
+        wait_until(lambda: board[ODOMETRY], "odometry")
+    assert board[BATTERY] is None
 
 
 def test_a_latched_value_reaches_a_gateway_that_starts_later(talker: Talker) -> None:
     latched = {"durability": DurabilityPolicy.TRANSIENT_LOCAL, "reliability": ReliabilityPolicy.RELIABLE}
     talker.publisher("/battery", BatteryState, **latched).publish(BatteryState(present=True, voltage=15.5))
-    source = next(source for source in DEFAULT_SOURCES if source.kind is SourceKind.BATTERY)
+    source = next(source for source in DEFAULT_SOURCES if source.kind == "battery")
     update = {"durability": "transient_local", "reliability": "reliable"}
     board = Board()
     with intake([source.model_copy(update=update)], board):
-        found = wait_until(lambda: board.battery, "the latched value")
+        found = wait_until(lambda: board[BATTERY], "the latched value")
     assert found.value.voltage_v == 15.5
 
 
@@ -183,5 +180,5 @@ def test_of_two_publishers_on_one_topic_the_later_message_counts(talker: Talker)
                 speed = number + (0.5 if voice is second else 0.0)
                 voice.say(running, "/odometry/filtered", driving(speed), voices=2)
                 wait_until(
-                    lambda s=speed: board.odometry and board.odometry.value.vx_mps == s, f"speed {speed}"
+                    lambda s=speed: board[ODOMETRY] and board[ODOMETRY].value.vx_mps == s, f"speed {speed}"
                 )

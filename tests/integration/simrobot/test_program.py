@@ -11,7 +11,17 @@ import pytest
 from common.errors import UserError
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.intake import intake
-from gateway.status.board import Board, SourceKind
+from gateway.status.board import Board
+from gateway.status.sources import (
+    BATTERY,
+    DETECTIONS,
+    DIAGNOSTICS,
+    EFFECTIVE_COMMAND,
+    MODE,
+    MUX_INPUTS,
+    ODOMETRY,
+    VISION,
+)
 from gateway.status.values import CommandSource, DiagnosticLevel
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
@@ -19,6 +29,11 @@ from tests.support.waiting import wait_until
 pytestmark = pytest.mark.ros
 
 SIMROBOT = [sys.executable, "-c", "from simrobot.cli import main; main()"]
+
+
+def spoken(board: Board) -> set[CommandSource]:
+    """The mux inputs with a command."""
+    return {source for source, spec in MUX_INPUTS.items() if board[spec]}
 
 
 def simrobot(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -36,50 +51,51 @@ def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: 
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path, "battery_percent=40", "speed_mps=0.75"):
         wait_until(
-            lambda: board.odometry and board.vision and board.detections and board.battery, "all sensors"
+            lambda: board[ODOMETRY] and board[VISION] and board[DETECTIONS] and board[BATTERY], "all sensors"
         )
-        wait_until(lambda: board.diagnostics and board.effective_command and board.mux_inputs, "the rest")
+        wait_until(lambda: board[DIAGNOSTICS] and board[EFFECTIVE_COMMAND] and spoken(board), "the rest")
     assert not board.unusable
-    assert set(board.mux_inputs) == {CommandSource.AUTONOMY}, "the others are there, and do not speak"
-    assert board.odometry
-    assert board.odometry.value.vx_mps == 0.75
-    assert board.battery
-    assert board.battery.value.charge_percent == pytest.approx(40, abs=1)
-    assert board.detections
-    assert board.detections.value.count == 3
+    assert spoken(board) == {CommandSource.AUTONOMY}, "the others are there, and do not speak"
+    assert board[ODOMETRY]
+    assert board[ODOMETRY].value.vx_mps == 0.75
+    assert board[BATTERY]
+    assert board[BATTERY].value.charge_percent == pytest.approx(40, abs=1)
+    assert board[DETECTIONS]
+    assert board[DETECTIONS].value.count == 3
 
 
 def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         robot.change(battery_percent=7, infer_errors_per_s=50, detection_count=250, speed_mps=-1.25)
-        wait_until(lambda: board.odometry and board.odometry.value.vx_mps == -1.25, "the new speed")
-        wait_until(lambda: board.vision and board.vision.value.infer_error_count > 10, "inference errors")
+        wait_until(lambda: board[ODOMETRY] and board[ODOMETRY].value.vx_mps == -1.25, "the new speed")
+        wait_until(lambda: board[VISION] and board[VISION].value.infer_error_count > 10, "inference errors")
         found = wait_until(
-            lambda: board.detections if board.detections and board.detections.value.count == 250 else None,
+            lambda: board[DETECTIONS] if board[DETECTIONS] and board[DETECTIONS].value.count == 250 else None,
             "many boxes",
         )
         assert len(found.value.items) == 100
         wait_until(
             lambda: (
-                board.battery
-                and board.battery.value.charge_percent is not None
-                and board.battery.value.charge_percent < 8
+                board[BATTERY]
+                and board[BATTERY].value.charge_percent is not None
+                and board[BATTERY].value.charge_percent < 8
             ),
             "a low battery",
         )
         robot.change(not_a_number=["battery", "detections"])
         wait_until(
-            lambda: board.battery and board.battery.value.charge_percent is None, "a charge that is not known"
+            lambda: board[BATTERY] and board[BATTERY].value.charge_percent is None,
+            "a charge that is not known",
         )
-        wait_until(lambda: board.detections and not board.detections.value.items, "no box to draw")
+        wait_until(lambda: board[DETECTIONS] and not board[DETECTIONS].value.items, "no box to draw")
 
 
 def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
     board = Board()
     latched = {"reliability": "reliable", "durability": "transient_local"}
     mode = SourceSettings(
-        kind=SourceKind.MODE,
+        kind="mode",
         topic="/mission/mode",
         type="std_msgs/msg/String",
         stale_after_ms=1000,
@@ -87,14 +103,16 @@ def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_
     )
 
     def levels() -> dict[str, DiagnosticLevel]:
-        items = board.diagnostics.value.items if board.diagnostics else ()
+        items = board[DIAGNOSTICS].value.items if board[DIAGNOSTICS] else ()
         return {item.component.partition(":")[0]: item.level for item in items}
 
     with simulated_robot(tmp_path, "mode=idle") as robot, intake((*DEFAULT_SOURCES, mode), board):
-        wait_until(lambda: board.mode and board.mode.value.name == "idle", "the mode from before the gateway")
+        wait_until(
+            lambda: board[MODE] and board[MODE].value.name == "idle", "the mode from before the gateway"
+        )
         robot.change(commander="keyboard", mode="returning", components={"drive": "error", "lidar": "stale"})
-        wait_until(lambda: CommandSource.KEYBOARD in board.mux_inputs, "the keyboard's commands")
-        wait_until(lambda: board.mode and board.mode.value.name == "returning", "the new mode")
+        wait_until(lambda: CommandSource.KEYBOARD in spoken(board), "the keyboard's commands")
+        wait_until(lambda: board[MODE] and board[MODE].value.name == "returning", "the new mode")
         wait_until(
             lambda: (
                 levels()

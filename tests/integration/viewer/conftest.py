@@ -8,15 +8,14 @@ from typing import Any
 
 import pytest
 
-from console.monitor.video import pass_on
-from console.monitor.worker import Worker
+from console.viewer.robot_video import RobotVideo
 from console.viewer.session import VideoSession
 from tests.support.video_ground import VideoGround, video_ground
 
 
 @pytest.fixture
 def ground(tmp_path: Path) -> Iterator[VideoGround]:
-    """Small pictures; the preview is off at first."""
+    """Small frames; the preview is off at first."""
     with video_ground(tmp_path) as ground:
         yield ground
         # A process that a test has stopped could not end in good order.
@@ -25,16 +24,14 @@ def ground(tmp_path: Path) -> Iterator[VideoGround]:
 
 @contextmanager
 def following(target: str, **options: Any) -> Iterator[VideoSession]:
-    """A session that is told what the gateway says."""
-    session = VideoSession(**options)
-    worker = Worker(target, lambda: pass_on(worker.newest(), session))
-    session.start()
-    worker.start()
+    """A session that follows the gateway's status. A recording stays open."""
+    robot = RobotVideo(target, **options)
+    robot.start()
     try:
-        yield session
+        yield robot.session
     finally:
-        assert worker.close()
-        assert session.close()
+        assert robot.worker.close()
+        assert robot.session.close()
 
 
 @pytest.fixture

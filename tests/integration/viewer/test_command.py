@@ -44,7 +44,7 @@ def without(library: str, directory: Path) -> str:
     return os.pathsep.join([str(directory), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
-def test_frames_are_counted_and_told_in_a_line(running: VideoGround) -> None:
+def test_frames_are_counted_in_one_line(running: VideoGround) -> None:
     done = robotctl_process("--target", running.target, "view", "--headless", "--frames", "20")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -65,7 +65,7 @@ def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path
     assert decoded_pictures(file) >= 20
 
 
-def test_it_ends_in_good_order_when_told_to(running: VideoGround, tmp_path: Path) -> None:
+def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = [ROBOTCTL, "--target", running.target, "view", "--headless", "--record", str(file)]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as viewing:
@@ -126,7 +126,7 @@ def test_a_place_that_cannot_be_written_is_one_line_and_1() -> None:
     assert "/nowhere/kept.ts can't be written" in only_line(done.stderr)
 
 
-def test_nobody_there_is_one_line_and_3_and_leaves_no_file(tmp_path: Path) -> None:
+def test_no_gateway_is_one_line_and_3_and_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = ["view", "--headless", "--frames", "3", "--record", str(file)]
     done = robotctl_process("--target", f"127.0.0.1:{free_tcp_port()}", *command)
@@ -163,7 +163,7 @@ def test_a_preview_that_is_off_is_one_line_and_1() -> None:
 
 @contextmanager
 def claiming_to_run(words: str = "") -> Iterator[str]:
-    """A gateway whose preview runs, as it says; nobody listens at its stream's port."""
+    """A gateway whose preview runs, as it says; its stream's port has no listener."""
     double = GatewayDouble()
     double.works = not words
     double.fault = words
@@ -179,7 +179,7 @@ def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
         done = robotctl_process("--target", target, "view", "--headless", "--frames", "3", "--patience", "4")
     assert done.returncode == 3
     said = only_line(done.stderr)
-    assert "no picture for 4 s: the preview is running; no SRT listener answers" in said
+    assert "no frame for 4 s: the preview is running; no SRT listener answers" in said
     assert said.endswith("Look at: robotctl doctor")
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from console.receiver import clips
 from console.receiver.decoder_probe import objection
+from tests.support.clips import FRAMES
 from tests.support.robotctl import robotctl_process
 from tests.support.video_ground import VideoGround, video_ground
 
@@ -48,7 +49,7 @@ def seen(ground: VideoGround, **faults: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("codec", ["h264", "h265"])
 def test_software_decodes_the_clips_rightly(codec: str) -> None:
-    assert len(clips.units(codec)) == clips.PICTURES
+    assert len(clips.units(codec)) == FRAMES
     assert objection(f"avdec_{codec}", codec) == ""
 
 
@@ -57,12 +58,12 @@ def test_software_decodes_the_clips_rightly(codec: str) -> None:
     [
         ("ok", ""),
         ("refuse", "the device can't be opened"),
-        ("silent", "it makes no picture"),
-        ("late", "pictures back"),
-        ("wrong", "its pictures are wrong"),
+        ("silent", "it decodes no frame"),
+        ("late", "frames back"),
+        ("wrong", "its frames are wrong"),
         ("crash", "it crashed when tried (SIGSEGV)"),
         ("error", "the driver reports a hardware fault"),
-        ("hang", "it makes no picture"),
+        ("hang", "it decodes no frame"),
         ("stuck", "it hung: no result within 3 s"),
     ],
 )
@@ -101,7 +102,7 @@ def test_one_that_fails_with_the_real_stream_is_replaced_by_software(
     assert document["redials"] >= 1
 
 
-def test_a_decoder_that_hangs_in_its_trial_does_not_keep_the_picture_waiting(running: VideoGround) -> None:
+def test_a_decoder_that_hangs_in_its_trial_does_not_delay_the_video(running: VideoGround) -> None:
     document = seen(running, vah264dec="stuck")
     assert document["decoder"] == "avdec_h264"
     assert document["first_picture_ms"] < 6000

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import pytest
 
 from console.client import GatewayClient
-from console.viewer.account import Bookkeeper
-from console.viewer.banner import banner
-from console.viewer.state import Phase
+from console.viewer.formatting import banner
+from console.viewer.playback import PlaybackState
+from console.viewer.summary import FrameCounter
 from gateway.access.role import Role
 from tests.support.guarded_program import ROBOT, Guarded, guarded_video
 from tests.support.qt import application, press, until
@@ -18,12 +18,12 @@ from tests.support.waiting import wait_until
 
 from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 
-from console.window.view_program import viewing
+from console.window.programs import viewing
 
 pytestmark = [pytest.mark.gst, pytest.mark.timed, pytest.mark.usefixtures("application")]
 __all__ = ["application"]
 
-TOLD_WITHIN_S = 10.0
+SHOWN_WITHIN_S = 10.0
 """Revoking counts within a second on the robot, a new login within half a second here; machines are busy."""
 
 
@@ -52,11 +52,11 @@ def test_a_viewer_by_the_robots_name_sees_an_encrypted_stream(robot: Guarded) ->
     assert document["recording"] is None
 
 
-def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded) -> None:
+def test_without_a_valid_login_there_is_no_video(robot: Guarded) -> None:
     robot.switch_on()
     robot.log_in("carl", Role.VIEWER)
-    robot.keeper.revoke("carl")
-    wait_until(lambda: view(robot)[0] == 1, "carl is refused", TOLD_WITHIN_S)
+    robot.admin.revoke("carl")
+    wait_until(lambda: view(robot)[0] == 1, "carl is refused", SHOWN_WITHIN_S)
     code, said, complaints = view(robot)
     assert (code, said) == (1, "")
     assert "was revoked" in only_line(complaints)
@@ -66,33 +66,45 @@ def test_a_stranger_and_somebody_whose_login_is_over_see_nothing(robot: Guarded)
     assert "robotctl login" in only_line(stranger.stderr)
 
 
-def test_the_window_tells_what_a_viewer_lacks_and_takes_a_new_login_over(robot: Guarded) -> None:
+def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Guarded) -> None:
     robot.switch_off()
     robot.log_in("dora", Role.VIEWER)
-    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
-        until(lambda: window.session.state().phase is Phase.OFF, "the preview is off")
-        press(window.window, Qt.Key.Key_P)
+    with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
+        until(lambda: window.robot.session.playback().state is PlaybackState.OFF, "the preview is off")
+        press(window, Qt.Key.Key_P)
         until(
-            lambda: "dora is viewer, and SetPreviewMode needs operator" in window.window.said.text(),
+            lambda: "dora is viewer, and SetPreviewMode needs operator" in window.notes.text(),
             "what is missing",
         )
-        robot.keeper.revoke("dora")
-        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
-        card = banner(window.session.state())
+        robot.admin.revoke("dora")
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
+            "no access",
+            SHOWN_WITHIN_S,
+        )
+        card = banner(window.robot.session.playback())
         assert card
         assert (
             "was revoked. Ask this robot's administrator for access, then type: robotctl login" in card.detail
         )
         robot.log_in("dora", Role.OPERATOR)
-        until(lambda: window.session.state().phase is Phase.OFF, "the new login counts", TOLD_WITHIN_S)
-        press(window.window, Qt.Key.Key_P)
-        until(lambda: window.session.state().phase is Phase.LIVE, "video")
-        robot.keeper.revoke("dora")
-        # The picture ends, too: the stream has another passphrase from then on, which is not told to her.
-        until(lambda: window.session.state().phase is Phase.NO_ACCESS, "no access", TOLD_WITHIN_S)
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.OFF,
+            "the new login counts",
+            SHOWN_WITHIN_S,
+        )
+        press(window, Qt.Key.Key_P)
+        until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
+        robot.admin.revoke("dora")
+        # The video ends, too: the stream has another passphrase from then on, which she does not get.
+        until(
+            lambda: window.robot.session.playback().state is PlaybackState.NO_ACCESS,
+            "no access",
+            SHOWN_WITHIN_S,
+        )
 
 
-def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselves(robot: Guarded) -> None:
+def test_after_a_revocation_the_other_viewers_reconnect_by_themselves(robot: Guarded) -> None:
     robot.log_in("emil", Role.VIEWER)
     emils = robot.stored()
     robot.log_in("frida", Role.VIEWER)
@@ -100,9 +112,9 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
     with GatewayClient(robot.target, credentials=emils) as client:
         known = client.status().preview.endpoint
     assert known
-    with viewing(robot.target, None, Bookkeeper(), robot.stored) as window:
-        until(lambda: window.session.state().phase is Phase.LIVE, "video")
-        robot.keeper.revoke("emil")
+    with viewing(robot.target, None, FrameCounter(), robot.stored) as window:
+        until(lambda: window.robot.session.playback().state is PlaybackState.LIVE, "video")
+        robot.admin.revoke("emil")
         with robot.client() as client:
             wait_until(
                 lambda: (
@@ -110,10 +122,10 @@ def test_when_somebody_is_let_out_the_others_have_their_picture_back_by_themselv
                     and endpoint.passphrase not in {"", known.passphrase}
                 ),
                 "another passphrase",
-                TOLD_WITHIN_S,
+                SHOWN_WITHIN_S,
             )
         until(
-            lambda: (now := window.session.state()).phase is Phase.LIVE and now.redials > 0,
+            lambda: (now := window.robot.session.playback()).state is PlaybackState.LIVE and now.redials > 0,
             "her video is back",
-            TOLD_WITHIN_S,
+            SHOWN_WITHIN_S,
         )

@@ -12,8 +12,8 @@ from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
+from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
-from console.viewer.state import Phase
 from tests.integration.viewer.conftest import following
 from tests.support.judges import decoded_pictures
 from tests.support.streams import SrtSender, encode
@@ -28,48 +28,48 @@ BACK_WITHIN_S = 1.5
 
 
 def is_live(session: VideoSession) -> bool:
-    return session.state().phase is Phase.LIVE
+    return session.playback().state is PlaybackState.LIVE
 
 
-def becomes(session: VideoSession, phase: Phase) -> float:
-    """Waits for a phase and tells when it was seen."""
-    wait_until(lambda: session.state().phase is phase, f"{phase}; it is {session.state()}", 25)
+def becomes(session: VideoSession, state: PlaybackState) -> float:
+    """Waits for a state and returns when it was seen."""
+    wait_until(lambda: session.playback().state is state, f"{state}; it is {session.playback()}", 25)
     return time.monotonic()
 
 
 def test_it_follows_the_preview_from_off_to_on_and_back(ground: VideoGround, session: VideoSession) -> None:
-    becomes(session, Phase.OFF)
+    becomes(session, PlaybackState.OFF)
     ground.switch_on()
-    becomes(session, Phase.LIVE)
-    picture = session.latest()
-    assert picture is not None
-    assert (picture.width, picture.height, picture.codec) == (320, 240, "h264")
-    assert picture.pixel_format is PixelFormat.BGRX
-    assert session.figures().decoder == "avdec_h264"
+    becomes(session, PlaybackState.LIVE)
+    frame = session.latest_frame()
+    assert frame is not None
+    assert (frame.width, frame.height, frame.codec) == (320, 240, "h264")
+    assert frame.pixel_format is PixelFormat.BGRX
+    assert frame.decoder == "avdec_h264"
     ground.switch_off()
-    becomes(session, Phase.OFF)
-    assert session.latest() is None
+    becomes(session, PlaybackState.OFF)
+    assert session.latest_frame() is None
 
 
 def test_a_killed_preview_is_a_freeze_at_once_and_back_at_once(
     ground: VideoGround, session: VideoSession
 ) -> None:
     ground.switch_on()
-    becomes(session, Phase.LIVE)
+    becomes(session, PlaybackState.LIVE)
     ground.kill_preview()
     died_s = time.monotonic()
     wait_until(lambda: not is_live(session), "the freeze shows")
     assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
-    # The gateway says why a moment later; the picture that stands still stays marked as one.
-    becomes(session, Phase.FAULTED)
-    assert session.state().still_s is not None
-    assert "unreachable" in session.state().reason
-    wait_until(lambda: session.figures().redials >= 1, "called again")
+    # The gateway says why a moment later; the frame that stands still stays marked as one.
+    becomes(session, PlaybackState.FAULTED)
+    assert session.playback().frame_age_s is not None
+    assert "unreachable" in session.playback().reason
+    wait_until(lambda: session.redials >= 1, "called again")
 
     ground.preview.start_again()
     ground.preview.running()
     returned_s = time.monotonic()
-    assert becomes(session, Phase.LIVE) - returned_s < BACK_WITHIN_S
+    assert becomes(session, PlaybackState.LIVE) - returned_s < BACK_WITHIN_S
 
 
 @pytest.mark.parametrize("redials", [1, 3])
@@ -78,40 +78,40 @@ def test_a_preview_that_stands_still_is_a_freeze_and_goes_on(
 ) -> None:
     """For a moment, and for longer than SRT itself keeps a connection."""
     ground.switch_on()
-    becomes(session, Phase.LIVE)
+    becomes(session, PlaybackState.LIVE)
     ground.preview.process.send_signal(signal.SIGSTOP)
     stopped_s = time.monotonic()
     wait_until(lambda: not is_live(session), "the freeze shows")
     assert time.monotonic() - stopped_s < FREEZE_SHOWN_WITHIN_S
-    wait_until(lambda: session.figures().redials >= redials, "called again")
+    wait_until(lambda: session.redials >= redials, "called again")
     ground.preview.process.send_signal(signal.SIGCONT)
     went_on_s = time.monotonic()
-    assert becomes(session, Phase.LIVE) - went_on_s < BACK_WITHIN_S
+    assert becomes(session, PlaybackState.LIVE) - went_on_s < BACK_WITHIN_S
 
 
-def test_pictures_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
+def test_frames_go_on_without_the_gateway(ground: VideoGround, session: VideoSession) -> None:
     ground.switch_on()
-    becomes(session, Phase.LIVE)
+    becomes(session, PlaybackState.LIVE)
     ground.kill_gateway()
-    wait_until(lambda: session.state().reason, "the gateway is missed")
+    wait_until(lambda: session.playback().reason, "the gateway is missed")
     assert is_live(session)
     ground.kill_preview()
-    becomes(session, Phase.UNREACHABLE)
+    becomes(session, PlaybackState.UNREACHABLE)
     ground.preview.start_again()
     ground.start_gateway()
-    becomes(session, Phase.OFF)
+    becomes(session, PlaybackState.OFF)
 
 
 def test_the_codec_may_change_with_the_stream(
     ground: VideoGround, session: VideoSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ground.switch_on()
-    becomes(session, Phase.LIVE)
+    becomes(session, PlaybackState.LIVE)
     ground.kill_preview()
     monkeypatch.setenv("PREVIEW__ENCODERS__ORDER", '["x265"]')
     ground.preview.start_again()
-    wait_until(lambda: (picture := session.latest()) and picture.codec == "h265", "H.265 is shown", 30)
-    becomes(session, Phase.LIVE)
+    wait_until(lambda: (frame := session.latest_frame()) and frame.codec == "h265", "H.265 is shown", 30)
+    becomes(session, PlaybackState.LIVE)
 
 
 def test_the_right_passphrase_comes_with_the_endpoint() -> None:
@@ -121,13 +121,13 @@ def test_the_right_passphrase_comes_with_the_endpoint() -> None:
     try:
         with SrtSender(port, passphrase="the right one") as sender:
             session.follow(preview(PreviewState.RUNNING, port=port, passphrase="a wrong passphrase"))
-            becomes(session, Phase.BLOCKED)
-            assert "did not accept the passphrase" in session.state().reason
+            becomes(session, PlaybackState.BLOCKED)
+            assert "did not accept the passphrase" in session.playback().reason
             session.follow(preview(PreviewState.RUNNING, port=port, passphrase="the right one"))
             assert sender.viewer_joined.wait(20)
             for piece in pieces:
                 sender.send(piece)
-            becomes(session, Phase.LIVE)
+            becomes(session, PlaybackState.LIVE)
     finally:
         assert session.close()
 
@@ -136,20 +136,20 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
     recording = Recording(tmp_path / "drive.ts")
     with following(ground.target, recording=recording) as session:
         ground.switch_on()
-        wait_until(lambda: session.figures().pictures >= 30, "pictures")
+        wait_until(lambda: session.frames >= 30, "frames")
         ground.kill_preview()
-        wait_until(lambda: session.figures().redials >= 1, "called again")
+        wait_until(lambda: session.redials >= 1, "called again")
         ground.preview.start_again()
-        before = session.figures().pictures
-        wait_until(lambda: session.figures().pictures >= before + 30, "pictures again", 30)
+        before = session.frames
+        wait_until(lambda: session.frames >= before + 30, "frames again", 30)
         kept_while_live = recording.size_bytes
-        seen = session.figures().pictures
+        seen = session.frames
     recording.close()
-    assert recording.trouble is None
+    assert recording.error is None
     assert recording.gaps == 0
     assert recording.size_bytes >= kept_while_live > 0
     assert recording.size_bytes % 188 == 0
-    # A picture that waits in the session is dropped for a newer one; the file has them all.
+    # A frame that waits in the session is dropped for a newer one; the file has them all.
     assert decoded_pictures(recording.file) >= seen >= 60
 
 
@@ -157,40 +157,40 @@ def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:
     recording = Recording(Path("/dev/full"))
     with following(ground.target, recording=recording) as session:
         ground.switch_on()
-        wait_until(lambda: recording.trouble, "the disk is full")
-        before = session.figures().pictures
-        wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on")
-        assert session.figures().redials == 0
+        wait_until(lambda: recording.error, "the disk is full")
+        before = session.frames
+        wait_until(lambda: session.frames >= before + 30, "frames go on")
+        assert session.redials == 0
     recording.close()
-    assert "ended early: No space left" in str(recording.trouble)
+    assert "ended early: No space left" in str(recording.error)
 
 
-def test_a_disk_that_does_not_answer_holds_up_neither_the_picture_nor_the_end(ground: VideoGround) -> None:
-    """A terminal that nobody reads takes a few kB; then whoever writes to it waits for ever."""
+def test_a_disk_that_does_not_answer_delays_neither_the_video_nor_the_end(ground: VideoGround) -> None:
+    """A terminal without a reader takes a few kB; then writing blocks for ever."""
     master, slave = os.openpty()
     recording = Recording(Path(os.ttyname(slave)))
     try:
         with following(ground.target, recording=recording) as session:
             ground.switch_on()
-            becomes(session, Phase.LIVE)
+            becomes(session, PlaybackState.LIVE)
             ground.kill_preview()
-            wait_until(lambda: session.figures().redials >= 1, "called again, with a disk that hangs")
+            wait_until(lambda: session.redials >= 1, "called again, with a disk that hangs")
             ground.preview.start_again()
-            before = session.figures().pictures
-            wait_until(lambda: session.figures().pictures >= before + 30, "pictures go on", 30)
-        recording.close(within_s=0.2)
-        assert "the disk does not answer" in str(recording.trouble)
+            before = session.frames
+            wait_until(lambda: session.frames >= before + 30, "frames go on", 30)
+        recording.close(timeout_s=0.2)
+        assert "the disk does not answer" in str(recording.error)
     finally:
         os.close(master)
         os.close(slave)
 
 
 def test_closing_takes_no_time_whatever_it_does() -> None:
-    nobody = StreamAddress("127.0.0.1", free_udp_port(), 20)
+    absent = StreamAddress("127.0.0.1", free_udp_port(), 20)
     session = VideoSession()
     session.start()
-    session.follow(preview(PreviewState.RUNNING, port=nobody.port))
-    wait_until(lambda: session.figures().redials >= 1, "nobody answers, it was called again")
+    session.follow(preview(PreviewState.RUNNING, port=absent.port))
+    wait_until(lambda: session.redials >= 1, "no answer, it has redialed")
     begun_s = time.monotonic()
     assert session.close()
     assert time.monotonic() - begun_s < 1.5
@@ -204,6 +204,6 @@ def test_an_encrypted_stream_needs_nothing_more(tmp_path: Path) -> None:
     ):
         for _ in range(2):
             ground.switch_on()
-            becomes(session, Phase.LIVE)
+            becomes(session, PlaybackState.LIVE)
             ground.switch_off()
-            becomes(session, Phase.OFF)
+            becomes(session, PlaybackState.OFF)

@@ -10,9 +10,9 @@ import pytest
 from bench.viewer import extra_latency_ms, on_screen
 from common.free import free_tcp_port
 from console.receiver.recording import Recording
-from console.viewer.account import Bookkeeper
 from console.viewer.geometry import Box
-from console.viewer.state import Phase
+from console.viewer.playback import PlaybackState
+from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
@@ -24,7 +24,8 @@ from PySide6.QtCore import Qt  # isort: skip - after Qt's platform was chosen
 from PySide6.QtGui import QColor, QImage  # isort: skip
 from PySide6.QtWidgets import QWidget  # isort: skip
 
-from console.window.view_program import Viewing, viewing
+from console.window.programs import viewing
+from console.window.view_window import ViewWindow
 
 pytestmark = [pytest.mark.gst, pytest.mark.usefixtures("application")]
 __all__ = ["application"]
@@ -36,14 +37,18 @@ BOX_YELLOW = QColor("#F0E442")
 
 
 @pytest.fixture
-def view(ground: VideoGround) -> Iterator[Viewing]:
+def view(ground: VideoGround) -> Iterator[ViewWindow]:
     """The window of `robotctl view`, following the robot."""
-    with viewing(ground.target, None, Bookkeeper()) as view:
+    with viewing(ground.target, None, FrameCounter()) as view:
         yield view
 
 
-def shows(view: Viewing, phase: Phase, within_s: float = 25) -> float:
-    until(lambda: view.session.state().phase is phase, f"{phase}; it is {view.session.state()}", within_s)
+def shows(view: ViewWindow, state: PlaybackState, within_s: float = 25) -> float:
+    until(
+        lambda: view.robot.session.playback().state is state,
+        f"{state}; it is {view.robot.session.playback()}",
+        within_s,
+    )
     return time.monotonic()
 
 
@@ -53,102 +58,102 @@ def keep(widget: QWidget, name: str) -> None:
     assert widget.grab().save(str(folder / f"{name}.png"))
 
 
-def banner_is_on_screen(view: Viewing) -> bool:
-    """Whether the card of a banner is painted over the lower part of the picture."""
-    video = on_screen(view.window.video)
+def banner_is_on_screen(view: ViewWindow) -> bool:
+    """Whether the card of a banner is painted over the lower part of the frame."""
+    video = on_screen(view.video)
     colour = video.pixelColor(video.width() // 2, video.height() - 24)
     return max(colour.red(), colour.green(), colour.blue()) < 60
 
 
 @pytest.mark.timed
-def test_the_window_adds_less_than_one_and_a_half_pictures_to_the_latency(tmp_path: Path) -> None:
+def test_the_window_adds_less_than_one_and_a_half_frames_to_the_latency(tmp_path: Path) -> None:
     """In one round of three: what other programs take of the machine is not the window's doing."""
     with closing(extra_latency_ms(tmp_path, rounds=3)) as rounds:
         assert any(extra_ms < 1.5 * 1000 / FPS for extra_ms in rounds)
 
 
-def test_a_freeze_is_painted_at_once_and_gone_when_the_picture_is_back(
-    ground: VideoGround, view: Viewing
+def test_a_freeze_is_painted_at_once_and_gone_when_the_video_is_back(
+    ground: VideoGround, view: ViewWindow
 ) -> None:
     ground.switch_on()
-    shows(view, Phase.LIVE)
-    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    shows(view, PlaybackState.LIVE)
+    until(lambda: not banner_is_on_screen(view), "the frame alone")
     ground.kill_preview()
     died_s = time.monotonic()
     until(lambda: banner_is_on_screen(view), "the banner")
     assert time.monotonic() - died_s < FREEZE_SHOWN_WITHIN_S
     let_pass(0.8)
-    keep(view.window, "frozen")
-    shows(view, Phase.FAULTED)
+    keep(view, "frozen")
+    shows(view, PlaybackState.FAULTED)
     let_pass(0.3)
-    keep(view.window, "faulted")
+    keep(view, "faulted")
     ground.preview.start_again()
     ground.preview.running()
     returned_s = time.monotonic()
-    until(lambda: not banner_is_on_screen(view), "the picture alone")
+    until(lambda: not banner_is_on_screen(view), "the frame alone")
     assert time.monotonic() - returned_s < BACK_WITHIN_S
 
 
-def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: Viewing) -> None:
-    shows(view, Phase.OFF)
+def test_a_person_switches_the_preview_with_a_key(ground: VideoGround, view: ViewWindow) -> None:
+    shows(view, PlaybackState.OFF)
     let_pass(0.6)
-    keep(view.window, "off")
-    press(view.window, Qt.Key.Key_P)
-    shows(view, Phase.LIVE)
-    until(lambda: "320x240 h264 by avdec_h264" in view.window.figures.text(), "the figures")
-    assert view.window.windowTitle().endswith(ground.target)
-    press(view.window, Qt.Key.Key_P)
-    shows(view, Phase.OFF)
+    keep(view, "off")
+    press(view, Qt.Key.Key_P)
+    shows(view, PlaybackState.LIVE)
+    until(lambda: "320x240 h264 by avdec_h264" in view.figures.text(), "the figures")
+    assert view.windowTitle().endswith(ground.target)
+    press(view, Qt.Key.Key_P)
+    shows(view, PlaybackState.OFF)
 
 
-def test_a_person_turns_full_screen_on_and_off_and_quits(view: Viewing) -> None:
-    shows(view, Phase.OFF)
-    press(view.window, Qt.Key.Key_F)
-    until(view.window.isFullScreen, "full screen")
-    assert not view.window.figures.isVisible()
-    press(view.window, Qt.Key.Key_Escape)
-    until(lambda: not view.window.isFullScreen(), "a window again")
-    assert view.window.figures.isVisible()
-    press(view.window, Qt.Key.Key_Q)
-    assert not view.window.isVisible()
+def test_a_person_turns_full_screen_on_and_off_and_quits(view: ViewWindow) -> None:
+    shows(view, PlaybackState.OFF)
+    press(view, Qt.Key.Key_F)
+    until(view.isFullScreen, "full screen")
+    assert not view.figures.isVisible()
+    press(view, Qt.Key.Key_Escape)
+    until(lambda: not view.isFullScreen(), "a window again")
+    assert view.figures.isVisible()
+    press(view, Qt.Key.Key_Q)
+    assert not view.isVisible()
 
 
-def test_nobody_there_is_said(tmp_path: Path) -> None:
-    with viewing(f"127.0.0.1:{free_tcp_port()}", Recording(tmp_path / "a.ts"), Bookkeeper()) as view:
-        shows(view, Phase.UNREACHABLE)
+def test_an_absent_robot_is_reported(tmp_path: Path) -> None:
+    with viewing(f"127.0.0.1:{free_tcp_port()}", Recording(tmp_path / "a.ts"), FrameCounter()) as view:
+        shows(view, PlaybackState.UNREACHABLE)
         let_pass(0.6)
-        keep(view.window, "unreachable")
-        assert view.window.said.text().startswith("recording a.ts: 0.0 MiB")
+        keep(view, "unreachable")
+        assert view.notes.text().startswith("recording a.ts: 0.0 MiB")
 
 
-def test_a_window_that_was_busy_paints_the_newest_picture_only(ground: VideoGround, view: Viewing) -> None:
+def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround, view: ViewWindow) -> None:
     ground.switch_on()
-    shows(view, Phase.LIVE)
-    before = view.session.figures().pictures
+    shows(view, PlaybackState.LIVE)
+    before = view.robot.session.frames
     # The window's thread does nothing else meanwhile.
-    wait_until(lambda: view.session.figures().pictures >= before + 30, "30 pictures")
+    wait_until(lambda: view.robot.session.frames >= before + 30, "30 frames")
     painted: list[float] = []
-    view.window.video.painted.connect(lambda: painted.append(time.monotonic()))
+    view.video.painted.connect(lambda: painted.append(time.monotonic()))
     let_pass(0.2)
     assert 1 <= len(painted) < 15
 
 
-def test_a_refusal_is_told_in_the_robots_words() -> None:
+def test_a_refusal_is_shown_in_the_robots_words() -> None:
     double = GatewayDouble()
     double.accept = False
-    with serving(double) as port, viewing(f"127.0.0.1:{port}", None, Bookkeeper()) as view:
-        shows(view, Phase.OFF)
-        press(view.window, Qt.Key.Key_P)
-        until(lambda: "the robot is being serviced" in view.window.said.text(), "the robot's words")
+    with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
+        shows(view, PlaybackState.OFF)
+        press(view, Qt.Key.Key_P)
+        until(lambda: "the robot is being serviced" in view.notes.text(), "the robot's words")
         let_pass(0.3)
-        keep(view.window, "refused")
-        assert view.session.state().phase is Phase.OFF
+        keep(view, "refused")
+        assert view.robot.session.playback().state is PlaybackState.OFF
 
 
 @contextmanager
 def seeing(
     directory: Path, source: str, *boxes: Box, shape: tuple[int, int]
-) -> Iterator[tuple[Viewing, GatewayDouble]]:
+) -> Iterator[tuple[ViewWindow, GatewayDouble]]:
     """A robot that shows `source` and detects `boxes` in a camera image of this shape."""
     settings = {"source": {"kind": "gst", "description": source}}
     double = GatewayDouble()
@@ -165,13 +170,13 @@ def seeing(
             bbox_height_px=box.height,
         )
     with RunningPreview(directory, settings) as preview, serving(double) as port:
-        preview.wish()
+        preview.enable()
         preview.running()
         shown = double.status.preview
         shown.state = states.PREVIEW_RUNNING
         shown.endpoint.host, shown.endpoint.port, shown.endpoint.latency_ms = "127.0.0.1", preview.port, 20
         shown.endpoint.transport = shown.endpoint.container = 1
-        with viewing(f"127.0.0.1:{port}", None, Bookkeeper()) as view:
+        with viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
             yield view, double
 
 
@@ -214,12 +219,12 @@ BLACK_4_3 = "videotestsrc is-live=true pattern=black ! video/x-raw,width=640,hei
 def test_boxes_are_painted_around_what_they_mean(
     tmp_path: Path, window: tuple[int, int], wanted: Box
 ) -> None:
-    """Boxes are in pixels of a 1280x960 camera; the picture is 320x240; the window is another size again."""
+    """Boxes are in pixels of a 1280x960 camera; the frame is 320x240; the window is another size again."""
     box = Box(400, 400, 320, 240)
     with seeing(tmp_path, BLACK_4_3, box, shape=(1280, 960)) as (view, _double):
-        video = view.window.video
-        view.window.resize(window[0], window[1] + view.window.height() - video.height())
-        shows(view, Phase.LIVE)
+        video = view.video
+        view.resize(window[0], window[1] + view.height() - video.height())
+        shows(view, PlaybackState.LIVE)
         until(lambda: (video.width(), video.height()) == window, "the size")
         # The label's letters are yellow, too, and stand above the box: looked at is the box's own part.
         let_pass(0.5)
@@ -233,13 +238,13 @@ def test_boxes_are_painted_around_what_they_mean(
             yellow(on_screen(video))
 
 
-def test_boxes_fit_a_camera_of_another_shape_than_the_picture(tmp_path: Path) -> None:
-    """The robot puts a 16:9 camera into a 4:3 picture with bars; the whole camera image is marked."""
+def test_boxes_fit_a_camera_of_another_shape_than_the_frame(tmp_path: Path) -> None:
+    """The robot puts a 16:9 camera into a 4:3 frame with bars; the whole camera image is marked."""
     source = "videotestsrc is-live=true pattern=white ! video/x-raw,width=640,height=360,framerate=30/1"
     with seeing(tmp_path, source, Box(0, 0, 640, 360), shape=(640, 360)) as (view, _double):
-        video = view.window.video
-        view.window.resize(640, 480 + view.window.height() - video.height())
-        shows(view, Phase.LIVE)
+        video = view.video
+        view.resize(640, 480 + view.height() - video.height())
+        shows(view, PlaybackState.LIVE)
         video.show_overlay(False)
         let_pass(0.5)
         bare = on_screen(video)
@@ -257,8 +262,8 @@ def test_boxes_fit_a_camera_of_another_shape_than_the_picture(tmp_path: Path) ->
 
 def test_stale_boxes_are_not_painted(tmp_path: Path) -> None:
     with seeing(tmp_path, BLACK_4_3, Box(400, 400, 320, 240), shape=(1280, 960)) as (view, double):
-        video = view.window.video
-        shows(view, Phase.LIVE)
+        video = view.video
+        shows(view, PlaybackState.LIVE)
         until(lambda: yellow_is_there(video), "the box")
         double.overlay.detections.stale = True
         until(lambda: not yellow_is_there(video), "no box")

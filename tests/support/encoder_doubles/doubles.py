@@ -1,4 +1,4 @@
-"""GStreamer elements with the names and properties of hardware encoders around software ones.
+"""GStreamer elements with the names and properties of hardware encoders, around software ones.
 
 ENCODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not named don't exist.
 
@@ -11,8 +11,8 @@ ENCODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not 
 | empty[:N] | after N frames every buffer is empty |
 | error:N | an ERROR message after N frames |
 | hang:N | the driver never comes back after N frames, not even for a stop |
-| stuck:N | after N frames, whoever tells it another bit rate is never answered |
-| deaf:N | after N frames, whoever asks for a key frame is never answered |
+| stuck:N | after N frames, setting the bit rate never returns |
+| deaf:N | after N frames, a request for a key frame never returns |
 | crash:N | the process dies after N frames |
 
 With "later " before it, the encoder proves itself in its trial and fails in the pipeline only.

@@ -8,13 +8,21 @@ from pathlib import Path
 import pytest
 
 from gateway.access import audit
-from gateway.access.audit import AuditLog, AuditRecord
+from gateway.access.audit import AuditLog
+from gateway.status.event import ControlAction, ControlResult
 from tests.support.waiting import wait_until
 
 
-def record(number: int, answer: str = "done") -> AuditRecord:
-    return AuditRecord(
-        "anna", "operator", "a" * 12, "10.0.0.5:4", "SetPreviewMode", str(number), "accepted", answer, ""
+def action(number: int, answer: str = "done") -> ControlAction:
+    return ControlAction(
+        who="anna",
+        address="10.0.0.5:4",
+        method="SetPreviewMode",
+        request=str(number),
+        result=ControlResult.ACCEPTED,
+        answer=answer,
+        role="operator",
+        credential="a" * 12,
     )
 
 
@@ -26,7 +34,7 @@ def test_every_record_is_a_line_and_nothing_breaks_one(tmp_path: Path) -> None:
     log = AuditLog(tmp_path / "a", 1 << 20, 2)
     with log.writing():
         for number in range(50):
-            log.note(record(number, answer='a "new"\nline\u2028and \ud800 more'))
+            log.record(action(number, answer='a "new"\nline\u2028and \ud800 more'))
     assert lines(tmp_path / "a") == [str(number) for number in range(50)]
     assert log.lost == 0
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o600
@@ -37,7 +45,7 @@ def test_files_are_bounded_and_the_newest_lines_stay(tmp_path: Path, generations
     log = AuditLog(tmp_path / "a", 4096, generations)
     with log.writing():
         for number in range(200):
-            log.note(record(number))
+            log.record(action(number))
     files = sorted(tmp_path.iterdir())
     assert len(files) == generations
     assert all(file.stat().st_size <= 4096 for file in files)
@@ -61,10 +69,10 @@ def test_a_full_disk_leaves_no_half_line_and_is_told(tmp_path: Path, monkeypatch
     monkeypatch.setattr(audit.os, "write", write)
     with log.writing():
         for number in range(10):
-            log.note(record(number))
+            log.record(action(number))
         wait_until(lambda: log.lost > 0, "a line is lost")
-        wait_until(lambda: log.trouble, "the trouble is told")
-        assert "No space left" in log.trouble
+        wait_until(lambda: log.error, "the trouble is told")
+        assert "No space left" in log.error
     kept = lines(tmp_path / "a")
     assert kept == [str(number) for number in range(len(kept))]
     assert 0 < len(kept) < 10
@@ -81,12 +89,12 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(audit, "_append", append)
     log = AuditLog(tmp_path / "a", 1 << 20, 2)
     with log.writing():
-        log.note(record(0))
+        log.record(action(0))
         assert hangs.wait(10)
         for number in range(1000):
-            log.note(record(number))
+            log.record(action(number))
         assert log.lost == 1000 - 256
-        assert "too slow" in log.trouble
+        assert "too slow" in log.error
         goes_on.set()
 
 
@@ -94,7 +102,7 @@ def test_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "a").symlink_to(tmp_path / "elsewhere")
     log = AuditLog(tmp_path / "a", 1 << 20, 2)
     with log.writing():
-        log.note(record(0))
+        log.record(action(0))
     assert not (tmp_path / "elsewhere").exists()
     assert log.lost == 1
 
@@ -102,5 +110,5 @@ def test_a_link_is_not_followed(tmp_path: Path) -> None:
 def test_without_a_file_the_programs_own_log_has_it(caplog: pytest.LogCaptureFixture) -> None:
     log = AuditLog(None, 4096, 2)
     with caplog.at_level("INFO"), log.writing():
-        log.note(record(7))
+        log.record(action(7))
     assert "audit: anna (operator) from 10.0.0.5:4: SetPreviewMode (7): accepted, done" in caplog.text

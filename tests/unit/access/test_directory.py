@@ -1,11 +1,11 @@
-"""What people are told of files that can't be read: to begin only where nothing has begun."""
+"""Errors of files that can't be read suggest `init` only where nothing would be replaced."""
 
 from pathlib import Path
 
 import pytest
 
 from common.errors import UserError
-from gateway.access.directory import CredentialDirectory, read_pair
+from gateway.access.directory import CredentialDirectory, KeyPairFiles
 
 
 def test_where_there_is_nothing_the_line_says_how_to_begin(tmp_path: Path) -> None:
@@ -19,13 +19,13 @@ def test_in_a_container_it_is_the_command_that_works_there(
 ) -> None:
     monkeypatch.setenv("ROBOT_GATEWAY_CREDENTIALS", "docker compose run --rm -T credentials")
     with pytest.raises(UserError) as caught:
-        CredentialDirectory(tmp_path).read_authority()
+        CredentialDirectory(tmp_path).ca.read()
     assert caught.value.remedy == "Type: docker compose run --rm -T credentials init"
 
 
 def test_what_somebody_else_has_made_is_not_to_be_made_anew(tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
-        read_pair(tmp_path / "bought.pem", tmp_path / "bought-key.pem", "server certificate")
+        KeyPairFiles(tmp_path / "bought.pem", tmp_path / "bought-key.pem", "server certificate").read()
     assert "No such file" in caught.value.what
     assert "credentials init" not in caught.value.remedy
 
@@ -35,4 +35,4 @@ def test_what_is_there_and_can_not_be_read_is_not_to_be_made_anew(tmp_path: Path
     directory.store_file.mkdir()
     with pytest.raises(UserError, match="Is a directory") as caught:
         directory.read_store()
-    assert "rights" in caught.value.remedy
+    assert "permissions" in caught.value.remedy

@@ -1,4 +1,4 @@
-"""The list of credentials: reads back what it writes, takes nothing else, and has an end."""
+"""The list of credentials: reads back what it writes, takes nothing else, and is bounded."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from common.errors import UserError
 from gateway.access.credential import Credential, Kind
 from gateway.access.role import Role
-from gateway.access.store import MOST, Store, check_name, parse_store, store_text
+from gateway.access.store import MAX_CREDENTIALS, Store, check_name, parse_store, store_text
 
 ONE = Credential("a" * 12, "anna", Role.ADMIN, Kind.TOKEN, "0" * 64, 1, 2, 3, None)
 
@@ -25,7 +25,7 @@ def numbered(number: int, **changed: object) -> Credential:
 
 
 def test_what_is_written_reads_back() -> None:
-    store = Store().with_one_more(ONE).with_one_more(numbered(1, revoked_s=9))
+    store = Store().adding(ONE).adding(numbered(1, revoked_s=9))
     assert parse_store(store_text(store)) == store
 
 
@@ -44,11 +44,27 @@ def test_what_is_written_reads_back() -> None:
         ("more", 1),
     ],
 )
-def test_a_credential_that_is_not_in_order_makes_the_list_none(key: str, value: object) -> None:
-    document = json.loads(store_text(Store().with_one_more(ONE)))
+def test_one_invalid_credential_makes_the_list_invalid(key: str, value: object) -> None:
+    document = json.loads(store_text(Store().adding(ONE)))
     document["credentials"][0][key] = value
-    with pytest.raises(ValueError, match="credential 1 is not in order"):
+    with pytest.raises(ValueError, match="credential 1 is invalid"):
         parse_store(json.dumps(document))
+
+
+@pytest.mark.parametrize("key", ["id", "made", "begins", "ends", "revoked"])
+def test_every_key_is_required(key: str) -> None:
+    document = json.loads(store_text(Store().adding(ONE)))
+    del document["credentials"][0][key]
+    with pytest.raises(ValueError, match="credential 1 is invalid"):
+        parse_store(json.dumps(document))
+
+
+def test_an_error_quotes_nothing_of_the_list() -> None:
+    document = json.loads(store_text(Store().adding(ONE)))
+    document["credentials"][0]["secret-key"] = "secret-value"
+    with pytest.raises(ValueError, match="invalid") as caught:
+        parse_store(json.dumps(document))
+    assert "secret" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -61,39 +77,39 @@ def test_what_is_no_list_is_refused(text: str) -> None:
 
 
 def test_two_of_one_id_are_refused() -> None:
-    document = json.loads(store_text(Store().with_one_more(ONE)))
+    document = json.loads(store_text(Store().adding(ONE)))
     document["credentials"] *= 2
     with pytest.raises(ValueError, match="same id"):
         parse_store(json.dumps(document))
 
 
-def test_what_is_over_for_longest_makes_room_and_nothing_else_does() -> None:
+def test_the_credential_revoked_first_makes_room_and_no_other() -> None:
     store = Store()
-    for number in range(MOST):
-        store = store.with_one_more(numbered(number))
+    for number in range(MAX_CREDENTIALS):
+        store = store.adding(numbered(number))
     with pytest.raises(UserError, match="Revoke some"):
-        store.with_one_more(numbered(MOST))
+        store.adding(numbered(MAX_CREDENTIALS))
     later, earlier = store.credentials[f"{7:012x}"], store.credentials[f"{9:012x}"]
-    store = store.revoked([later], 20).revoked([earlier], 10).with_one_more(numbered(MOST))
-    assert len(store.credentials) == MOST
+    store = store.revoking([later], 20).revoking([earlier], 10).adding(numbered(MAX_CREDENTIALS))
+    assert len(store.credentials) == MAX_CREDENTIALS
     assert earlier.credential_id not in store.credentials
     assert later.credential_id in store.credentials
 
 
-def test_a_name_means_all_of_that_name_that_are_not_over() -> None:
+def test_a_name_finds_all_of_that_name_that_are_not_revoked() -> None:
     store = Store()
-    for number, over in enumerate((None, None, 5)):
-        store = store.with_one_more(numbered(number, name="anna", revoked_s=over))
-    assert [each.made_s for each in store.found("anna", 100)] == [0, 1]
-    assert [each.made_s for each in store.found(f"{1:012x}", 100)] == [1]
-    for nobody in ("ben", f"{2:012x}"):
-        with pytest.raises(UserError, match="no credential in force"):
-            store.found(nobody, 100)
+    for number, revoked_s in enumerate((None, None, 5)):
+        store = store.adding(numbered(number, name="anna", revoked_s=revoked_s))
+    assert [each.made_s for each in store.find("anna", 100)] == [0, 1]
+    assert [each.made_s for each in store.find(f"{1:012x}", 100)] == [1]
+    for unknown in ("ben", f"{2:012x}"):
+        with pytest.raises(UserError, match="no valid credential"):
+            store.find(unknown, 100)
 
 
-def test_an_end_comes_no_later_than_it_would_have() -> None:
-    store = Store().with_one_more(numbered(1, ends_s=50)).with_one_more(numbered(2))
-    ended = store.ending(store.credentials.values(), 80)
+def test_an_earlier_expiry_is_kept() -> None:
+    store = Store().adding(numbered(1, ends_s=50)).adding(numbered(2))
+    ended = store.expiring(store.credentials.values(), 80)
     assert [each.ends_s for each in ended.credentials.values()] == [50, 80]
 
 

@@ -1,14 +1,14 @@
-"""Tokens: enough chance, compared in constant time, and never shown by accident."""
+"""Tokens: enough entropy, compared in constant time, and never shown by accident."""
 
 import inspect
 
 import pytest
 
 from gateway.access import token
-from gateway.access.token import Token, hash_of, is_token, new_id, new_token, parse_token
+from gateway.access.token import Token, hash_of, new_id, new_token, parse_token, verify
 
 
-def test_a_token_is_256_bits_of_chance_and_reads_back() -> None:
+def test_a_token_is_256_random_bits_and_reads_back() -> None:
     made = {new_token(new_id()) for _ in range(100)}
     assert len(made) == 100
     assert all(parse_token(each.text()) == each for each in made)
@@ -20,17 +20,17 @@ def test_a_token_is_256_bits_of_chance_and_reads_back() -> None:
     "text",
     ["", "rgt-", "rgt-00.x", "rgt-00112233445Z." + "A" * 43, "rgt-001122334455." + "A" * 44, "x" * 9999],
 )
-def test_what_is_no_token_is_none(text: str) -> None:
+def test_other_text_is_no_token(text: str) -> None:
     assert parse_token(text) is None
 
 
 def test_only_the_right_secret_of_the_right_credential_matches() -> None:
     right = new_token(new_id())
     kept = hash_of(right)
-    assert is_token(right, kept)
-    assert not is_token(Token(right.credential_id, right.secret[:-1] + "_"), kept) or right.secret[-1] == "_"
-    assert not is_token(Token(new_id(), right.secret), kept)
-    assert not is_token(right, None)
+    assert verify(right, kept)
+    assert not verify(Token(right.credential_id, right.secret[:-1] + "_"), kept) or right.secret[-1] == "_"
+    assert not verify(Token(new_id(), right.secret), kept)
+    assert not verify(right, None)
     assert right.secret not in kept
 
 
@@ -40,7 +40,7 @@ def test_a_secret_is_in_no_repr() -> None:
 
 
 def test_every_comparison_goes_through_constant_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For an id that nobody has as well: how long it takes tells nobody which ids there are."""
+    """For an unknown id, too: the time that it takes must not reveal which ids exist."""
     seen: list[tuple[str, str]] = []
 
     def compare(one: str, other: str) -> bool:
@@ -49,7 +49,7 @@ def test_every_comparison_goes_through_constant_time(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(token.hmac, "compare_digest", compare)
     made = new_token(new_id())
-    is_token(made, hash_of(made))
-    is_token(made, None)
+    verify(made, hash_of(made))
+    verify(made, None)
     assert [len(one) == len(other) for one, other in seen] == [True, True]
-    assert "==" not in inspect.getsource(is_token)
+    assert "==" not in inspect.getsource(verify)

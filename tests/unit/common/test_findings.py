@@ -33,7 +33,7 @@ def test_people_read_why_and_what_to_do_below_each_finding() -> None:
         ["wrong", "clock", "is", "[bold]late[/bold]"],
         ["why", "logs", "don't", "fit"],
         ["do", "type", "this"],
-        ["1", "to", "mend"],
+        ["1", "to", "fix"],
     ]
     assert printed(ALL[:1], as_json=False).splitlines()[-1] == "nothing is wrong"
 

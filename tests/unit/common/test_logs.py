@@ -53,10 +53,10 @@ def test_an_exception_stays_in_its_line(capsys: pytest.CaptureFixture[str]) -> N
     except ValueError:
         _log.exception("it failed")
     (line,) = capsys.readouterr().err.splitlines()
-    told = json.loads(line)
-    assert told["message"] == "it failed"
-    assert "Traceback" in told["exception"]
-    assert "ValueError: invalid literal" in told["exception"]
+    parsed = json.loads(line)
+    assert parsed["message"] == "it failed"
+    assert "Traceback" in parsed["exception"]
+    assert "ValueError: invalid literal" in parsed["exception"]
 
 
 def test_what_is_below_the_level_is_silent(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""The id of a request: whose it is, when it is made, and what is refused as one."""
+"""The id of a request: its source, when it is generated, and which ids are rejected."""
 
 import asyncio
 from typing import Any
@@ -58,9 +58,9 @@ def test_a_request_that_logs_nothing_costs_no_look() -> None:
 
 
 def test_what_is_done_for_a_request_later_carries_its_id() -> None:
-    with request_id.continuing("of-the-wish"):
-        assert request_id.current() == "of-the-wish"
+    with request_id.continuing("of-the-request"):
+        assert request_id.current() == "of-the-request"
         with request_id.continuing(""):
             assert request_id.current() == ""
-        assert request_id.current() == "of-the-wish"
+        assert request_id.current() == "of-the-request"
     assert request_id.current() == ""

@@ -6,7 +6,8 @@ import pytest
 
 import gateway.app  # noqa: F401  # so that every domain error that exists is known here
 from common.errors import DomainError, InvalidRequestError
-from common.rpc import STATUS_CODES, new_server
+from common.grpc_errors import STATUS_CODES
+from common.rpc import new_server
 
 
 def below(error: type[DomainError]) -> Iterator[type[DomainError]]:

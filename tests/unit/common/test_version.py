@@ -31,13 +31,13 @@ def test_a_detached_head(repository: Path) -> None:
     assert project_revision(repository) == REVISION
 
 
-def test_the_builders_word_goes_first(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_takes_precedence(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(REVISION_VARIABLE, REVISION.upper())
     assert project_revision(repository / "nowhere") == REVISION
 
 
 @pytest.mark.parametrize("head", ["", "ref: refs/heads/gone", "not a revision"])
-def test_what_is_not_known_is_empty(repository: Path, head: str) -> None:
+def test_an_unknown_revision_is_empty(repository: Path, head: str) -> None:
     (repository / "HEAD").write_text(head, encoding="ascii")
     assert project_revision(repository) == ""
     assert project_revision(repository / "nowhere") == ""

@@ -28,7 +28,7 @@ def test_the_defaults_are_the_contracts() -> None:
         "effective_command": 500,
     }
     assert settings.platform.stale_after_ms == 3000
-    assert {source.kind.value for source in DEFAULT_SOURCES if source.required} == {"odometry", "vision"}
+    assert {source.kind for source in DEFAULT_SOURCES if source.required} == {"odometry", "vision"}
 
 
 def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -41,9 +41,14 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
     [
         ("grpc: {prot: 1}", "unknown key 'grpc.prot'"),
         ("grpc: {port: 99999}", "key 'grpc.port' is 99999"),
-        ("sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
-        ("grpc: {host: 0.0.0.0}", "everybody on that network"),
-        ("grpc: {host: some-name}", "everybody on that network"),
+        (
+            "sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]",
+            "key 'sources.0.kind' is 'smell': Input should be 'odometry', 'vision', 'detections', 'battery', "
+            "'diagnostics', 'mode', 'effective_command' or 'mux_input'",
+        ),
+        ("sources: [{kind: compute, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
+        ("grpc: {host: 0.0.0.0}", "anyone on that network"),
+        ("grpc: {host: some-name}", "anyone on that network"),
         (
             "sources: [{kind: odometry, topic: /a, type: n/msg/O, stale_after_ms: 1},"
             " {kind: odometry, topic: /b, type: n/msg/O, stale_after_ms: 1}]",
@@ -62,7 +67,7 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
             "and no other, has a label",
         ),
-        ("- a list", "holds a list at its top"),
+        ("- a list", "holds a list at the top level"),
         ("a: [", "is not YAML"),
     ],
 )
@@ -122,8 +127,8 @@ def test_what_is_guarded_kept_in_or_accepted_is_good(tmp_path: Path, text: str) 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("{tls: {certificate: /a, key: /b}}", "tls alone lets everybody in"),
-        ("{tls: {client_certificates: true}}", "tls alone lets everybody in"),
+        ("{tls: {certificate: /a, key: /b}}", "tls alone authenticates no one"),
+        ("{tls: {client_certificates: true}}", "tls alone authenticates no one"),
         ("{credentials: /c, tls: {certificate: /a}}", "belong together"),
         ("{credentials: /c, tls: {enabled: false, client_certificates: true}}", "need TLS"),
     ],

@@ -1,4 +1,4 @@
-"""What the doctor on the robot makes of devices, doors and configuration."""
+"""The robot's doctor: findings of devices, endpoints, credentials and configuration."""
 
 import os
 import socket
@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from common.findings import Finding, Verdict
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
-from gateway.access.keeping import Keeper, Wanted
 from gateway.access.role import Role
 from gateway.doctor.devices import device_findings
-from gateway.doctor.doors import operator_door, preview_door
+from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
 from gateway.doctor.examination import examine
 
 
@@ -58,28 +58,28 @@ def test_a_device_of_another_group_says_which(tmp_path: Path, monkeypatch: pytes
     assert f"usermod -aG {device.group()} $USER" in finding.remedy
 
 
-def test_the_operators_door() -> None:
+def test_the_operators_endpoint() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-        assert operator_door("127.0.0.1", port).verdict is Verdict.GOOD
-        assert operator_door("0.0.0.0", port).verdict is Verdict.GOOD
-    assert operator_door("127.0.0.1", port).verdict is Verdict.NOTE
-    assert operator_door("127.0.0.1", 0).verdict is Verdict.NOTE
+        assert operator_endpoint("127.0.0.1", port).verdict is Verdict.GOOD
+        assert operator_endpoint("0.0.0.0", port).verdict is Verdict.GOOD
+    assert operator_endpoint("127.0.0.1", port).verdict is Verdict.NOTE
+    assert operator_endpoint("127.0.0.1", 0).verdict is Verdict.NOTE
 
 
-def test_the_previews_door(tmp_path: Path) -> None:
+def test_the_previews_endpoint(tmp_path: Path) -> None:
     path = tmp_path / "preview.sock"
-    assert "robot-preview serve" in preview_door(path).remedy
-    assert f"directory {tmp_path / 'gone'}" in preview_door(tmp_path / "gone/preview.sock").remedy
+    assert "robot-preview serve" in preview_endpoint(path).remedy
+    assert f"directory {tmp_path / 'gone'}" in preview_endpoint(tmp_path / "gone/preview.sock").remedy
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(path))
         server.listen()
-        assert preview_door(path).verdict is Verdict.GOOD
-    left_over = preview_door(path)
+        assert preview_endpoint(path).verdict is Verdict.GOOD
+    left_over = preview_endpoint(path)
     assert (left_over.verdict, "left over" in left_over.what) == (Verdict.WRONG, True)
     path.unlink()
     path.write_text("no socket", encoding="utf-8")
-    assert preview_door(path).verdict is Verdict.WRONG
+    assert preview_endpoint(path).verdict is Verdict.WRONG
 
 
 def access_of(tmp_path: Path) -> Finding:
@@ -92,12 +92,10 @@ def test_credentials_are_looked_at_as_the_gateway_does(tmp_path: Path) -> None:
     missing = access_of(tmp_path)
     assert missing.verdict is Verdict.WRONG
     assert "robot-gateway credentials init" in missing.remedy
-    keeper = Keeper(CredentialDirectory(tmp_path / "c"), "lab")
-    keeper.begin(("localhost",))
+    admin = CredentialAdmin(CredentialDirectory(tmp_path / "c"), "lab")
+    admin.initialize(("localhost",))
     assert access_of(tmp_path).verdict is Verdict.NOTE
-    keeper.add(Wanted("anna", Role.VIEWER))
-    assert access_of(tmp_path).what.startswith(
-        "credentials that are valid: 1; the certificate is good until 2"
-    )
+    admin.add(CredentialRequest("anna", Role.VIEWER))
+    assert access_of(tmp_path).what.startswith("valid credentials: 1; the certificate is valid until 2")
     (tmp_path / "c/server-key.pem").write_text("no key", encoding="utf-8")
     assert access_of(tmp_path).verdict is Verdict.WRONG

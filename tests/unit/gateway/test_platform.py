@@ -8,6 +8,7 @@ from gateway.config import PlatformSettings
 from gateway.platform import battery, compute, network
 from gateway.platform.sampler import PlatformSampler
 from gateway.status.board import Board
+from gateway.status.sources import COMPUTE, NETWORK
 from gateway.status.values import Battery
 from tests.support.waiting import wait_until
 
@@ -163,6 +164,6 @@ def test_the_sampler_renews_the_values_and_ends() -> None:
     board = Board()
     sampler = PlatformSampler(PlatformSettings(interval_ms=100), board)
     with sampler:
-        first = wait_until(lambda: board.compute, "a first sample")
-        wait_until(lambda: board.compute is not first, "a second sample")
-    assert board.network is not None
+        first = wait_until(lambda: board[COMPUTE], "a first sample")
+        wait_until(lambda: board[COMPUTE] is not first, "a second sample")
+    assert board[NETWORK] is not None

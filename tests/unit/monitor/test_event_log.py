@@ -1,66 +1,97 @@
-"""Each event once; what was missed and who speaks is said."""
+"""Events as lines, and which of them are new."""
 
-from console.client import OverlaySnapshot
-from console.monitor.event_log import EventLog
-from omniseer.gateway.v1 import overlay_pb2
-from tests.support.snapshots import event, snapshot
+from dataclasses import replace
 
+from console.client import CaughtUp, DeadlineExceeded, Event, EventGap, EventPosition, FaultSeverity, Outage
+from console.client.results import ControlAction, ControlResult, EventKind, GapReason
+from console.monitor.event_log import CAPACITY, EventLine, EventLog, line_of
+from console.presentation.severity_style import SeverityStyle
 
-def listing(*events: overlay_pb2.OperatorEvent, up_ms: int = 0, boot: str = "") -> OverlaySnapshot:
-    def change(made: overlay_pb2.OverlaySnapshot) -> None:
-        made.events.extend(events)
-        if boot:
-            made.status.gateway.boot_id, made.status.gateway.uptime_ms = boot, up_ms
-
-    return snapshot(change)
+HERE = EventPosition("run", 7)
 
 
-def told(log: EventLog, taken: OverlaySnapshot) -> list[str]:
-    return [line.text for line in log.news(taken)]
+def happened(kind: EventKind, severity: FaultSeverity, component: str, message: str) -> Event:
+    return Event(
+        position=HERE,
+        monotonic_ns=0,
+        wall_clock_unix_ms=5_000_500,
+        severity=severity,
+        component=component,
+        message=message,
+        kind=kind,
+    )
 
 
-def test_each_event_is_told_once_in_order() -> None:
-    log = EventLog()
-    assert told(log, listing(event(5), event(6))) == ["event 5", "event 6"]
-    assert told(log, listing(event(5), event(6))) == []
-    assert told(log, listing(event(6), event(7))) == ["event 7"]
+def test_a_fault_says_how_bad_it_is_and_who_has_it() -> None:
+    raised = happened(EventKind.FAULT_RAISED, FaultSeverity.ERROR, "lidar", "stopped turning")
+    assert line_of(raised, 0) == EventLine(5000.5, "error: lidar: stopped turning", SeverityStyle.BAD)
 
 
-def test_it_happened_when_it_happened() -> None:
-    log = EventLog(clock=lambda: 5000.0)
-    (line,) = log.news(listing(event(1, age_ms=1500)))
-    assert line.at_s == 4998.5
+def test_a_component_is_not_named_twice() -> None:
+    running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, BALANCED")
+    assert line_of(running, 0) == EventLine(5000.5, "preview running, BALANCED", SeverityStyle.QUIET)
 
 
-def test_what_fell_out_between_two_looks_is_counted() -> None:
-    log = EventLog()
-    log.news(listing(event(3)))
-    assert told(log, listing(event(12), event(13))) == ["8 events were missed", "event 12", "event 13"]
-    assert told(log, listing(event(15))) == ["1 event was missed", "event 15"]
+def test_a_cleared_fault_says_so() -> None:
+    over = happened(EventKind.FAULT_CLEARED, FaultSeverity.INFO, "lidar", "stopped turning")
+    line = line_of(over, 0)
+    assert line
+    assert line.text == "cleared: lidar: stopped turning"
 
 
-def test_a_restarted_gateway_begins_anew() -> None:
-    log = EventLog()
-    log.news(listing(event(8), boot="a", up_ms=60_000))
-    lines = log.news(listing(event(1), event(2), boot="a", up_ms=900))
-    assert [line.own for line in lines] == [True, False, False]
-    assert [line.text for line in lines][1:] == ["event 1", "event 2"]
+def test_what_the_message_says_itself_is_not_said_twice() -> None:
+    over = happened(
+        EventKind.FAULT_CLEARED, FaultSeverity.INFO, "odometry", "cleared: odometry stopped coming"
+    )
+    line = line_of(over, 0)
+    assert line
+    assert line.text == "cleared: odometry stopped coming"
 
 
-def test_a_restarted_gateway_is_noticed_although_its_numbers_have_grown() -> None:
-    log = EventLog()
-    log.news(listing(event(1), boot="a", up_ms=60_000))
-    assert told(log, listing(event(1), event(2), boot="a", up_ms=30_000))[1:] == ["event 1", "event 2"]
+def test_who_asked_for_what_and_what_came_of_it() -> None:
+    action = ControlAction(
+        who="anna",
+        address="10.0.0.7:5000",
+        method="SetPreviewMode",
+        request="enabled: true",
+        result=ControlResult.REFUSED,
+        answer="not now",
+    )
+    asked = replace(happened(EventKind.CONTROL, FaultSeverity.INFO, "gateway", "long"), control=action)
+    line = line_of(asked, 0)
+    assert line
+    assert line.text == "anna asked for SetPreviewMode: refused, not now"
 
 
-def test_another_boot_is_another_gateway() -> None:
-    log = EventLog()
-    log.news(listing(event(1), boot="a", up_ms=60_000))
-    assert told(log, listing(event(1), boot="b", up_ms=70_000))[1:] == ["event 1"]
+def test_missed_events_are_reported() -> None:
+    gap = EventGap(reason=GapReason.NO_LONGER_KEPT, missed_count=3, position=HERE)
+    line = line_of(gap, 99.0)
+    assert line == EventLine(
+        99.0, "3 events missed: more came than the gateway keeps", SeverityStyle.WARNING, own=True
+    )
+    anew = line_of(EventGap(reason=GapReason.NEW_RUN, missed_count=0, position=HERE), 99.0)
+    assert anew
+    assert anew.text.startswith("The gateway was restarted")
 
 
-def test_an_old_gateway_is_told_by_its_numbers() -> None:
-    log = EventLog()
-    log.news(listing(event(8)))
-    assert told(log, listing(event(1)))[1:] == ["event 1"]
-    assert told(log, listing())[0].startswith("The gateway was started again")
+def test_the_rest_is_no_event() -> None:
+    assert line_of(CaughtUp(position=HERE), 0) is None
+    assert line_of(Outage(DeadlineExceeded("silence"), 1), 0) is None
+
+
+def lines(first: int, count: int) -> list[EventLine]:
+    return [EventLine(0, str(number)) for number in range(first, first + count)]
+
+
+def test_what_was_not_shown_yet() -> None:
+    log = EventLog().with_lines(lines(0, 3))
+    assert [line.text for line in log.since(0)] == ["0", "1", "2"]
+    assert [line.text for line in log.with_lines(lines(3, 1)).since(3)] == ["3"]
+    assert log.since(3) == ()
+
+
+def test_a_log_is_bounded_and_still_knows_what_is_new() -> None:
+    log = EventLog().with_lines(lines(0, CAPACITY)).with_lines(lines(CAPACITY, 5))
+    assert len(log.lines) == CAPACITY
+    assert [line.text for line in log.since(CAPACITY + 3)] == [str(CAPACITY + 3), str(CAPACITY + 4)]
+    assert len(log.since(0)) == CAPACITY

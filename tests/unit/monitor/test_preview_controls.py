@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from console.client import DeadlineExceeded, OverlaySnapshot, PreviewChange, PreviewProfile, Unreachable
-from console.monitor.link import Link, Phase
+from console.monitor.link import Link, LinkState
+from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
 from console.monitor.preview_controls import Controls, Note, controls
-from console.monitor.state import MonitorState, Request, Wish
-from console.tone import Tone
+from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.snapshots import NOW_S, heard, snapshot
@@ -30,85 +30,87 @@ DISABLED = with_preview(states.PREVIEW_DISABLED)
 
 
 def of(
-    taken: OverlaySnapshot, request: Request | None = None, marked: PreviewProfile | None = None
+    taken: OverlaySnapshot, request: PreviewRequest | None = None, selected: PreviewProfile | None = None
 ) -> Controls:
-    return controls(heard(taken, request=request), marked, NOW_S)
+    return controls(heard(taken, request=request), selected, NOW_S)
 
 
-def answer(taken: OverlaySnapshot, *, accepted: bool = True, ended_s: float = NOW_S) -> Request:
+def answer(taken: OverlaySnapshot, *, accepted: bool = True, ended_s: float = NOW_S) -> PreviewRequest:
     change = PreviewChange(accepted=accepted, message="the robot's words", preview=taken.status.preview)
-    return Request(Wish(True), change, ended_s)
+    return PreviewRequest(DesiredPreview(True), change, ended_s)
 
 
 def test_off_the_switch_turns_it_on_with_the_profile_in_force() -> None:
     now = of(DISABLED)
-    assert (now.wanted, now.mark, now.profile) == (False, "DISABLED", HIGH)
-    assert now.switched() == Wish(True, HIGH)
+    assert (now.on, now.mark, now.profile) == (False, "DISABLED", HIGH)
+    assert now.toggled() == DesiredPreview(True, HIGH)
 
 
-def test_off_a_profile_is_only_marked_for_the_next_time() -> None:
-    assert of(DISABLED).chosen(LOW) is None
-    assert of(DISABLED, marked=LOW).switched() == Wish(True, LOW)
+def test_off_a_profile_is_only_selected_for_the_next_time() -> None:
+    assert of(DISABLED).with_profile(LOW) is None
+    assert of(DISABLED, selected=LOW).toggled() == DesiredPreview(True, LOW)
 
 
 @pytest.mark.parametrize("state", [states.PREVIEW_RUNNING, states.PREVIEW_STARTING, states.PREVIEW_FAULTED])
 def test_on_the_switch_turns_it_off_and_a_profile_is_taken_at_once(state: int) -> None:
     now = of(with_preview(state))
-    assert now.switched() == Wish(False)
-    assert now.chosen(LOW) == Wish(True, LOW)
+    assert now.toggled() == DesiredPreview(False)
+    assert now.with_profile(LOW) == DesiredPreview(True, LOW)
 
 
-def test_on_the_robots_profile_counts_not_the_marked_one() -> None:
-    assert of(RUNNING, marked=LOW).profile is HIGH
+def test_on_the_robots_profile_counts_not_the_selected_one() -> None:
+    assert of(RUNNING, selected=LOW).profile is HIGH
 
 
-def test_a_profile_nobody_ever_chose_is_balanced() -> None:
+def test_an_unknown_profile_is_shown_as_balanced() -> None:
     assert of(snapshot()).profile is BALANCED
 
 
 def test_while_a_request_runs_nothing_may_be_touched() -> None:
-    now = of(DISABLED, Request(Wish(True)))
+    now = of(DISABLED, PreviewRequest(DesiredPreview(True)))
     assert not now.enabled
-    assert now.notes[0] == Note("The robot is asked ...", Tone.QUIET)
+    assert now.notes[0] == Note("Waiting for the robot ...", SeverityStyle.QUIET)
 
 
 @pytest.mark.parametrize(
     "state",
     [
-        MonitorState(Link(phase=Phase.CONNECTING, since_s=0)),
-        replace(heard(RUNNING), link=Link(phase=Phase.LOST, since_s=0, trouble=Unreachable("gone"))),
+        MonitorState(Link(state=LinkState.CONNECTING, since_s=0)),
+        replace(heard(RUNNING), link=Link(state=LinkState.LOST, since_s=0, error=Unreachable("gone"))),
     ],
 )
 def test_without_a_connection_nothing_may_be_touched_and_nothing_is_claimed(state: MonitorState) -> None:
     now = controls(state, None, NOW_S)
     assert not now.enabled
-    assert (now.mark, now.tone) == ("UNKNOWN", Tone.QUIET)
+    assert (now.mark, now.style) == ("UNKNOWN", SeverityStyle.QUIET)
 
 
 def test_a_refusal_stays_until_the_next_request() -> None:
     now = controls(heard(DISABLED, request=answer(DISABLED, accepted=False, ended_s=0)), None, NOW_S)
-    assert now.notes == (Note("The robot refused: the robot's words", Tone.BAD),)
+    assert now.notes == (Note("The robot refused: the robot's words", SeverityStyle.BAD),)
     assert now.enabled
 
 
 def test_an_error_says_what_to_do() -> None:
-    request = Request(Wish(True), DeadlineExceeded("no answer within 8 s", "Try again"), 0.0)
-    assert of(DISABLED, request).notes == (Note("Not done: no answer within 8 s. Try again", Tone.BAD),)
+    request = PreviewRequest(DesiredPreview(True), DeadlineExceeded("no answer within 8 s", "Try again"), 0.0)
+    assert of(DISABLED, request).notes == (
+        Note("Request failed: no answer within 8 s. Try again", SeverityStyle.BAD),
+    )
 
 
 def test_good_news_goes_away_by_itself() -> None:
-    assert of(RUNNING, answer(RUNNING)).notes == (Note("the robot's words", Tone.QUIET),)
+    assert of(RUNNING, answer(RUNNING)).notes == (Note("the robot's words", SeverityStyle.QUIET),)
     assert of(RUNNING, answer(RUNNING, ended_s=NOW_S - 60)).notes == ()
 
 
-def test_a_fault_is_told_once_in_the_robots_words() -> None:
+def test_a_fault_is_reported_once_in_the_robots_words() -> None:
     faulted = with_preview(states.PREVIEW_FAULTED, "no encoder works. Type: robot-preview encoders")
-    expected = (Note("no encoder works. Type: robot-preview encoders", Tone.BAD),)
+    expected = (Note("no encoder works. Type: robot-preview encoders", SeverityStyle.BAD),)
     assert of(faulted).notes == expected
     assert of(faulted, answer(faulted)).notes == expected
-    assert of(faulted).tone is Tone.BAD
+    assert of(faulted).style is SeverityStyle.BAD
 
 
-def test_a_service_that_does_not_answer_is_told_before_anybody_wants_video() -> None:
+def test_an_unreachable_service_is_reported_while_the_preview_is_off() -> None:
     (note,) = of(with_preview(states.PREVIEW_DISABLED, reachable=False)).notes
     assert "does not answer" in note.text

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
+from common.backoff import Backoff
 from common.errors import UserError
 from console.client import (
-    Backoff,
     CaughtUp,
     Event,
     EventGap,
@@ -28,30 +28,35 @@ from console.client import (
     Unsupported,
 )
 from console.client.results import EventKind
-from console.monitor.link import Phase
-from console.monitor.state import MonitorState, Wish
+from console.monitor.conversation import RetryBackoff
+from console.monitor.link import LinkState
+from console.monitor.monitor_state import DesiredPreview, MonitorState
 from console.monitor.worker import Worker
 from tests.support.snapshots import event, snapshot
 from tests.support.waiting import wait_until
 
-NEVER = Backoff(first_s=1e6, longest_s=1e6)
-AT_ONCE = Backoff(first_s=0.0, longest_s=0.0)
+NEVER_S = 1e6
+AT_ONCE_S = 0.0
 
 
 class PlayedRobot:
-    """Answers as it is told; what it is asked, it notes."""
+    """Answers as the test sets it up, and records the calls."""
 
     def __init__(self) -> None:
-        self.trouble: GatewayError | None = None
+        self.error: GatewayError | None = None
         self.hangs = False
         self.looks = 0
         self.lists = snapshot()
-        self.wishes: list[Wish] = []
-        self.wishes_hang = False
+        self.requests: list[DesiredPreview] = []
+        self.requests_hang = False
         self.open = 0
         self.streamed: list[Event | EventGap | CaughtUp | Outage | GatewayError] = []
         self.asked_after: list[EventPosition | None] = []
         self.another_login = False
+
+    @property
+    def client(self) -> "PlayedRobot":
+        return self
 
     @asynccontextmanager
     async def connect(self, target: str) -> AsyncIterator["PlayedRobot"]:
@@ -65,17 +70,17 @@ class PlayedRobot:
         self.looks += 1
         if self.hangs:
             await asyncio.Event().wait()
-        if self.trouble:
-            raise self.trouble
+        if self.error:
+            raise self.error
         return self.lists
 
     async def enable_preview(
         self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
     ) -> PreviewChange:
-        return await self._take(Wish(True, profile))
+        return await self._take(DesiredPreview(True, profile))
 
     async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
-        return await self._take(Wish(False))
+        return await self._take(DesiredPreview(False))
 
     async def events(
         self, after: EventPosition | None = None
@@ -87,18 +92,18 @@ class PlayedRobot:
             yield item
         await asyncio.Event().wait()
 
-    async def renew(self) -> bool:
+    async def refresh(self) -> bool:
         if self.another_login:
-            self.another_login, self.trouble = False, None
+            self.another_login, self.error = False, None
             return True
         return False
 
-    async def _take(self, wish: Wish) -> PreviewChange:
-        self.wishes.append(wish)
-        if self.wishes_hang:
+    async def _take(self, desired: DesiredPreview) -> PreviewChange:
+        self.requests.append(desired)
+        if self.requests_hang:
             await asyncio.Event().wait()
-        if self.trouble:
-            raise self.trouble
+        if self.error:
+            raise self.error
         return PreviewChange(accepted=True, message="done", preview=snapshot().status.preview)
 
 
@@ -109,9 +114,10 @@ def robot() -> PlayedRobot:
 
 @contextmanager
 def following(
-    robot: PlayedRobot, on_news: Callable[[], None] = lambda: None, retry: Backoff = NEVER
+    robot: PlayedRobot, on_change: Callable[[], None] = lambda: None, pause_s: float = NEVER_S
 ) -> Iterator[Worker]:
-    worker = Worker("robot", on_news, robot.connect, retry, refused=NEVER)
+    retry = RetryBackoff(Backoff(pause_s, pause_s), Backoff(NEVER_S, NEVER_S))
+    worker = Worker("robot", on_change, robot.connect, retry)
     worker.start()
     try:
         yield worker
@@ -120,56 +126,58 @@ def following(
         assert robot.open == 0
 
 
-def reached(worker: Worker, phase: Phase) -> MonitorState:
-    return wait_until(lambda: state if (state := worker.newest()).link.phase is phase else None, phase.value)
+def reached(worker: Worker, link_state: LinkState) -> MonitorState:
+    return wait_until(
+        lambda: state if (state := worker.latest()).link.state is link_state else None, link_state.value
+    )
 
 
 def test_it_looks_again_and_again(robot: PlayedRobot) -> None:
-    news = threading.Semaphore(0)
-    with following(robot, news.release) as worker:
+    changes = threading.Semaphore(0)
+    with following(robot, changes.release) as worker:
         for _ in range(3):
-            assert news.acquire(timeout=10)
-        state = reached(worker, Phase.CONNECTED)
+            assert changes.acquire(timeout=10)
+        state = reached(worker, LinkState.CONNECTED)
         assert state.snapshot
         assert state.link.answer_ms is not None
 
 
 def test_a_robot_that_is_gone_is_lost_since_it_was_heard_last(robot: PlayedRobot) -> None:
     with following(robot) as worker:
-        reached(worker, Phase.CONNECTED)
-        robot.trouble = Unreachable("gone")
-        lost = reached(worker, Phase.LOST)
-        assert lost.link.trouble is robot.trouble
+        reached(worker, LinkState.CONNECTED)
+        robot.error = Unreachable("gone")
+        lost = reached(worker, LinkState.LOST)
+        assert lost.link.error is robot.error
         assert lost.link.since_s == lost.received_s
         assert lost.snapshot, "what was known stays known"
 
 
 def test_it_tries_again_by_itself_and_counts(robot: PlayedRobot) -> None:
-    robot.trouble = Unreachable("gone")
-    with following(robot, retry=AT_ONCE) as worker:
-        wait_until(lambda: worker.newest().link.attempts >= 3, "three attempts")
-        began_s = worker.newest().link.since_s
-        robot.trouble = None
-        state = reached(worker, Phase.CONNECTED)
+    robot.error = Unreachable("gone")
+    with following(robot, pause_s=AT_ONCE_S) as worker:
+        wait_until(lambda: worker.latest().link.attempts >= 3, "three attempts")
+        began_s = worker.latest().link.since_s
+        robot.error = None
+        state = reached(worker, LinkState.CONNECTED)
         assert state.link.attempts == 0
         assert state.link.since_s > began_s
 
 
 def test_the_operator_need_not_wait_for_the_next_attempt(robot: PlayedRobot) -> None:
-    robot.trouble = Unreachable("gone")
-    with following(robot, retry=NEVER) as worker:
-        reached(worker, Phase.LOST)
-        assert worker.newest().link.next_try_s
-        robot.trouble = None
+    robot.error = Unreachable("gone")
+    with following(robot, pause_s=NEVER_S) as worker:
+        reached(worker, LinkState.LOST)
+        assert worker.latest().link.next_try_s
+        robot.error = None
         worker.retry_now()
-        reached(worker, Phase.CONNECTED)
+        reached(worker, LinkState.CONNECTED)
 
 
 def test_a_login_that_is_refused_is_not_shown_again_and_again(robot: PlayedRobot) -> None:
-    robot.trouble = NotAllowed("the token of anna was revoked")
-    robot.streamed = [robot.trouble]
-    with following(robot, retry=AT_ONCE) as worker:
-        lost = reached(worker, Phase.LOST)
+    robot.error = NotAllowed("the token of anna was revoked")
+    robot.streamed = [robot.error]
+    with following(robot, pause_s=AT_ONCE_S) as worker:
+        lost = reached(worker, LinkState.LOST)
         assert lost.link.next_try_s
         assert lost.link.next_try_s > time.monotonic() + 1e5
         worker.retry_now()
@@ -177,41 +185,39 @@ def test_a_login_that_is_refused_is_not_shown_again_and_again(robot: PlayedRobot
         assert len(robot.asked_after) == 1, "who asks for events waits until there is an answer at all"
         robot.streamed = []
         robot.another_login = True
-        assert reached(worker, Phase.CONNECTED).link.attempts == 0
+        assert reached(worker, LinkState.CONNECTED).link.attempts == 0
         wait_until(lambda: len(robot.asked_after) == 2, "events are asked for again")
 
 
-def test_a_wish_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> None:
+def test_a_request_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> None:
     with following(robot) as worker:
-        worker.switch(Wish(True, PreviewProfile.LOW_BW))
+        worker.switch(DesiredPreview(True, PreviewProfile.LOW_BW))
         request = wait_until(
-            lambda: found if (found := worker.newest().request) and not found.under_way else None,
+            lambda: found if (found := worker.latest().request) and not found.pending else None,
             "an outcome",
         )
-        assert robot.wishes == [Wish(True, PreviewProfile.LOW_BW)]
+        assert robot.requests == [DesiredPreview(True, PreviewProfile.LOW_BW)]
         assert isinstance(request.outcome, PreviewChange)
-        worker.switch(Wish(False))
-        wait_until(lambda: robot.wishes[-1] == Wish(False), "the next one")
+        worker.switch(DesiredPreview(False))
+        wait_until(lambda: robot.requests[-1] == DesiredPreview(False), "the next one")
 
 
-def test_one_wish_at_a_time(robot: PlayedRobot) -> None:
-    robot.wishes_hang = True
+def test_one_request_at_a_time(robot: PlayedRobot) -> None:
+    robot.requests_hang = True
     with following(robot) as worker:
-        worker.switch(Wish(True))
-        wait_until(lambda: robot.wishes, "the first")
-        worker.switch(Wish(False))
+        worker.switch(DesiredPreview(True))
+        wait_until(lambda: robot.requests, "the first")
+        worker.switch(DesiredPreview(False))
         looks = robot.looks
         wait_until(lambda: robot.looks > looks + 1, "it goes on looking meanwhile")
-        assert robot.wishes == [Wish(True)]
+        assert robot.requests == [DesiredPreview(True)]
 
 
 def test_a_refusal_is_an_outcome(robot: PlayedRobot) -> None:
-    robot.trouble = Refused("not today")
+    robot.error = Refused("not today")
     with following(robot) as worker:
-        worker.switch(Wish(True))
-        wait_until(
-            lambda: (found := worker.newest().request) and found.outcome is robot.trouble, "the refusal"
-        )
+        worker.switch(DesiredPreview(True))
+        wait_until(lambda: (found := worker.latest().request) and found.outcome is robot.error, "the refusal")
 
 
 def happened(sequence: int) -> Event:
@@ -226,49 +232,49 @@ def happened(sequence: int) -> Event:
     )
 
 
-def told(worker: Worker) -> list[str]:
-    return [line.text for line in worker.newest().events.lines]
+def texts(worker: Worker) -> list[str]:
+    return [line.text for line in worker.latest().events.lines]
 
 
 def test_events_are_streamed_and_go_on_where_they_broke_off(robot: PlayedRobot) -> None:
     robot.streamed = [happened(1), happened(2), Unreachable("gone")]
-    with following(robot, retry=AT_ONCE) as worker:
+    with following(robot, pause_s=AT_ONCE_S) as worker:
         wait_until(lambda: len(robot.asked_after) > 1, "it asks again")
         assert robot.asked_after[:2] == [None, EventPosition("run", 2)]
-        assert told(worker)[:2] == ["error: odometry: event 1", "error: odometry: event 2"]
+        assert texts(worker)[:2] == ["error: odometry: event 1", "error: odometry: event 2"]
 
 
 def test_a_gateway_that_streams_no_events_is_read_from_its_snapshots(robot: PlayedRobot) -> None:
     robot.streamed = [Unsupported("an old gateway")]
     robot.lists = snapshot(lambda made: made.events.append(event(7, "preview running")))
     with following(robot) as worker:
-        wait_until(lambda: told(worker) == ["preview running"], "the event")
+        wait_until(lambda: texts(worker) == ["preview running"], "the event")
         looks = robot.looks
         wait_until(lambda: robot.looks > looks + 2, "it looks again")
-        assert told(worker) == ["preview running"]
+        assert texts(worker) == ["preview running"]
 
 
 def test_it_ends_in_the_middle_of_a_call(robot: PlayedRobot) -> None:
-    robot.hangs = robot.wishes_hang = True
+    robot.hangs = robot.requests_hang = True
     with following(robot) as worker:
-        worker.switch(Wish(True))
-        wait_until(lambda: robot.looks and robot.wishes, "both calls hang")
+        worker.switch(DesiredPreview(True))
+        wait_until(lambda: robot.looks and robot.requests, "both calls hang")
 
 
 def test_orders_after_the_end_do_nothing(robot: PlayedRobot) -> None:
     with following(robot) as worker:
         pass
-    worker.switch(Wish(True))
+    worker.switch(DesiredPreview(True))
     worker.retry_now()
     assert worker.close()
-    assert not robot.wishes
+    assert not robot.requests
 
 
 def test_never_started_is_closed_at_once(robot: PlayedRobot) -> None:
     assert Worker("robot", lambda: None, robot.connect).close()
 
 
-def test_an_address_that_is_none_is_told_at_once() -> None:
+def test_an_invalid_address_is_reported_at_once() -> None:
     with pytest.raises(UserError, match="not the address"):
         Worker("http://robot/", lambda: None)
 
@@ -282,7 +288,7 @@ def test_a_fault_of_our_own_does_not_look_like_a_robot_that_stands_still() -> No
 
     worker = Worker("robot", lambda: None, broken)
     worker.start()
-    state = reached(worker, Phase.LOST)
-    assert "ZeroDivisionError" in str(state.link.trouble)
+    state = reached(worker, LinkState.LOST)
+    assert "ZeroDivisionError" in str(state.link.error)
     assert worker.close(10)
-    assert replace(state) == worker.newest()
+    assert replace(state) == worker.latest()

@@ -1,24 +1,21 @@
-"""The bit rate on made-up links."""
+"""The bit rate controller on simulated links."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from preview.adaptive import BitrateController
+from preview.pipeline.adaptive import BitrateController, LinkReport
 
 
-@dataclass(frozen=True)
-class Link:
-    rtt_ms: float = 10.0
-    loss_percent: float = 0.0
-    retransmitted_percent: float = 0.0
-    dropped_percent: float = 0.0
+def link(
+    rtt_ms: float = 10.0, loss: float = 0.0, retransmitted: float = 0.0, dropped: float = 0.0
+) -> LinkReport:
+    return LinkReport(rtt_ms, loss, retransmitted, dropped)
 
 
-QUIET = Link()
+QUIET = link()
 
 
 def settled(controller: BitrateController, now: float = 0.0) -> float:
@@ -36,27 +33,27 @@ def test_a_quiet_link_gets_the_target() -> None:
 
 
 @pytest.mark.parametrize(
-    ("link", "words"),
+    ("congested", "signs"),
     [
-        (Link(rtt_ms=180), "RTT 180 ms"),
-        (Link(loss_percent=12), "12 % loss"),
-        (Link(retransmitted_percent=20), "20 % sent again"),
-        (Link(dropped_percent=2), "2.0 % too late to send"),
-        (Link(rtt_ms=180, loss_percent=12), "RTT 180 ms, 12 % loss"),
+        (link(rtt_ms=180), "RTT 180 ms"),
+        (link(loss=12), "12 % loss"),
+        (link(retransmitted=20), "20 % sent again"),
+        (link(dropped=2), "2.0 % too late to send"),
+        (link(rtt_ms=180, loss=12), "RTT 180 ms, 12 % loss"),
     ],
 )
-def test_a_congested_link_gets_less_at_once(link: Link, words: str) -> None:
+def test_a_congested_link_gets_less_at_once(congested: LinkReport, signs: str) -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    decision = controller.decide(link, now)
+    decision = controller.decide(congested, now)
     assert decision.bitrate_kbps == 1750
-    assert decision.reason == f"{words}: 2500 -> 1750 kbit/s"
+    assert decision.reason == f"{signs}: 2500 -> 1750 kbit/s"
 
 
 def test_a_little_random_loss_is_left_to_srt() -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    lossy = Link(loss_percent=3, retransmitted_percent=4)
+    lossy = link(loss=3, retransmitted=4)
     for step in range(20):
         assert controller.decide(lossy, now + step * 0.5).bitrate_kbps == 2500
 
@@ -65,7 +62,7 @@ def test_it_falls_to_the_floor_and_says_so() -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
     for step in range(40):
-        decision = controller.decide(Link(dropped_percent=5), now + step * 0.5)
+        decision = controller.decide(link(dropped=5), now + step * 0.5)
     assert decision.bitrate_kbps == 500
     assert "at the floor of 500 kbit/s" in decision.reason
 
@@ -74,7 +71,7 @@ def test_one_bad_window_is_one_step() -> None:
     """The next windows still carry what was sent before the step."""
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    bad = Link(dropped_percent=5)
+    bad = link(dropped=5)
     assert controller.decide(bad, now).bitrate_kbps == 1750
     assert controller.decide(bad, now + 0.5).bitrate_kbps == 1750
     assert controller.decide(bad, now + 1.0).bitrate_kbps == 1225
@@ -83,7 +80,7 @@ def test_one_bad_window_is_one_step() -> None:
 def test_it_climbs_slowly_back_to_the_target() -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    controller.decide(Link(dropped_percent=5), now)
+    controller.decide(link(dropped=5), now)
     rates = [controller.decide(QUIET, now + step * 0.5).bitrate_kbps for step in range(1, 60)]
     assert rates[0] == 1750
     steps = {after - before for before, after in pairwise(rates)}
@@ -95,42 +92,42 @@ def test_it_climbs_slowly_back_to_the_target() -> None:
 
 
 def test_where_hardly_anything_gets_through_the_rate_is_halved() -> None:
-    for link in (Link(loss_percent=40), Link(dropped_percent=30)):
+    for severe in (link(loss=40), link(dropped=30)):
         controller = BitrateController(2500, 500)
         now = settled(controller)
-        assert controller.decide(link, now).bitrate_kbps == 1250
+        assert controller.decide(severe, now).bitrate_kbps == 1250
 
 
-def test_a_round_trip_that_is_always_long_is_no_trouble() -> None:
+def test_a_round_trip_that_is_always_long_is_no_congestion() -> None:
     controller = BitrateController(2500, 500)
     for step in range(40):
-        assert controller.decide(Link(rtt_ms=250), step * 0.5).bitrate_kbps == 2500
+        assert controller.decide(link(rtt_ms=250), step * 0.5).bitrate_kbps == 2500
 
 
 def test_without_viewers_the_target_comes_back() -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    controller.decide(Link(dropped_percent=5), now)
+    controller.decide(link(dropped=5), now)
     assert controller.decide(None, now + 1).bitrate_kbps == 2500
 
 
 def test_another_profile_begins_at_its_target() -> None:
     controller = BitrateController(2500, 500)
     now = settled(controller)
-    controller.decide(Link(dropped_percent=5), now)
+    controller.decide(link(dropped=5), now)
     controller.retarget(1000, 300)
     assert controller.decide(QUIET, now + 1).bitrate_kbps == 1000
 
 
 _percent = st.floats(0, 100)
-_links = st.builds(Link, st.floats(0.1, 5000), _percent, _percent, _percent) | st.none()
+_links = st.builds(LinkReport, st.floats(0.1, 5000), _percent, _percent, _percent) | st.none()
 
 
 @given(st.lists(_links, max_size=100), st.integers(100, 5000), st.integers(100, 5000))
-def test_it_never_leaves_its_bounds(links: list[Link | None], target: int, floor: int) -> None:
+def test_it_never_leaves_its_bounds(links: list[LinkReport | None], target: int, floor: int) -> None:
     controller = BitrateController(target, floor)
-    for step, link in enumerate(links):
-        decision = controller.decide(link, step * 0.5)
+    for step, report in enumerate(links):
+        decision = controller.decide(report, step * 0.5)
         assert min(floor, target) <= decision.bitrate_kbps <= target
         assert "\n" not in decision.reason
         assert (decision.reason == "") <= (decision.bitrate_kbps == target)

@@ -15,14 +15,14 @@ TABLE = bytes((0x47, 0x40, 0, 0x10)).ljust(188, b"\xff")
 WRAP = (1 << 33) * 300
 
 
-def picture(ticks: int) -> bytes:
+def frame(ticks: int) -> bytes:
     """A table, a packet with the clock, one more packet."""
     return TABLE + Reference(ticks, PID, 3).packet(0) + PAYLOAD
 
 
 @pytest.mark.parametrize("ticks", [0, 299, 300, 123_456_789_012, WRAP - 1])
 def test_what_is_written_is_read(ticks: int) -> None:
-    found = clock_references.read(picture(ticks))
+    found = clock_references.read(frame(ticks))
     assert found == Reference(ticks, PID, COUNTER)
 
 
@@ -32,19 +32,19 @@ def test_the_clock_wraps() -> None:
     assert found.ticks == 27_000
 
 
-def test_a_picture_without_a_clock_is_left_alone() -> None:
+def test_a_frame_without_a_clock_is_left_alone() -> None:
     assert clock_references.read(TABLE + PAYLOAD) is None
     assert clock_references.read(b"") is None
 
 
-@pytest.mark.parametrize("rate_fps", [1, 2.5, 5, 10, 12, 15, 20, 24, 25, 30, 60, 120])
-def test_never_more_than_40_ms_and_never_ahead_of_the_next_picture(rate_fps: float) -> None:
-    rhythm = Rhythm.at(rate_fps)
-    last_s = rhythm.count * rhythm.apart_s
-    assert rhythm.apart_s <= 0.030
-    assert last_s < 1 / rate_fps
-    assert 1 / rate_fps - last_s <= 0.040
-    assert (rhythm.count == 0) == (rate_fps >= 30)
+@pytest.mark.parametrize("fps", [1, 2.5, 5, 10, 12, 15, 20, 24, 25, 30, 60, 120])
+def test_never_more_than_40_ms_and_never_ahead_of_the_next_frame(fps: float) -> None:
+    rhythm = Rhythm.at(fps)
+    last_s = rhythm.count * rhythm.interval_s
+    assert rhythm.interval_s <= 0.030
+    assert last_s < 1 / fps
+    assert 1 / fps - last_s <= 0.040
+    assert (rhythm.count == 0) == (fps >= 30)
 
 
 class Listener:
@@ -68,7 +68,7 @@ def listener() -> Listener:
 
 @pytest.fixture
 def slow(listener: Listener) -> Iterator[ClockReferences]:
-    """Between pictures that come ten times a second."""
+    """Between frames that come ten times a second."""
     made = ClockReferences(listener, 10)
     yield made
     made.stop()
@@ -78,72 +78,70 @@ def nothing() -> None:
     pass
 
 
-def test_a_picture_is_followed_by_what_it_needs_and_no_more(
-    slow: ClockReferences, listener: Listener
-) -> None:
-    slow.around(picture(27_000_000), nothing)
+def test_a_frame_is_followed_by_what_it_needs_and_no_more(slow: ClockReferences, listener: Listener) -> None:
+    slow.around(frame(27_000_000), nothing)
     wait_until(lambda: len(listener.packets) == 3, "three references")
-    # The next picture is late: the stream's clock does not run away from it.
-    assert not threading.Event().wait(3 * Rhythm.at(10).apart_s)
+    # The next frame is late: the stream's clock does not run away from it.
+    assert not threading.Event().wait(3 * Rhythm.at(10).interval_s)
     assert listener.ticks == [27_000_000 + 27_000 * ms for ms in (25, 50, 75)]
 
 
-def test_they_follow_the_newest_picture_and_keep_its_count(slow: ClockReferences, listener: Listener) -> None:
-    slow.around(picture(0), nothing)
-    slow.around(picture(90 * 27_000), nothing)
+def test_they_follow_the_newest_frame_and_keep_its_count(slow: ClockReferences, listener: Listener) -> None:
+    slow.around(frame(0), nothing)
+    slow.around(frame(90 * 27_000), nothing)
     wait_until(lambda: len(listener.packets) == 3, "three references")
     assert listener.ticks == [27_000 * (90 + ms) for ms in (25, 50, 75)]
-    # No payload, so the counter stands where the last packet of the picture left it.
+    # No payload, so the counter stands where the last packet of the frame left it.
     assert {packet[3] for packet in listener.packets} == {0x20 | COUNTER}
     assert {len(packet) for packet in listener.packets} == {188}
 
 
-def test_none_comes_between_the_packets_of_a_picture(slow: ClockReferences, listener: Listener) -> None:
-    slow.around(picture(0), nothing)
+def test_none_comes_between_the_packets_of_a_frame(slow: ClockReferences, listener: Listener) -> None:
+    slow.around(frame(0), nothing)
     while_sending: list[int] = []
 
     def send_slowly() -> None:
         before = len(listener.packets)
-        assert not threading.Event().wait(2 * Rhythm.at(10).apart_s)
+        assert not threading.Event().wait(2 * Rhythm.at(10).interval_s)
         while_sending.append(len(listener.packets) - before)
 
-    slow.around(picture(90 * 27_000), send_slowly)
+    slow.around(frame(90 * 27_000), send_slowly)
     assert while_sending == [0]
 
 
-def test_where_pictures_come_often_there_is_no_thread(listener: Listener) -> None:
+def test_where_frames_come_often_there_is_no_thread(listener: Listener) -> None:
     threads = threading.active_count()
     fast = ClockReferences(listener, 30)
-    fast.around(picture(0), nothing)
+    fast.around(frame(0), nothing)
     assert threading.active_count() == threads
     fast.set_rate(15)
     for number in range(2):
-        fast.around(picture(number * 67 * 27_000), nothing)
+        fast.around(frame(number * 67 * 27_000), nothing)
     wait_until(lambda: len(listener.packets) == 1, "a reference")
     fast.set_rate(60)
     wait_until(lambda: threading.active_count() == threads, "the thread has ended")
     fast.stop()
 
 
-def test_a_new_rhythm_begins_with_the_first_two_pictures_in_it(listener: Listener) -> None:
+def test_a_new_rhythm_begins_with_the_first_two_frames_in_it(listener: Listener) -> None:
     references = ClockReferences(listener, 30)
     references.set_rate(10)
     period = 27_000 * 33
     for number in range(3):
         # What was on its way at the old rate: a reference 75 ms later would be ahead of the next one.
-        references.around(picture(number * period), nothing)
+        references.around(frame(number * period), nothing)
     assert not threading.Event().wait(0.1)
     assert listener.packets == []
-    references.around(picture(2 * period + 2_700_000), nothing)
+    references.around(frame(2 * period + 2_700_000), nothing)
     wait_until(lambda: len(listener.packets) == 3, "three references")
     references.stop()
 
 
-def test_a_picture_from_before_a_detour_is_forgotten(listener: Listener) -> None:
+def test_a_frame_from_before_a_detour_is_forgotten(listener: Listener) -> None:
     references = ClockReferences(listener, 10)
-    references.around(picture(0), nothing)
+    references.around(frame(0), nothing)
     references.set_rate(60)
-    references.around(picture(27_000 * 500), nothing)
+    references.around(frame(27_000 * 500), nothing)
     references.set_rate(10)
     assert not threading.Event().wait(0.1)
     assert len(listener.packets) <= 1
@@ -153,9 +151,9 @@ def test_a_picture_from_before_a_detour_is_forgotten(listener: Listener) -> None
 def test_after_stop_nothing_comes_and_the_thread_ends(listener: Listener) -> None:
     threads = threading.active_count()
     references = ClockReferences(listener, 10)
-    references.around(picture(0), nothing)
+    references.around(frame(0), nothing)
     references.stop()
     wait_until(lambda: threading.active_count() == threads, "the thread has ended")
     came = len(listener.packets)
-    references.around(picture(0), nothing)
+    references.around(frame(0), nothing)
     assert len(listener.packets) == came

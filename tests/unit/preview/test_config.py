@@ -27,8 +27,8 @@ def test_the_defaults_suit_the_first_robot() -> None:
         Profile.HIGH_QUALITY: (1280, 720, 60, 4500),
     }
     assert (settings.srt.port, settings.srt.latency_ms) == (7100, 125)
-    assert settings.encoders.allowed[0] == "mpp-h265"
-    assert settings.encoders.allowed[-1] == "x264"
+    assert settings.encoders.allowed[0].name == "mpp-h265"
+    assert settings.encoders.allowed[-1].name == "x264"
     assert not settings.adaptive.enabled
 
 
@@ -43,8 +43,8 @@ def test_one_figure_of_a_profile_may_be_changed(tmp_path: Path) -> None:
 
 def test_a_codec_restricts_the_order() -> None:
     settings = PreviewSettings(encoders={"codec": "h264"})  # type: ignore[arg-type]
-    assert all(CATALOGUE[name].codec is Codec.H264 for name in settings.encoders.allowed)
-    assert settings.encoders.allowed[-1] == "x264"
+    assert all(encoder.codec is Codec.H264 for encoder in settings.encoders.allowed)
+    assert settings.encoders.allowed[-1].name == "x264"
 
 
 @pytest.mark.parametrize(
@@ -66,9 +66,9 @@ def test_hardware_h265_comes_before_hardware_h264_before_software() -> None:
         assert {e.codec for e in entries if e.family == family} == set(Codec)
 
 
-def test_every_encoder_can_be_told_its_bit_rate_and_key_frames() -> None:
+def test_every_encoder_has_a_bit_rate_and_a_gop_length() -> None:
     for encoder in CATALOGUE.values():
-        spelling = encoder.spelling
-        told = set(spelling.controls.values())
-        assert spelling.bitrate or "bitrate" in told, encoder.name
-        assert spelling.gop or "gop" in told, encoder.name
+        properties = encoder.properties
+        controlled = set(properties.controls.values())
+        assert properties.bitrate or "bitrate" in controlled, encoder.name
+        assert properties.gop or "gop" in controlled, encoder.name

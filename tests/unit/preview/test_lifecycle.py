@@ -78,7 +78,7 @@ def test_delays_begin_again(calming: str) -> None:
     if calming == "steady":
         lifecycle.handle(Event.RETRY)
         lifecycle.handle(Event.FIRST_FRAME)
-        lifecycle.note_steady()
+        lifecycle.reset_backoff()
     else:
         lifecycle.handle(Event.DISABLE)
         lifecycle.handle(Event.ENABLE)
@@ -86,8 +86,8 @@ def test_delays_begin_again(calming: str) -> None:
     assert lifecycle.retry_delay_s == 1
 
 
-def test_a_first_picture_alone_does_not_shorten_the_delay() -> None:
-    """An encoder that fails after every first picture must not be tried every second for ever."""
+def test_a_first_frame_alone_does_not_shorten_the_delay() -> None:
+    """An encoder that fails after every first frame must not be tried every second forever."""
     lifecycle = in_state(State.FAULTED)
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)
@@ -98,7 +98,7 @@ def test_a_first_picture_alone_does_not_shorten_the_delay() -> None:
 def test_counters() -> None:
     lifecycle = in_state(State.RUNNING)
     lifecycle.handle(Event.FAILURE)
-    lifecycle.note_fallback()
+    lifecycle.count_fallback()
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)
     lifecycle.handle(Event.DISABLE)

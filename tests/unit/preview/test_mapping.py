@@ -7,13 +7,12 @@ import pytest
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.selection import Verdict
 from preview.lifecycle import Counters, State
 from preview.rpc import mapping
-from preview.selection import Verdict
-from preview.status import Status, StreamStatus
-from preview.values import Codec, EncoderChoice, Measurement, Profile, Target
+from preview.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
 
-FULL = Status(
+FULL = ActualState(
     instance_id="abc",
     applied_revision=7,
     state=State.RUNNING,
@@ -22,8 +21,8 @@ FULL = Status(
     counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4),
     port=7100,
     latency_ms=125,
-    stream=StreamStatus(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
-    encoder=EncoderChoice("va-h265", Codec.H265, hardware=True, wanted="mpp-h265", fallback_reason="why"),
+    stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
+    encoder=EncoderChoice("va-h265", hardware=True, wanted="mpp-h265", fallback_reason="why"),
     measurement=Measurement(59.5, 4400.0, 2, 12, 30.5, 1.5),
 )
 
@@ -53,11 +52,11 @@ def unset_fields(message: object, prefix: str = "") -> list[str]:
 
 
 def test_a_full_status_fills_every_field() -> None:
-    assert unset_fields(mapping.actual(FULL)) == []
+    assert unset_fields(mapping.actual_state(FULL)) == []
 
 
 def test_numbers_arrive_where_they_belong() -> None:
-    actual = mapping.actual(FULL)
+    actual = mapping.actual_state(FULL)
     assert actual.counters == pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4)
     assert (actual.stream.target_bitrate_kbps, actual.stream.fps) == (3000, 60)
     assert (actual.listener.port, actual.listener.latency_ms) == (7100, 125)
@@ -65,8 +64,8 @@ def test_numbers_arrive_where_they_belong() -> None:
 
 
 def test_an_empty_status_leaves_out_what_is_not_there() -> None:
-    empty = Status("abc", 0, State.DISABLED, Profile.BALANCED, "", Counters(), 7100, 125)
-    actual = mapping.actual(empty)
+    empty = ActualState("abc", 0, State.DISABLED, Profile.BALANCED, "", Counters(), 7100, 125)
+    actual = mapping.actual_state(empty)
     assert not any(actual.HasField(name) for name in ("stream", "encoder", "measurement"))
 
 
@@ -76,23 +75,23 @@ def test_a_candidate_fills_every_field() -> None:
     assert not mapping.candidate(CATALOGUE["x264"], Verdict(False, False)).HasField("first_byte_ms")
 
 
-def test_a_wish_and_its_passphrase() -> None:
+def test_a_desired_state_and_its_passphrase() -> None:
     desired = pb.DesiredState(revision=3, enabled=True, profile=pb.PROFILE_LOW_BW, passphrase="0123456789")
-    wish = mapping.wish(desired)
-    assert (wish.revision, wish.enabled, wish.profile) == (3, True, Profile.LOW_BW)
-    assert wish.passphrase == "0123456789"
-    assert "0123456789" not in repr(wish)
+    mapped = mapping.desired_state(desired)
+    assert (mapped.revision, mapped.enabled, mapped.profile) == (3, True, Profile.LOW_BW)
+    assert mapped.passphrase == "0123456789"
+    assert "0123456789" not in repr(mapped)
 
 
 @pytest.mark.parametrize("passphrase", ["short", "x" * 80, "ä" * 40])
 def test_a_passphrase_that_srt_does_not_take_is_refused_without_repeating_it(passphrase: str) -> None:
     desired = pb.DesiredState(enabled=True, profile=pb.PROFILE_LOW_BW, passphrase=passphrase)
     with pytest.raises(InvalidRequestError) as refusal:
-        mapping.wish(desired)
+        mapping.desired_state(desired)
     assert passphrase not in str(refusal.value)
 
 
-def test_an_unknown_profile_is_refused_only_when_it_is_wanted() -> None:
+def test_an_unknown_profile_is_refused_only_when_enabled() -> None:
     with pytest.raises(InvalidRequestError, match="known are LOW_BW, BALANCED, HIGH_QUALITY"):
-        mapping.wish(pb.DesiredState(enabled=True, profile=9))  # type: ignore[arg-type]
-    assert not mapping.wish(pb.DesiredState(enabled=False, profile=9)).enabled  # type: ignore[arg-type]
+        mapping.desired_state(pb.DesiredState(enabled=True, profile=9))  # type: ignore[arg-type]
+    assert not mapping.desired_state(pb.DesiredState(enabled=False, profile=9)).enabled  # type: ignore[arg-type]

@@ -1,58 +1,96 @@
-"""Which encoder is used, and what is said about it."""
+"""Which encoder is chosen, and the reason that is reported."""
 
-from preview.encoders.catalogue import CATALOGUE
-from preview.selection import Selection, Verdict
+import pytest
+
+from common.errors import UserError
+from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.selection import Selection, Verdict
 
 ORDER = [CATALOGUE[name] for name in ("mpp-h265", "va-h265", "x264")]
 GOOD = Verdict(present=True, proven=True, first_byte_ms=5)
-BAD = Verdict(present=True, proven=False, reason="it gave no output")
+BAD = Verdict(present=True, proven=False, reason="it produced no output")
 ABSENT = Verdict(present=False, proven=False, reason="there is no GStreamer element mpph265enc")
+ALL_GOOD = {"mpp-h265": GOOD, "va-h265": GOOD, "x264": GOOD}
 
 
-def chosen(selection: Selection, verdicts: dict[str, Verdict], now: float = 0) -> tuple[str, str]:
-    found = selection.choose(verdicts, now)
-    assert found is not None
-    encoder, choice = found
+class Prober:
+    """Knows all results beforehand; counts as tried what was asked for."""
+
+    def __init__(self, results: dict[str, Verdict]) -> None:
+        self._results = results
+        self.verdicts: dict[str, Verdict] = {}
+
+    async def verdict(self, encoder: Encoder) -> Verdict:
+        self.verdicts[encoder.name] = self._results[encoder.name]
+        return self.verdicts[encoder.name]
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def selection(verdicts: dict[str, Verdict], clock: Clock | None = None) -> Selection:
+    """A selection whose trials are over."""
+    prober = Prober(verdicts)
+    prober.verdicts = verdicts
+    return Selection(ORDER, 600, prober, clock or Clock())
+
+
+def chosen(selection: Selection) -> tuple[str, str]:
+    encoder, choice = selection.choose()
     assert choice.name == encoder.name
     assert choice.wanted == "mpp-h265"
-    assert (choice.codec, choice.hardware) == (encoder.codec, encoder.hardware)
+    assert choice.hardware == encoder.hardware
     return choice.name, choice.fallback_reason
 
 
 def test_the_first_proven_one_wins() -> None:
-    everything = {"mpp-h265": GOOD, "va-h265": GOOD, "x264": GOOD}
-    assert chosen(Selection(ORDER, 600), everything) == ("mpp-h265", "")
-    assert chosen(Selection(ORDER, 600), everything | {"mpp-h265": BAD}) == ("va-h265", "it gave no output")
-    assert chosen(Selection(ORDER, 600), everything | {"mpp-h265": ABSENT}) == ("va-h265", ABSENT.reason)
+    assert chosen(selection(ALL_GOOD)) == ("mpp-h265", "")
+    assert chosen(selection(ALL_GOOD | {"mpp-h265": BAD})) == ("va-h265", "it produced no output")
+    assert chosen(selection(ALL_GOOD | {"mpp-h265": ABSENT})) == ("va-h265", ABSENT.reason)
 
 
 def test_one_that_failed_is_passed_over_until_it_is_forgiven() -> None:
-    selection = Selection(ORDER, 600)
-    verdicts = {"mpp-h265": GOOD, "va-h265": GOOD, "x264": GOOD}
-    selection.pass_over("mpp-h265", "encoder mpp-h265 failed: oh", now=100)
-    assert chosen(selection, verdicts, now=101) == ("va-h265", "encoder mpp-h265 failed: oh")
-    assert chosen(selection, verdicts, now=699) == ("va-h265", "encoder mpp-h265 failed: oh")
-    assert chosen(selection, verdicts, now=701) == ("mpp-h265", "")
+    clock = Clock()
+    encoders = selection(ALL_GOOD, clock)
+    clock.now = 100
+    encoders.pass_over("mpp-h265", "encoder mpp-h265 failed: oh")
+    for clock.now in (101, 699):
+        assert chosen(encoders) == ("va-h265", "encoder mpp-h265 failed: oh")
+    clock.now = 701
+    assert chosen(encoders) == ("mpp-h265", "")
 
 
-def test_when_all_have_failed_all_are_forgiven() -> None:
-    selection = Selection(ORDER, 600)
-    verdicts = {"mpp-h265": GOOD, "va-h265": BAD, "x264": GOOD}
-    selection.pass_over("mpp-h265", "one", now=0)
-    assert selection.has_another(verdicts)
-    selection.pass_over("x264", "two", now=1)
-    assert not selection.has_another(verdicts)
-    assert chosen(selection, verdicts, now=2) == ("mpp-h265", "")
+async def test_when_all_have_failed_all_are_forgiven() -> None:
+    encoders = selection({"mpp-h265": GOOD, "va-h265": BAD, "x264": GOOD})
+    encoders.pass_over("mpp-h265", "one")
+    assert await encoders.probe()
+    encoders.pass_over("x264", "two")
+    assert not await encoders.probe()
+    assert chosen(encoders) == ("mpp-h265", "")
 
 
-def test_none_proven_says_what_was_tried() -> None:
-    selection = Selection(ORDER, 600)
-    assert selection.choose({"mpp-h265": ABSENT, "va-h265": BAD}, 0) is None
-    text = selection.why_none({"mpp-h265": ABSENT, "va-h265": BAD})
-    assert "va-h265: it gave no output" in text
-    assert "mpp-h265: " not in text
-    assert "none of their GStreamer elements is installed" in selection.why_none({})
+def test_none_proven_lists_what_was_tried() -> None:
+    with pytest.raises(UserError, match="va-h265: it produced no output") as refusal:
+        selection({"mpp-h265": ABSENT, "va-h265": BAD}).choose()
+    assert "mpp-h265: " not in str(refusal.value)
+    assert "'robot-preview encoders' lists what works" in str(refusal.value)
+    with pytest.raises(UserError, match="none of their GStreamer elements is installed"):
+        selection({}).choose()
 
 
 def test_what_was_not_tried_is_not_used() -> None:
-    assert chosen(Selection(ORDER, 600), {"x264": GOOD}) == ("x264", "mpp-h265 was not tried")
+    assert chosen(selection({"x264": GOOD})) == ("x264", "mpp-h265 was not tried")
+
+
+async def test_trials_end_at_the_first_encoder_that_works_and_has_not_failed() -> None:
+    prober = Prober({"mpp-h265": BAD, "va-h265": GOOD, "x264": GOOD})
+    encoders = Selection(ORDER, 600, prober)
+    assert await encoders.probe()
+    assert set(prober.verdicts) == {"mpp-h265", "va-h265"}
+    encoders.pass_over("va-h265", "it failed")
+    assert await encoders.probe()
+    assert set(prober.verdicts) == {"mpp-h265", "va-h265", "x264"}

@@ -1,37 +1,38 @@
 """Silence, with made-up clocks."""
 
+from preview.config import TimeoutSettings
 from preview.pipeline.watchdogs import Silent, Watchdogs
 
 
 def dogs() -> Watchdogs:
-    return Watchdogs(0.0, first_frame_s=5.0, source_s=1.5, encoder_s=1.0)
+    return Watchdogs(0.0, TimeoutSettings(start_s=5.0, source_silence_s=1.5, encoder_silence_s=1.0))
 
 
 def test_a_lively_pipeline_is_left_alone() -> None:
     watchdogs = dogs()
     for step in range(1, 200):
-        assert watchdogs.look(step, step, step * 0.1) is None
+        assert watchdogs.check(step, step, step * 0.1) is None
 
 
 def test_a_source_may_take_its_time_to_begin() -> None:
     watchdogs = dogs()
-    assert watchdogs.look(0, 0, 4.9) is None
-    assert watchdogs.look(0, 0, 5.1) is Silent.SOURCE
+    assert watchdogs.check(0, 0, 4.9) is None
+    assert watchdogs.check(0, 0, 5.1) is Silent.SOURCE
     assert watchdogs.silence_s(Silent.SOURCE, 5.1) == 5.1
 
 
 def test_a_source_that_stalls() -> None:
     watchdogs = dogs()
-    assert watchdogs.look(30, 30, 1.0) is None
-    assert watchdogs.look(30, 30, 2.4) is None
-    assert watchdogs.look(30, 30, 2.6) is Silent.SOURCE
+    assert watchdogs.check(30, 30, 1.0) is None
+    assert watchdogs.check(30, 30, 2.4) is None
+    assert watchdogs.check(30, 30, 2.6) is Silent.SOURCE
 
 
 def test_an_encoder_that_never_begins_is_timed_from_the_first_frame() -> None:
     watchdogs = dogs()
-    assert watchdogs.look(1, 0, 4.0) is None
-    assert watchdogs.look(20, 0, 4.9) is None
-    assert watchdogs.look(25, 0, 5.1) is Silent.ENCODER
+    assert watchdogs.check(1, 0, 4.0) is None
+    assert watchdogs.check(20, 0, 4.9) is None
+    assert watchdogs.check(25, 0, 5.1) is Silent.ENCODER
 
 
 def test_an_encoder_that_stops() -> None:
@@ -39,18 +40,18 @@ def test_an_encoder_that_stops() -> None:
     frames = 0
     for step in range(1, 11):
         frames += 3
-        assert watchdogs.look(frames, frames, step * 0.1) is None
+        assert watchdogs.check(frames, frames, step * 0.1) is None
     for step in range(11, 20):
         frames += 3
-        assert watchdogs.look(frames, 30, step * 0.1) is None
-    assert watchdogs.look(frames + 3, 30, 2.05) is Silent.ENCODER
+        assert watchdogs.check(frames, 30, step * 0.1) is None
+    assert watchdogs.check(frames + 3, 30, 2.05) is Silent.ENCODER
 
 
 def test_an_encoder_is_not_blamed_for_a_pause_of_the_source() -> None:
     watchdogs = dogs()
-    assert watchdogs.look(30, 30, 1.0) is None
-    assert watchdogs.look(30, 30, 2.3) is None
+    assert watchdogs.check(30, 30, 1.0) is None
+    assert watchdogs.check(30, 30, 2.3) is None
     # The source goes on; the encoder gets its own second from here.
-    assert watchdogs.look(31, 30, 2.4) is None
-    assert watchdogs.look(33, 30, 3.3) is None
-    assert watchdogs.look(35, 30, 3.5) is Silent.ENCODER
+    assert watchdogs.check(31, 30, 2.4) is None
+    assert watchdogs.check(33, 30, 3.3) is None
+    assert watchdogs.check(35, 30, 3.5) is Silent.ENCODER

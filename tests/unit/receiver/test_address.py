@@ -24,7 +24,7 @@ def test_the_passphrase_shows_nowhere() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "text"),
     [
         ({"host": ""}, "host ''"),
         ({"host": "robot?mode=listener"}, "host 'robot?mode=listener'"),
@@ -36,10 +36,10 @@ def test_the_passphrase_shows_nowhere() -> None:
         ({"passphrase": "x" * 80}, "passphrase has 80 characters"),
     ],
 )
-def test_what_srt_cannot_use_is_refused(values: dict[str, object], told: str) -> None:
+def test_what_srt_cannot_use_is_refused(values: dict[str, object], text: str) -> None:
     with pytest.raises(UserError, match="stream ") as caught:
         StreamAddress(**({"host": "robot"} | values))  # type: ignore[arg-type]  # wrong values are the point
-    assert told in caught.value.what
+    assert text in caught.value.what
     assert caught.value.exit_code == ExitCode.USAGE
 
 

@@ -18,7 +18,7 @@ def test_a_file_that_exists_is_never_overwritten(tmp_path: Path) -> None:
     assert file.read_bytes() == b"yesterday"
 
 
-def test_a_place_that_cannot_be_written_is_told_before_anything_starts(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_reported_before_anything_starts(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"can't be written \(No such file or directory\)"):
         Recording(tmp_path / "nowhere" / "drive.ts")
 
@@ -27,19 +27,19 @@ def test_what_several_connections_write_is_kept_in_order(tmp_path: Path) -> None
     with Recording(tmp_path / "drive.ts") as recording:
         for number in range(300):
             os.write(recording.pipe, bytes([number % 256]) * 188)
-    assert recording.trouble is None
+    assert recording.error is None
     assert recording.size_bytes == 300 * 188
     assert recording.file.read_bytes() == b"".join(bytes([number % 256]) * 188 for number in range(300))
 
 
-def test_a_full_disk_ends_it_and_holds_up_nobody() -> None:
+def test_a_full_disk_ends_it_and_delays_no_connection() -> None:
     with Recording(Path("/dev/full")) as recording:
         os.write(recording.pipe, bytes(188))
-        wait_until(lambda: recording.trouble, "the trouble is known")
+        wait_until(lambda: recording.error, "the error is known")
         for _ in range(2000):
             wait_until(lambda: poll_once(recording.pipe), "what comes is read")
             os.write(recording.pipe, bytes(1316))
-    assert "/dev/full ended early: No space left on device" in str(recording.trouble)
+    assert "/dev/full ended early: No space left on device" in str(recording.error)
     assert recording.size_bytes == 0
 
 
@@ -68,11 +68,11 @@ def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "drive.ts")
     recording.close()
     recording.close()
-    assert recording.trouble is None
+    assert recording.error is None
 
 
 def test_what_was_left_out_is_counted(tmp_path: Path) -> None:
     with Recording(tmp_path / "drive.ts") as recording:
         for _ in range(3):
-            recording.leave_out()
+            recording.add_gap()
     assert recording.gaps == 3

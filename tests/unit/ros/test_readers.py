@@ -12,7 +12,7 @@ from common.errors import UserError
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from gateway.ros.readers import reader_for
 from gateway.ros.readers.registry import reads
-from gateway.status.board import SourceKind
+from gateway.status import sources as specs
 from gateway.status.values import (
     Battery,
     CommandSource,
@@ -27,19 +27,19 @@ from gateway.status.values import (
 )
 
 
-def source(kind: SourceKind, message_type: str, **more: Any) -> SourceSettings:
+def source(kind: str, message_type: str, **more: Any) -> SourceSettings:
     return SourceSettings(kind=kind, topic="/t", type=message_type, stale_after_ms=1000, **more)
 
 
-ODOMETRY = source(SourceKind.ODOMETRY, "nav_msgs/msg/Odometry")
-VISION = source(SourceKind.VISION, "omniseer_msgs/msg/VisionPerfSummary")
-YOLO = source(SourceKind.DETECTIONS, "yolo_msgs/msg/DetectionArray", max_items=3)
-VISION_MSGS = source(SourceKind.DETECTIONS, "vision_msgs/msg/Detection2DArray")
-BATTERY = source(SourceKind.BATTERY, "sensor_msgs/msg/BatteryState")
-DIAGNOSTICS = source(SourceKind.DIAGNOSTICS, "diagnostic_msgs/msg/DiagnosticArray")
-MODE = source(SourceKind.MODE, "std_msgs/msg/String")
-COMMAND = source(SourceKind.EFFECTIVE_COMMAND, "geometry_msgs/msg/TwistStamped")
-INPUT = source(SourceKind.MUX_INPUT, "geometry_msgs/msg/Twist", label=CommandSource.KEYBOARD)
+ODOMETRY = source("odometry", "nav_msgs/msg/Odometry")
+VISION = source("vision", "omniseer_msgs/msg/VisionPerfSummary")
+YOLO = source("detections", "yolo_msgs/msg/DetectionArray", max_items=3)
+VISION_MSGS = source("detections", "vision_msgs/msg/Detection2DArray")
+BATTERY = source("battery", "sensor_msgs/msg/BatteryState")
+DIAGNOSTICS = source("diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+MODE = source("mode", "std_msgs/msg/String")
+COMMAND = source("effective_command", "geometry_msgs/msg/TwistStamped")
+INPUT = source("mux_input", "geometry_msgs/msg/Twist", label=CommandSource.KEYBOARD)
 
 
 def read(settings: SourceSettings, message: Any) -> Any:
@@ -237,14 +237,14 @@ def test_every_default_source_has_a_reader() -> None:
 
 def test_a_type_without_reader_is_refused_with_those_that_have_one() -> None:
     with pytest.raises(UserError, match=r"my_msgs/msg/Speed.*nav_msgs/msg/Odometry"):
-        reader_for(source(SourceKind.ODOMETRY, "my_msgs/msg/Speed"))
+        reader_for(source("odometry", "my_msgs/msg/Speed"))
 
 
 def test_a_type_read_for_another_kind_is_refused() -> None:
     with pytest.raises(UserError, match="nav_msgs/msg/Odometry"):
-        reader_for(source(SourceKind.BATTERY, "nav_msgs/msg/Odometry"))
+        reader_for(source("battery", "nav_msgs/msg/Odometry"))
 
 
 def test_two_readers_for_one_type_are_a_mistake() -> None:
     with pytest.raises(ValueError, match="two readers"):
-        reads("nav_msgs/msg/Odometry", SourceKind.ODOMETRY)(lambda message, settings: None)
+        reads("nav_msgs/msg/Odometry", specs.ODOMETRY)(lambda message, settings: None)

@@ -13,10 +13,10 @@ from simrobot.robot import Robot
 
 
 def changes(robot: Robot) -> Any:
-    return lambda wish: robot.change(wish, 1.0).model_dump(mode="json")
+    return lambda fields: robot.change(fields, 1.0).model_dump(mode="json")
 
 
-async def test_a_wish_changes_the_robot_and_is_answered(tmp_path: Path) -> None:
+async def test_a_request_changes_the_robot_and_is_answered(tmp_path: Path) -> None:
     robot = Robot(Behaviour(), 0.0)
     async with listening(tmp_path / "s", changes(robot)):
         answer = await asyncio.to_thread(ask, tmp_path / "s", {"speed_mps": 1.5})
@@ -24,7 +24,7 @@ async def test_a_wish_changes_the_robot_and_is_answered(tmp_path: Path) -> None:
     assert robot.behaviour.speed_mps == 1.5
 
 
-async def test_a_refusal_reaches_the_one_who_asked(tmp_path: Path) -> None:
+async def test_a_refusal_reaches_the_client(tmp_path: Path) -> None:
     async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
         with pytest.raises(UserError, match="silent") as refusal:
             await asyncio.to_thread(ask, tmp_path / "s", {"silent": ["sonar"]})
@@ -32,7 +32,7 @@ async def test_a_refusal_reaches_the_one_who_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("line", [b"{", b"[]", b"7", b"\xff", b'{"speed_mps": NaN}'])
-async def test_nonsense_is_answered_and_harms_nobody(tmp_path: Path, line: bytes) -> None:
+async def test_an_invalid_request_gets_an_error_and_breaks_nothing(tmp_path: Path, line: bytes) -> None:
     async with listening(tmp_path / "s", changes(Robot(Behaviour(), 0.0))):
         reader, writer = await asyncio.open_unix_connection(tmp_path / "s")
         writer.write(line + b"\n{}\n")
@@ -62,8 +62,8 @@ async def test_a_running_robot_keeps_its_socket(tmp_path: Path) -> None:
         assert await asyncio.to_thread(ask, tmp_path / "s", {})
 
 
-def test_nobody_there_is_said_in_one_line(tmp_path: Path) -> None:
+def test_a_missing_robot_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no simulated robot answers") as refusal:
-        ask(tmp_path / "nobody", {})
+        ask(tmp_path / "missing", {})
     assert refusal.value.exit_code is ExitCode.UNREACHABLE
     assert os.linesep not in str(refusal.value)

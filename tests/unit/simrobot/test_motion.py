@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simrobot.motion import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, Pose, boxes_at, pack_voltage
+from simrobot.motion import FRAME_HEIGHT_PX, FRAME_WIDTH_PX, Pose, boxes_at, pack_voltage
 
 
 def test_a_full_turn_leads_back_to_the_start() -> None:
@@ -24,12 +24,12 @@ def test_half_a_turn_is_one_diameter_away() -> None:
 
 
 @given(time_s=st.floats(0, 1e6), count=st.integers(0, 200))
-def test_boxes_stay_inside_the_picture(time_s: float, count: int) -> None:
+def test_boxes_stay_inside_the_frame(time_s: float, count: int) -> None:
     boxes = boxes_at(time_s, count)
     assert len(boxes) == count
     for box in boxes:
-        assert box.width_px / 2 - 1e-3 <= box.center_x_px <= PICTURE_WIDTH_PX - box.width_px / 2 + 1e-3
-        assert box.height_px / 2 - 1e-3 <= box.center_y_px <= PICTURE_HEIGHT_PX - box.height_px / 2 + 1e-3
+        assert box.width_px / 2 - 1e-3 <= box.center_x_px <= FRAME_WIDTH_PX - box.width_px / 2 + 1e-3
+        assert box.height_px / 2 - 1e-3 <= box.center_y_px <= FRAME_HEIGHT_PX - box.height_px / 2 + 1e-3
         assert 0 <= box.score <= 1
 
 

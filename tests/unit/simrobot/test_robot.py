@@ -46,16 +46,16 @@ def test_topics_are_silenced_by_name() -> None:
     assert robot(silent=["odometry"]).behaviour.silent == {Topic.ODOMETRY}
 
 
-def test_a_mode_is_news_once() -> None:
+def test_a_mode_change_is_reported_once() -> None:
     running = robot(mode="idle")
-    assert running.news_of_mode()
-    assert not running.news_of_mode()
+    assert running.mode_changed()
+    assert not running.mode_changed()
     running.change({"mode": "returning"}, now_s=101.0)
-    assert running.news_of_mode()
+    assert running.mode_changed()
 
 
 @pytest.mark.parametrize(
-    ("wish", "named"),
+    ("fields", "named"),
     [
         ({"speed": 1}, "speed"),
         ({"battery_percent": 101}, "battery_percent"),
@@ -66,9 +66,9 @@ def test_a_mode_is_news_once() -> None:
         ({"components": {"drive": "broken"}}, "components"),
     ],
 )
-def test_a_wish_that_makes_no_sense_changes_nothing(wish: dict[str, Any], named: str) -> None:
+def test_an_invalid_request_changes_nothing(fields: dict[str, Any], named: str) -> None:
     running = robot()
     before = running.behaviour
     with pytest.raises(UserError, match=named):
-        running.change(wish, now_s=100.0)
+        running.change(fields, now_s=100.0)
     assert running.behaviour == before

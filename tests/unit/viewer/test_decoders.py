@@ -27,10 +27,10 @@ def test_a_failure_with_hardware_is_given_to_software_once() -> None:
     assert decoders.after_undecodable(UNDECODABLE) is UNDECODABLE
 
 
-def test_no_picture_at_all_is_given_to_software_too() -> None:
+def test_no_frame_at_all_falls_back_to_software_too() -> None:
     decoders = started({"h264": "vah264dec"})
     decoders.chosen()
-    decoders.after_nothing()
+    decoders.after_no_frame()
     assert decoders.chosen() == {}
 
 

@@ -11,42 +11,38 @@ from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.errors import UndecodableError, ended, from_srt
 from console.receiver.frame import Frame
-from console.receiver.inbox import Inbox
-from console.receiver.receiver import Receiver
-from console.receiver.setup import Setup
+from console.receiver.frame_queue import FrameQueue
+from console.receiver.options import ReceiverOptions
+from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
-from console.viewer.state import Phase
 from tests.support.waiting import wait_until
-from tests.unit.receiver.pictures import frame
+from tests.unit.receiver.frames import frame
 from tests.unit.viewer.previews import preview
 
 
 @dataclass
 class Exchange:
-    """Every call that was made; a test puts pictures and ends into the inboxes."""
+    """Every connection that was made; a test puts frames and ends into the queues."""
 
     refuse: bool = False
-    calls: list[tuple[StreamAddress, Inbox]] = field(default_factory=list)
+    calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
 
-    def connect(self, address: StreamAddress, _setup: Setup) -> Receiver:
-        return Receiver(address, queue_size=1, dial=self._dial)
-
-    def _dial(self, address: StreamAddress, inbox: Inbox) -> "Exchange":
-        self.calls.append((address, inbox))
+    def connect(self, address: StreamAddress, queue: FrameQueue, _options: ReceiverOptions) -> "Exchange":
+        self.calls.append((address, queue))
         self.open += 1
         if self.refuse:
-            inbox.end(from_srt(address, "Incorrect passphrase", had_data=False))
+            queue.end(from_srt(address, "Incorrect passphrase", had_data=False))
         return self
 
     def close(self) -> None:
         self.open -= 1
 
     def show(self) -> Frame:
-        """A picture arrives over the newest call."""
-        picture = replace(frame(), arrival_s=time.monotonic())
-        self.calls[-1][1].put(picture)
-        return picture
+        """A frame arrives over the latest connection."""
+        latest = replace(frame(), arrival_s=time.monotonic())
+        self.calls[-1][1].put(latest)
+        return latest
 
 
 @pytest.fixture
@@ -71,32 +67,32 @@ def test_nothing_is_called_until_the_gateway_names_a_stream(
     session: VideoSession, exchange: Exchange
 ) -> None:
     session.follow(preview(PreviewState.DISABLED))
-    assert session.state().phase is Phase.OFF
+    assert session.playback().state is PlaybackState.OFF
     assert exchange.calls == []
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
 
 
-def test_the_newest_picture_is_kept_and_told(session: VideoSession, exchange: Exchange) -> None:
-    told: list[Frame] = []
-    session.watch_pictures(told.append)
+def test_the_latest_frame_is_kept_and_passed_to_listeners(session: VideoSession, exchange: Exchange) -> None:
+    received: list[Frame] = []
+    session.add_frame_listener(received.append)
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
     for number in (1, 2, 3):
-        picture = exchange.show()
-        wait_until(lambda picture=picture: session.latest() is picture, "the picture is kept")  # type: ignore[misc]
-        assert session.figures().pictures == len(told) == number
-    assert session.state().phase is Phase.LIVE
+        latest = exchange.show()
+        wait_until(lambda latest=latest: session.latest_frame() is latest, "the frame is kept")  # type: ignore[misc]
+        assert session.frames == len(received) == number
+    assert session.playback().state is PlaybackState.LIVE
 
 
 def test_a_lost_call_is_made_again_and_counted(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     for number in (1, 2, 3):
         called(exchange, number)
-        address, inbox = exchange.calls[-1]
-        inbox.end(ended(address, "lost"))
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
     called(exchange, 4)
-    assert session.figures().redials == session.state().redials == 3
+    assert session.redials == session.playback().redials == 3
 
 
 def test_silence_is_a_loss(session: VideoSession, exchange: Exchange) -> None:
@@ -104,11 +100,11 @@ def test_silence_is_a_loss(session: VideoSession, exchange: Exchange) -> None:
     called(exchange, 1)
     exchange.show()
     called(exchange, 2)
-    state = session.state()
-    assert state.phase is Phase.FROZEN
-    assert state.still_s is not None
-    assert state.still_s >= 1
-    assert "fell silent" in state.reason
+    now = session.playback()
+    assert now.state is PlaybackState.FROZEN
+    assert now.frame_age_s is not None
+    assert now.frame_age_s >= 1
+    assert "fell silent" in now.reason
 
 
 def test_another_address_is_called_at_once(session: VideoSession, exchange: Exchange) -> None:
@@ -117,48 +113,48 @@ def test_another_address_is_called_at_once(session: VideoSession, exchange: Exch
     session.follow(preview(PreviewState.RUNNING, port=7200))
     called(exchange, 2)
     assert [address.port for address, _ in exchange.calls] == [7100, 7200]
-    assert session.figures().redials == 0
+    assert session.redials == 0
 
 
-def test_the_gateway_may_be_away_while_pictures_come(session: VideoSession, exchange: Exchange) -> None:
+def test_the_gateway_may_be_away_while_frames_come(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
-    session.lost(Unreachable("nobody there"))
+    session.gateway_lost(Unreachable("no gateway"))
     exchange.show()
-    wait_until(session.latest, "a picture")
-    assert session.state().phase is Phase.LIVE
+    wait_until(session.latest_frame, "a frame")
+    assert session.playback().state is PlaybackState.LIVE
     assert len(exchange.calls) == 1
 
 
-def test_an_old_picture_does_not_outlive_its_preview(session: VideoSession, exchange: Exchange) -> None:
+def test_an_old_frame_does_not_outlive_its_preview(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
     exchange.show()
-    wait_until(session.latest, "a picture")
+    wait_until(session.latest_frame, "a frame")
     session.follow(preview(PreviewState.DISABLED))
-    assert session.latest() is None
+    assert session.latest_frame() is None
     wait_until(lambda: exchange.open == 0, "hung up")
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 2)
-    assert session.state().phase is Phase.CONNECTING
+    assert session.playback().state is PlaybackState.CONNECTING
 
 
 def test_a_wrong_passphrase_blocks_until_there_is_another(session: VideoSession, exchange: Exchange) -> None:
     exchange.refuse = True
     session.follow(preview(PreviewState.RUNNING, passphrase="not the right one"))
-    wait_until(lambda: session.state().phase is Phase.BLOCKED, "blocked")
-    assert "passphrase" in session.state().reason
-    assert "right one" not in session.state().reason
+    wait_until(lambda: session.playback().state is PlaybackState.BLOCKED, "blocked")
+    assert "passphrase" in session.playback().reason
+    assert "right one" not in session.playback().reason
     exchange.refuse = False
     session.follow(preview(PreviewState.RUNNING, passphrase="the right one"))
     called(exchange, 2)
     exchange.show()
-    wait_until(lambda: session.state().phase is Phase.LIVE, "live")
+    wait_until(lambda: session.playback().state is PlaybackState.LIVE, "live")
 
 
 def test_an_address_that_cannot_be_used_blocks(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING, passphrase="short"))
-    assert session.state().phase is Phase.BLOCKED
+    assert session.playback().state is PlaybackState.BLOCKED
     assert exchange.calls == []
 
 
@@ -166,8 +162,8 @@ def test_what_cannot_be_decoded_blocks(session: VideoSession, exchange: Exchange
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)
     exchange.calls[-1][1].end(UndecodableError("it sends video/mpeg", "Look at the port", final=True))
-    wait_until(lambda: session.state().phase is Phase.BLOCKED, "blocked")
-    assert session.state().remedy == "Look at the port"
+    wait_until(lambda: session.playback().state is PlaybackState.BLOCKED, "blocked")
+    assert session.playback().remedy == "Look at the port"
 
 
 def test_a_session_that_never_began_can_be_closed() -> None:

@@ -6,7 +6,6 @@ from typing import Any
 import grpc
 import pytest
 
-from common.error_details import metadata_of, metadata_of_defect
 from common.errors import (
     DomainError,
     ExitCode,
@@ -15,8 +14,8 @@ from common.errors import (
     NotAllowedError,
     TooMuchError,
 )
+from common.grpc_errors import STATUS_CODES, metadata_of, metadata_of_defect
 from common.reasons import Reason
-from common.rpc import STATUS_CODES
 from console.client import errors
 from console.client.error_table import ERRORS, REASONS, error_from
 
@@ -164,7 +163,7 @@ def test_without_readable_details_the_code_speaks_alone(metadata: Any) -> None:
 
 
 def test_a_word_of_a_newer_gateway_leaves_the_code_to_speak(monkeypatch: pytest.MonkeyPatch) -> None:
-    error = TooMuchError("hm", Reason.NOT_NOW)
+    error = TooMuchError("hm", Reason.TOO_MANY_REQUESTS)
     monkeypatch.setattr(error, "reason", _Newer())
     code = grpc.StatusCode.RESOURCE_EXHAUSTED
     seen = error_from(Failure(code, "hm", metadata_of(error, code)), "robot:50051", 2.0)

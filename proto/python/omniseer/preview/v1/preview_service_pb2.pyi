@@ -28,31 +28,31 @@ class _LifecycleStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Lifecy
     LIFECYCLE_STATE_UNSPECIFIED: _LifecycleState.ValueType  # 0
     """Never sent."""
     LIFECYCLE_STATE_DISABLED: _LifecycleState.ValueType  # 1
-    """No pipeline, no port, no CPU."""
+    """No pipeline, no bound port, no CPU time."""
     LIFECYCLE_STATE_STARTING: _LifecycleState.ValueType  # 2
-    """Pipeline built or being built, no encoded frame yet."""
+    """The pipeline is being built or started; no encoded frame yet."""
     LIFECYCLE_STATE_RUNNING: _LifecycleState.ValueType  # 3
-    """Encoded frames leave."""
+    """Encoded frames reach the listener."""
     LIFECYCLE_STATE_STOPPING: _LifecycleState.ValueType  # 4
-    """Being torn down."""
+    """The pipeline is being torn down."""
     LIFECYCLE_STATE_FAULTED: _LifecycleState.ValueType  # 5
-    """Wanted but not delivering; a retry is scheduled."""
+    """Enabled but not delivering; a retry is scheduled."""
 
 class LifecycleState(_LifecycleState, metaclass=_LifecycleStateEnumTypeWrapper):
-    """Where the preview is in its life."""
+    """State of the preview."""
 
 LIFECYCLE_STATE_UNSPECIFIED: LifecycleState.ValueType  # 0
 """Never sent."""
 LIFECYCLE_STATE_DISABLED: LifecycleState.ValueType  # 1
-"""No pipeline, no port, no CPU."""
+"""No pipeline, no bound port, no CPU time."""
 LIFECYCLE_STATE_STARTING: LifecycleState.ValueType  # 2
-"""Pipeline built or being built, no encoded frame yet."""
+"""The pipeline is being built or started; no encoded frame yet."""
 LIFECYCLE_STATE_RUNNING: LifecycleState.ValueType  # 3
-"""Encoded frames leave."""
+"""Encoded frames reach the listener."""
 LIFECYCLE_STATE_STOPPING: LifecycleState.ValueType  # 4
-"""Being torn down."""
+"""The pipeline is being torn down."""
 LIFECYCLE_STATE_FAULTED: LifecycleState.ValueType  # 5
-"""Wanted but not delivering; a retry is scheduled."""
+"""Enabled but not delivering; a retry is scheduled."""
 Global___LifecycleState: _TypeAlias = LifecycleState  # noqa: Y015
 
 class _Profile:
@@ -97,7 +97,7 @@ class _CodecEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Codec.ValueType
     """H.265 / HEVC."""
 
 class Codec(_Codec, metaclass=_CodecEnumTypeWrapper):
-    """How the pictures are compressed."""
+    """Video coding standard."""
 
 CODEC_UNSPECIFIED: Codec.ValueType  # 0
 """Not known."""
@@ -109,7 +109,7 @@ Global___Codec: _TypeAlias = Codec  # noqa: Y015
 
 @_typing.final
 class DesiredState(_message.Message):
-    """What the operator wants, as the gateway keeps it."""
+    """The state that the gateway requests."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -118,15 +118,15 @@ class DesiredState(_message.Message):
     PROFILE_FIELD_NUMBER: _builtins.int
     PASSPHRASE_FIELD_NUMBER: _builtins.int
     revision: _builtins.int
-    """Counts up with every request of an operator. The service echoes the newest one it has applied.
-    Two wishes with the same revision are the same wish.
+    """Incremented by every request of an operator. The service echoes the newest revision applied. Two
+    desired states with the same revision are the same request.
     """
     enabled: _builtins.bool
-    """Whether there shall be a preview."""
+    """Whether the preview is to run."""
     profile: Global___Profile.ValueType
-    """Which profile. Ignored when enabled is false."""
+    """Bandwidth profile. Ignored when enabled is false."""
     passphrase: _builtins.str
-    """The SRT passphrase of this session (10 to 79 characters). Empty: no encryption. Never logged."""
+    """The SRT passphrase of this session (10 to 79 bytes). Empty: no encryption. Never logged."""
     def __init__(
         self,
         *,
@@ -145,7 +145,7 @@ Global___DesiredState: _TypeAlias = DesiredState  # noqa: Y015
 
 @_typing.final
 class ActualState(_message.Message):
-    """What is."""
+    """The state of the service at one moment."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -160,20 +160,18 @@ class ActualState(_message.Message):
     COUNTERS_FIELD_NUMBER: _builtins.int
     LISTENER_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
-    """Random for every process of the service: a new value means that counters began again at 0."""
+    """Random for every process of the service: a new value means that all counters restarted at 0."""
     applied_revision: _builtins.int
     """The newest revision applied. 0: none yet."""
     state: Global___LifecycleState.ValueType
-    """Where the preview is in its life."""
+    """State of the lifecycle."""
     profile: Global___Profile.ValueType
-    """The profile of the pipeline, or of the newest wish while there is none."""
+    """The profile of the pipeline, or of the newest desired state while there is none."""
     last_error: _builtins.str
-    """What went wrong last and what to do, for a person to read. Empty when nothing did since the
-    preview was last enabled.
-    """
+    """The last error and what to do, for people. Empty for none since the preview was last enabled."""
     @_builtins.property
     def stream(self) -> Global___Stream:
-        """What is served and how. Unset while no pipeline exists."""
+        """Parameters of the stream being served. Unset while no pipeline exists."""
 
     @_builtins.property
     def encoder(self) -> Global___Encoder:
@@ -181,7 +179,7 @@ class ActualState(_message.Message):
 
     @_builtins.property
     def measurement(self) -> Global___Measurement:
-        """Figures of the running stream. Unset before the first window has passed."""
+        """Statistics of the running stream. Unset before the end of the first window."""
 
     @_builtins.property
     def counters(self) -> Global___Counters:
@@ -189,7 +187,7 @@ class ActualState(_message.Message):
 
     @_builtins.property
     def listener(self) -> Global___Listener:
-        """Where a viewer connects, whether a pipeline exists or not."""
+        """Address for viewers, whether a pipeline exists or not."""
 
     def __init__(
         self,
@@ -224,7 +222,7 @@ class Listener(_message.Message):
     port: _builtins.int
     """UDP port."""
     latency_ms: _builtins.int
-    """SRT latency in ms."""
+    """SRT latency in ms (SRTO_LATENCY)."""
     def __init__(
         self,
         *,
@@ -241,7 +239,7 @@ Global___Listener: _TypeAlias = Listener  # noqa: Y015
 
 @_typing.final
 class Stream(_message.Message):
-    """What is served."""
+    """Parameters of the stream being served."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -253,19 +251,19 @@ class Stream(_message.Message):
     ENCRYPTED_FIELD_NUMBER: _builtins.int
     BITRATE_REASON_FIELD_NUMBER: _builtins.int
     width_px: _builtins.int
-    """Picture width in pixels."""
+    """Frame width in pixels."""
     height_px: _builtins.int
-    """Picture height in pixels."""
+    """Frame height in pixels."""
     fps: _builtins.float
-    """Pictures per second that the profile asks for."""
+    """Frame rate of the profile, in frames per second."""
     target_bitrate_kbps: _builtins.int
-    """What the encoder is told to keep, in kbit/s."""
+    """Bit rate that the encoder is set to, in kbit/s."""
     codec: Global___Codec.ValueType
-    """How the pictures are compressed."""
+    """Video coding standard."""
     encrypted: _builtins.bool
-    """Whether the listener asks for a passphrase."""
+    """Whether the listener requires a passphrase."""
     bitrate_reason: _builtins.str
-    """Why the target is not the profile's own, for a person to read. Empty when it is."""
+    """Why it differs from the profile's own, for people. Empty when it does not."""
     def __init__(
         self,
         *,
@@ -302,7 +300,7 @@ class Encoder(_message.Message):
     wanted: _builtins.str
     """The first choice of the configuration."""
     fallback_reason: _builtins.str
-    """Why the first choice does not run. Empty when it does."""
+    """Why the first choice is not in use. Empty when it is."""
     def __init__(
         self,
         *,
@@ -321,7 +319,7 @@ Global___Encoder: _TypeAlias = Encoder  # noqa: Y015
 
 @_typing.final
 class Measurement(_message.Message):
-    """Figures of the running stream over the last window."""
+    """Statistics of the stream over the last window."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -332,7 +330,7 @@ class Measurement(_message.Message):
     WORST_RTT_MS_FIELD_NUMBER: _builtins.int
     WORST_LOSS_PERCENT_FIELD_NUMBER: _builtins.int
     fps: _builtins.float
-    """Encoded pictures per second."""
+    """Encoded frames per second."""
     bitrate_kbps: _builtins.float
     """Bit rate of the transport stream in kbit/s."""
     viewer_count: _builtins.int
@@ -383,11 +381,11 @@ class Counters(_message.Message):
     starts: _builtins.int
     """Pipelines started."""
     restarts: _builtins.int
-    """Pipelines started again after a fault."""
+    """Pipelines started after a fault; included in starts."""
     faults: _builtins.int
     """Times the state became FAULTED."""
     fallbacks: _builtins.int
-    """Times an encoder was passed over for the next one."""
+    """Times an encoder was replaced by the next one after a failure."""
     def __init__(
         self,
         *,
@@ -406,7 +404,7 @@ Global___Counters: _TypeAlias = Counters  # noqa: Y015
 
 @_typing.final
 class EncoderCandidate(_message.Message):
-    """One encoder of the catalogue and what came of trying it."""
+    """One encoder of the catalogue and the result of its trial."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -426,17 +424,17 @@ class EncoderCandidate(_message.Message):
     element: _builtins.str
     """The GStreamer element."""
     codec: Global___Codec.ValueType
-    """How it compresses."""
+    """Video coding standard."""
     hardware: _builtins.bool
     """Whether it is dedicated hardware."""
     present: _builtins.bool
     """Whether the element exists on this machine."""
     proven: _builtins.bool
-    """Whether it really encoded frames when tried."""
+    """Whether it encoded frames in its trial."""
     reason: _builtins.str
-    """Why it is not present or not proven, for a person to read. Empty when it is."""
+    """Why it is not present or not proven, for people. Empty when it is."""
     first_byte_ms: _builtins.float
-    """Time from the first frame in to the first byte out when tried, in ms. Unset when not proven."""
+    """Time from the first frame in to the first byte out in its trial, in ms. Unset when not proven."""
     def __init__(
         self,
         *,
@@ -462,14 +460,14 @@ Global___EncoderCandidate: _TypeAlias = EncoderCandidate  # noqa: Y015
 
 @_typing.final
 class ApplyDesiredStateRequest(_message.Message):
-    """Makes the wish known."""
+    """Request of ApplyDesiredState."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     DESIRED_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def desired(self) -> Global___DesiredState:
-        """The whole wish."""
+        """The whole desired state."""
 
     def __init__(
         self,
@@ -486,14 +484,14 @@ Global___ApplyDesiredStateRequest: _TypeAlias = ApplyDesiredStateRequest  # noqa
 
 @_typing.final
 class ApplyDesiredStateResponse(_message.Message):
-    """The answer to a wish."""
+    """Response of ApplyDesiredState."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     ACTUAL_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def actual(self) -> Global___ActualState:
-        """What is, at the moment the wish was taken in."""
+        """The actual state at the moment the request was accepted."""
 
     def __init__(
         self,
@@ -510,7 +508,7 @@ Global___ApplyDesiredStateResponse: _TypeAlias = ApplyDesiredStateResponse  # no
 
 @_typing.final
 class WatchActualStateRequest(_message.Message):
-    """Asks to be told."""
+    """Request of WatchActualState."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -527,14 +525,14 @@ Global___WatchActualStateRequest: _TypeAlias = WatchActualStateRequest  # noqa: 
 
 @_typing.final
 class WatchActualStateResponse(_message.Message):
-    """One piece of news."""
+    """Response of WatchActualState."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     ACTUAL_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def actual(self) -> Global___ActualState:
-        """What is."""
+        """The actual state at this moment."""
 
     def __init__(
         self,
@@ -551,7 +549,7 @@ Global___WatchActualStateResponse: _TypeAlias = WatchActualStateResponse  # noqa
 
 @_typing.final
 class ListEncodersRequest(_message.Message):
-    """Asks for the encoders."""
+    """Request of ListEncoders."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -568,7 +566,7 @@ Global___ListEncodersRequest: _TypeAlias = ListEncodersRequest  # noqa: Y015
 
 @_typing.final
 class ListEncodersResponse(_message.Message):
-    """The encoders."""
+    """Response of ListEncoders."""
 
     DESCRIPTOR: _descriptor.Descriptor
 

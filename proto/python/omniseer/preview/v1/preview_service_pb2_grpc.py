@@ -26,11 +26,12 @@ if _version_not_supported:
 
 
 class PreviewServiceStub:
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     def __init__(self, channel):
@@ -57,34 +58,36 @@ class PreviewServiceStub:
 
 
 class PreviewServiceServicer:
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     def ApplyDesiredState(self, request, context):
-        """Makes the wish known. Returns at once with the state at that moment; the way to the new state
-        is told by WatchActualState. Applying the same wish again changes nothing, unless the preview
-        is faulted: then the next attempt is made at once when the revision is a new one.
-        INVALID_ARGUMENT: enabled with a profile that the service does not know.
+        """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
+        streams the transition. Applying the same revision again changes nothing. A new revision while the
+        preview is faulted makes the next attempt at once.
+        INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
+        that SRT does not accept.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def WatchActualState(self, request, context):
-        """The state now, then again on every change, and at least every 500 ms while a pipeline exists
-        (every 2 s otherwise, as a sign of life). A slow reader gets the newest state, never a backlog.
+        """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
+        (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListEncoders(self, request, context):
-        """Every encoder that the service knows and what came of trying it. The first call may take some
-        seconds, later ones answer from memory.
+        """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
+        later ones return cached results.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -117,11 +120,12 @@ def add_PreviewServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class PreviewService:
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     @staticmethod

@@ -27,11 +27,12 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class PreviewServiceStub:
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     @_typing.overload
@@ -39,51 +40,55 @@ class PreviewServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> PreviewServiceAsyncStub: ...
     ApplyDesiredState: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ApplyDesiredStateRequest, _preview_service_pb2.ApplyDesiredStateResponse]
-    """Makes the wish known. Returns at once with the state at that moment; the way to the new state
-    is told by WatchActualState. Applying the same wish again changes nothing, unless the preview
-    is faulted: then the next attempt is made at once when the revision is a new one.
-    INVALID_ARGUMENT: enabled with a profile that the service does not know.
+    """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
+    streams the transition. Applying the same revision again changes nothing. A new revision while the
+    preview is faulted makes the next attempt at once.
+    INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
+    that SRT does not accept.
     """
     WatchActualState: _grpc.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]
-    """The state now, then again on every change, and at least every 500 ms while a pipeline exists
-    (every 2 s otherwise, as a sign of life). A slow reader gets the newest state, never a backlog.
+    """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
+    (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
     """
     ListEncoders: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]
-    """Every encoder that the service knows and what came of trying it. The first call may take some
-    seconds, later ones answer from memory.
+    """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
+    later ones return cached results.
     """
 
 @_typing.type_check_only
 class PreviewServiceAsyncStub(PreviewServiceStub):
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     ApplyDesiredState: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ApplyDesiredStateRequest, _preview_service_pb2.ApplyDesiredStateResponse]  # type: ignore[assignment]
-    """Makes the wish known. Returns at once with the state at that moment; the way to the new state
-    is told by WatchActualState. Applying the same wish again changes nothing, unless the preview
-    is faulted: then the next attempt is made at once when the revision is a new one.
-    INVALID_ARGUMENT: enabled with a profile that the service does not know.
+    """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
+    streams the transition. Applying the same revision again changes nothing. A new revision while the
+    preview is faulted makes the next attempt at once.
+    INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
+    that SRT does not accept.
     """
     WatchActualState: _aio.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]  # type: ignore[assignment]
-    """The state now, then again on every change, and at least every 500 ms while a pipeline exists
-    (every 2 s otherwise, as a sign of life). A slow reader gets the newest state, never a backlog.
+    """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
+    (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
     """
     ListEncoders: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]  # type: ignore[assignment]
-    """Every encoder that the service knows and what came of trying it. The first call may take some
-    seconds, later ones answer from memory.
+    """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
+    later ones return cached results.
     """
 
 class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
-    """The door between the gateway and the program that makes the video. Private to the robot: it is
-    served on a Unix socket and no operator speaks it.
+    """Between the gateway and the preview service, which produces the video. Private to the robot: served
+    on a Unix socket, never exposed to operators.
 
-    The gateway owns the wish, the preview service owns the truth. The gateway sends the wish whenever
-    it changes and whenever the service comes back; it reads the truth from one long-lived stream.
+    The gateway owns the desired state, the preview service the actual state. The gateway applies the
+    desired state whenever it changes and whenever the service comes back; it reads the actual state from
+    one long-lived stream.
     """
 
     @_abc_1.abstractmethod
@@ -92,10 +97,11 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _preview_service_pb2.ApplyDesiredStateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_preview_service_pb2.ApplyDesiredStateResponse, _abc.Awaitable[_preview_service_pb2.ApplyDesiredStateResponse]]:
-        """Makes the wish known. Returns at once with the state at that moment; the way to the new state
-        is told by WatchActualState. Applying the same wish again changes nothing, unless the preview
-        is faulted: then the next attempt is made at once when the revision is a new one.
-        INVALID_ARGUMENT: enabled with a profile that the service does not know.
+        """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
+        streams the transition. Applying the same revision again changes nothing. A new revision while the
+        preview is faulted makes the next attempt at once.
+        INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
+        that SRT does not accept.
         """
 
     @_abc_1.abstractmethod
@@ -104,8 +110,8 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _preview_service_pb2.WatchActualStateRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_preview_service_pb2.WatchActualStateResponse], _abc.AsyncIterator[_preview_service_pb2.WatchActualStateResponse]]:
-        """The state now, then again on every change, and at least every 500 ms while a pipeline exists
-        (every 2 s otherwise, as a sign of life). A slow reader gets the newest state, never a backlog.
+        """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
+        (every 2 s otherwise, as a heartbeat). A slow reader gets the newest state, never a backlog.
         """
 
     @_abc_1.abstractmethod
@@ -114,8 +120,8 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _preview_service_pb2.ListEncodersRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_preview_service_pb2.ListEncodersResponse, _abc.Awaitable[_preview_service_pb2.ListEncodersResponse]]:
-        """Every encoder that the service knows and what came of trying it. The first call may take some
-        seconds, later ones answer from memory.
+        """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
+        later ones return cached results.
         """
 
 def add_PreviewServiceServicer_to_server(servicer: PreviewServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

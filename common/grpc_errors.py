@@ -1,0 +1,101 @@
+"""Domain errors as gRPC statuses: the code, and google.rpc.Status with reason, fields and retry delay."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from typing import Final
+
+import grpc
+from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, RetryInfo
+from google.rpc.status_pb2 import Status
+from grpc_status.rpc_status import to_status
+
+from common.errors import (
+    DomainError,
+    InvalidRequestError,
+    NotAllowedError,
+    NotAuthenticatedError,
+    TooMuchError,
+    UnknownServiceError,
+)
+from common.interceptors import Call, Interceptor
+from common.reasons import Reason
+
+_log = logging.getLogger(__name__)
+
+DOMAIN: Final = "omniseer.gateway.v1"
+"""The `domain` of google.rpc.ErrorInfo: who defines the reasons."""
+STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
+    InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
+    NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
+    NotAllowedError: grpc.StatusCode.PERMISSION_DENIED,
+    TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
+    UnknownServiceError: grpc.StatusCode.NOT_FOUND,
+}
+"""Total: a test walks the subclasses of DomainError. Every other exception is a defect, so INTERNAL."""
+_DEFECT: Final = "internal error; see the robot's log"
+_NS_PER_S: Final = 1_000_000_000
+
+
+class ErrorInterceptor(Interceptor[Call]):
+    """Ends a call whose handler raised with the status of the error. The outermost interceptor.
+
+    An exception that is no DomainError is a defect of ours: it is logged with its traceback, and the caller
+    gets INTERNAL without any detail of it.
+    """
+
+    async def on_end(self, call: Call, error: BaseException | None) -> None:
+        """Aborts the call, which raises grpc.aio.AbortError; one that succeeded or was aborted is left."""
+        if error is None or isinstance(error, grpc.aio.AbortError) or not isinstance(error, Exception):
+            return
+        code = status_code(error, call)
+        if code is grpc.StatusCode.INTERNAL:
+            _log.error("%s failed", call.path, exc_info=error)
+            await call.rpc.abort(code, _DEFECT, metadata_of_defect(_DEFECT))
+        assert isinstance(error, DomainError)
+        await call.rpc.abort(code, str(error), metadata_of(error, code))
+
+
+def status_code(error: BaseException | None, call: Call) -> grpc.StatusCode:
+    """Returns the code that a call ends with, given what ended it (see `Interceptor.on_end`)."""
+    if error is None:
+        return grpc.StatusCode.OK
+    if isinstance(error, asyncio.CancelledError | GeneratorExit):
+        return grpc.StatusCode.CANCELLED
+    if isinstance(error, grpc.aio.AbortError):
+        return call.rpc.code()
+    if isinstance(error, DomainError):
+        return STATUS_CODES.get(type(error), grpc.StatusCode.INTERNAL)
+    return grpc.StatusCode.INTERNAL
+
+
+def metadata_of(error: DomainError, code: grpc.StatusCode) -> tuple[tuple[str, str | bytes], ...]:
+    """Returns the trailing metadata that carries the error's details for programs."""
+    status = _status(code, str(error), error.reason)
+    if error.violations:
+        fields = [
+            BadRequest.FieldViolation(field=each.field, description=each.description)
+            for each in error.violations
+        ]
+        status.details.add().Pack(BadRequest(field_violations=fields))
+    if error.retry_after_s is not None:
+        retry = RetryInfo()
+        retry.retry_delay.FromNanoseconds(round(error.retry_after_s * _NS_PER_S))
+        status.details.add().Pack(retry)
+    return _metadata(status)
+
+
+def metadata_of_defect(message: str) -> tuple[tuple[str, str | bytes], ...]:
+    """Returns the trailing metadata of a defect of ours: the caller gets the message and no more."""
+    return _metadata(_status(grpc.StatusCode.INTERNAL, message, Reason.INTERNAL))
+
+
+def _status(code: grpc.StatusCode, message: str, reason: Reason) -> Status:
+    number: int = code.value[0]
+    status = Status(code=number, message=message)
+    status.details.add().Pack(ErrorInfo(reason=reason.value, domain=DOMAIN))
+    return status
+
+
+def _metadata(status: Status) -> tuple[tuple[str, str | bytes], ...]:
+    return tuple(to_status(status).trailing_metadata)

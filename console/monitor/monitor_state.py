@@ -1,0 +1,66 @@
+"""State of the monitor window, as one frozen value that a thread can hand to another."""
+
+from dataclasses import dataclass, field
+
+from console.client import GatewayError, OverlaySnapshot, PreviewChange, PreviewProfile
+from console.monitor.event_log import EventLog
+from console.monitor.link import Link, LinkState
+
+_MS_PER_S = 1000
+# A connection that is up may still be slow; an older snapshot is shown as outdated.
+_OUTDATED_AFTER_MS = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class DesiredPreview:
+    """Desired state of the preview. `UNKNOWN` leaves the profile to the robot."""
+
+    enabled: bool
+    profile: PreviewProfile = PreviewProfile.UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewRequest:
+    """A request to the robot, and its outcome.
+
+    Args:
+        desired: what was asked for.
+        outcome: the robot's answer, or why there is none; None while it is pending.
+        ended_s: when the outcome came, on the monotonic clock.
+    """
+
+    desired: DesiredPreview
+    outcome: PreviewChange | GatewayError | None = None
+    ended_s: float = 0.0
+
+    @property
+    def pending(self) -> bool:
+        """Whether the robot is still to answer."""
+        return self.outcome is None
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorState:
+    """Latest state of the connection, the robot and the operator's request.
+
+    Args:
+        link: the connection.
+        snapshot: the latest one; None before the first.
+        received_s: when it came, on the monotonic clock.
+        request: the latest request; None before the first.
+        events: the log of events.
+    """
+
+    link: Link
+    snapshot: OverlaySnapshot | None = None
+    received_s: float = 0.0
+    request: PreviewRequest | None = None
+    events: EventLog = field(default_factory=EventLog)
+
+    def snapshot_age_ms(self, now_s: float) -> int:
+        """Returns the time since the snapshot came; to be added to the ages in it."""
+        return max(0, round((now_s - self.received_s) * _MS_PER_S))
+
+    def outdated(self, now_s: float) -> bool:
+        """Whether the snapshot is too old, or its connection lost, to count as the robot's present state."""
+        return self.link.state is not LinkState.CONNECTED or self.snapshot_age_ms(now_s) > _OUTDATED_AFTER_MS

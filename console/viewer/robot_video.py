@@ -1,0 +1,66 @@
+"""One robot's status and video together: what every viewer, with or without a window, runs."""
+
+from collections.abc import Callable
+
+from console.monitor.credential_refresh import LoadCredentials
+from console.monitor.link import LinkState
+from console.monitor.worker import Worker, connecting
+from console.receiver.frame import PixelFormat
+from console.receiver.recording import Recording
+from console.viewer.overlay import Overlay
+from console.viewer.session import VideoSession
+
+
+class RobotVideo:
+    """A gateway worker, and a video session that follows the status it polls.
+
+    Args:
+        target: the robot's gateway, HOST:PORT.
+        load: reads the stored credentials; by default there are none.
+        pixels: pixel format of the frames.
+        recording: keeps the encoded stream, too; closed together with the session.
+        on_change: called after each change of the status, mostly in the worker's thread; must only hand over.
+
+    Raises:
+        UserError: the target is not an address, or the credentials can't be used.
+    """
+
+    def __init__(
+        self,
+        target: str,
+        load: LoadCredentials | None = None,
+        *,
+        pixels: PixelFormat = PixelFormat.BGRX,
+        recording: Recording | None = None,
+        on_change: Callable[[], None] | None = None,
+    ) -> None:
+        self._on_change = on_change
+        self.recording = recording
+        self.session = VideoSession(pixels=pixels, recording=recording)
+        self.worker = Worker(target, self._update_session, connecting(load))
+
+    def start(self) -> None:
+        """Starts both threads."""
+        self.session.start()
+        self.worker.start()
+
+    def overlay(self) -> Overlay | None:
+        """Returns the latest detections; None before the first status."""
+        state = self.worker.latest()
+        return Overlay(state.snapshot.detections, state.received_s) if state.snapshot else None
+
+    def close(self, timeout_s: float) -> None:
+        """Disconnects both, within `timeout_s` each, and closes the recording."""
+        self.worker.close(timeout_s)
+        # A session that still runs may still write to the recording.
+        if self.session.close(timeout_s) and self.recording:
+            self.recording.close()
+
+    def _update_session(self) -> None:
+        state = self.worker.latest()
+        if state.link.state is LinkState.CONNECTED and state.snapshot:
+            self.session.follow(state.snapshot.status.preview)
+        elif state.link.error:
+            self.session.gateway_lost(state.link.error)
+        if self._on_change:
+            self._on_change()

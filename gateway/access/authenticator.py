@@ -1,0 +1,107 @@
+"""Authenticates tokens and client certificates against the current list of credentials."""
+
+import hmac
+import time
+from collections.abc import Callable
+from typing import Final
+
+from common.errors import NotAuthenticatedError
+from common.reasons import Reason
+from gateway.access.credential import Credential, Kind, Principal, State
+from gateway.access.store import Store
+from gateway.access.token import Token, parse_token, verify
+
+_INVALID: Final = {
+    State.REVOKED: (Reason.CREDENTIAL_REVOKED, "was revoked"),
+    State.EXPIRED: (Reason.CREDENTIAL_EXPIRED, "has expired"),
+    State.NOT_YET: (Reason.CREDENTIAL_NOT_YET_VALID, "is not valid yet, by the robot's clock"),
+}
+
+
+class Authenticator:
+    """Maps credentials to principals. Used on one event loop alone.
+
+    Args:
+        store: the list to begin with.
+        clock: calendar time, seconds since 1970.
+    """
+
+    def __init__(self, store: Store, clock: Callable[[], float] = time.time) -> None:
+        self._clock = clock
+        self.use(store)
+
+    def use(self, store: Store) -> None:
+        """Replaces the list of credentials."""
+        self._by_id = store.credentials
+        self._by_fingerprint = {
+            each.proof: each for each in store.credentials.values() if each.kind is Kind.CERTIFICATE
+        }
+
+    def id_of_token(self, text: str) -> str:
+        """Returns the id that a token names if this robot has such a credential, else "". Proves nothing."""
+        token = parse_token(text)
+        return token.credential_id if token and token.credential_id in self._by_id else ""
+
+    def knows_certificate(self, fingerprint: str) -> bool:
+        """Returns whether the certificate is on the list, valid or not."""
+        return fingerprint in self._by_fingerprint
+
+    def authenticate_token(self, text: str) -> Principal:
+        """Returns the principal of a token.
+
+        Raises:
+            NotAuthenticatedError: the token is unknown, wrong, or not valid now.
+        """
+        token = parse_token(text)
+        credential = self._by_id.get(token.credential_id) if token else None
+        if credential is not None and credential.kind is not Kind.TOKEN:
+            credential = None
+        # Malformed text is verified, too, so that its refusal takes as long as that of a wrong token.
+        verified = verify(token or Token("", ""), credential.proof if credential else None)
+        if credential is None or not verified:
+            raise NotAuthenticatedError("the token is not one of this robot's", Reason.CREDENTIAL_UNKNOWN)
+        return self._principal(credential)
+
+    def authenticate_certificate(self, fingerprint: str) -> Principal:
+        """Returns the principal of a client certificate, whose key TLS has verified (RFC 8446 4.4.3).
+
+        Raises:
+            NotAuthenticatedError: the certificate is unknown, or not valid now.
+        """
+        credential = self._by_fingerprint.get(fingerprint)
+        if credential is None or not hmac.compare_digest(credential.proof, fingerprint):
+            raise NotAuthenticatedError(
+                "the client certificate is not one of this robot's", Reason.CREDENTIAL_UNKNOWN
+            )
+        return self._principal(credential)
+
+    def still_valid(self, principal: Principal) -> bool:
+        """Returns whether all credentials of the principal are valid now and still grant its role."""
+        now_s = self._clock()
+        credentials = [self._by_id.get(each) for each in principal.credential_ids]
+        return all(
+            each is not None and each.state(now_s) is State.VALID and each.role.may(principal.role)
+            for each in credentials
+        )
+
+    def _principal(self, credential: Credential) -> Principal:
+        state = credential.state(self._clock())
+        if state is not State.VALID:
+            reason, problem = _INVALID[state]
+            what = f"the {credential.kind.value} of {credential.name} ({credential.credential_id}) {problem}"
+            raise NotAuthenticatedError(what, reason)
+        return Principal(credential.name, credential.role, (credential.credential_id,))
+
+
+def combined(first: Principal, second: Principal) -> Principal:
+    """Returns the principal of a caller who presents two credentials, with the lower of both roles.
+
+    Raises:
+        NotAuthenticatedError: the credentials have different names.
+    """
+    if first.name != second.name:
+        raise NotAuthenticatedError(
+            f"the certificate belongs to {first.name}, but the token does not", Reason.CREDENTIAL_UNKNOWN
+        )
+    role = second.role if first.role.may(second.role) else first.role
+    return Principal(first.name, role, (*first.credential_ids, *second.credential_ids))

@@ -1,0 +1,61 @@
+"""Rate limit of refusal reports, so that repeated refused calls do not fill the audit log. Pure.
+
+Each caller has a token bucket: a burst is reported call by call, then one refusal a minute, together with the
+number of those that were suppressed before it.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+BURST: Final = 10
+"""Capacity of a bucket, in tokens; each report takes one."""
+REFILL_S: Final = 60.0
+"""Seconds in which a bucket gains one token."""
+MAX_CALLERS: Final = 256
+"""Buckets kept; beyond that, the least recently used one is dropped."""
+
+
+@dataclass(slots=True)
+class _Bucket:
+    tokens: float
+    updated_s: float
+    suppressed: int = 0
+
+
+class RefusalLimiter:
+    """One token bucket per caller. Used on one event loop alone.
+
+    Args:
+        clock: monotonic seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._buckets: dict[str, _Bucket] = {}
+        """Ordered by last use, the latest at the end."""
+
+    def __len__(self) -> int:
+        return len(self._buckets)
+
+    def take(self, caller: str) -> int | None:
+        """Takes a token for one refusal of this caller, a name or an address.
+
+        Returns:
+            The number of refusals suppressed since the last reported one, or None if this one is to be
+            suppressed, too.
+        """
+        now_s = self._clock()
+        bucket = self._buckets.pop(caller, None) or _Bucket(BURST, now_s)
+        self._buckets[caller] = bucket
+        if len(self._buckets) > MAX_CALLERS:
+            del self._buckets[next(iter(self._buckets))]
+        bucket.tokens = min(BURST, bucket.tokens + (now_s - bucket.updated_s) / REFILL_S)
+        bucket.updated_s = now_s
+        if bucket.tokens < 1:
+            bucket.suppressed += 1
+            return None
+        bucket.tokens -= 1
+        suppressed, bucket.suppressed = bucket.suppressed, 0
+        return suppressed

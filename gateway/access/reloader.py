@@ -1,0 +1,209 @@
+"""Reloads credentials and certificates when their files change, without a restart or a signal.
+
+Files that can't be read change nothing: the last good version stays in effect, and operators see a fault.
+"""
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, NoReturn
+
+from common.errors import UserError
+from gateway.access.ca import KeyPair, certificate_info, key_matches
+from gateway.access.command import credentials_command
+from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
+from gateway.access.store import Store
+from gateway.status.access import AccessView, CertificateExpiry
+
+POLL_INTERVAL_S: Final = 0.5
+"""Bounds how long a revoked credential remains usable."""
+_UNKNOWN_INTERVAL_S: Final = 0.1
+"""Minimum interval of polls caused by unknown credentials, of which there may be a flood."""
+_FAILURES_REPORTED: Final = 3
+"""Consecutive failures before a fault: two files that belong together do not change at the same instant."""
+_CERTIFICATES: Final = {
+    "server_certificate": ("the gateway's certificate", "server"),
+    "authority": ("the robot's certificate authority", "ca"),
+}
+"""Certificates whose expiry is reported: text for people, and the argument of `rotate` that renews them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """Files that TLS needs.
+
+    Attributes:
+        certificate: of the gateway.
+        key: of that certificate.
+        client_ca: certificate of the CA of client certificates; None requests no certificate from clients.
+    """
+
+    certificate: Path
+    key: Path
+    client_ca: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TlsMaterial:
+    """Contents of `TlsFiles`."""
+
+    server: KeyPair
+    client_ca: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedAccess:
+    """Credentials and certificates that are in effect together.
+
+    Attributes:
+        store: the credentials.
+        tls: None without TLS.
+        ends_s: end of validity of certificates by their key in `_CERTIFICATES`, seconds since 1970.
+    """
+
+    store: Store
+    tls: TlsMaterial | None
+    ends_s: Mapping[str, int]
+
+
+def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedAccess:
+    """Reads credentials and certificates.
+
+    Raises:
+        UserError: one can't be read or is invalid.
+    """
+    store = directory.read_store()
+    if tls is None:
+        return LoadedAccess(store, None, {})
+    server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
+    client_ca = read_public(tls.client_ca, "certificate authority") if tls.client_ca else None
+    try:
+        matches = key_matches(server)
+        ends_s = {"server_certificate": certificate_info(server.certificate).ends_s}
+        if client_ca:
+            ends_s["authority"] = certificate_info(client_ca).ends_s
+    except ValueError as error:
+        raise UserError(
+            f"a certificate or key of {tls.certificate} can't be parsed: {error}", "Both must be PEM"
+        ) from error
+    if not matches:
+        raise UserError(
+            f"{tls.key} is not the key of {tls.certificate}",
+            f"To replace both, type: {credentials_command('rotate server')}",
+        )
+    return LoadedAccess(store, TlsMaterial(server, client_ca), ends_s)
+
+
+class CredentialReloader:
+    """Polls the files of credentials and certificates. Used on one event loop alone.
+
+    Args:
+        directory: of the credentials.
+        tls: files of the certificates; None without TLS.
+        on_change: called with each new version.
+        clock: calendar time, seconds since 1970.
+
+    Raises:
+        UserError: the initial version can't be read.
+    """
+
+    def __init__(
+        self,
+        directory: CredentialDirectory,
+        tls: TlsFiles | None,
+        on_change: Callable[[LoadedAccess], None],
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self._directory = directory
+        self._tls = tls
+        self._files = [directory.store_file]
+        if tls:
+            self._files += [each for each in (tls.certificate, tls.key, tls.client_ca) if each]
+        self._clock = clock
+        self._on_change = on_change
+        self._seen = self._signatures()
+        self.loaded = load_access(directory, tls)
+        self._error, self._failures = "", 0
+        self._polling = asyncio.Lock()
+        self._polled_s = -math.inf
+        self._next_poll: asyncio.Task[None] | None = None
+
+    async def run(self) -> NoReturn:
+        """Polls the files until cancelled."""
+        while True:
+            await asyncio.sleep(POLL_INTERVAL_S)
+            await self._poll()
+
+    async def reload_for_unknown(self) -> None:
+        """Returns after a poll that began after this call, because the credential may just have been added.
+
+        Concurrent calls share polls, which are at least 0.1 s apart.
+        """
+        if self._next_poll is None:
+            self._next_poll = asyncio.create_task(self._poll_when_due(), name="reload for unknown credential")
+        # Shielded: a caller that leaves must not cancel the poll of the others.
+        await asyncio.shield(self._next_poll)
+
+    def view(self, audit_error: str = "") -> AccessView:
+        """Returns the state of access control that operators see."""
+        now_s = self._clock()
+        return AccessView(
+            tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
+            self._error,
+            audit_error,
+        )
+
+    async def _poll_when_due(self) -> None:
+        await asyncio.sleep(max(0.0, self._polled_s + _UNKNOWN_INTERVAL_S - time.monotonic()))
+        self._next_poll = None
+        await self._poll()
+
+    async def _poll(self) -> None:
+        # One at a time: an earlier poll that ended later would put a revoked credential back into effect.
+        async with self._polling:
+            self._polled_s = time.monotonic()
+            await self._reload_if_changed()
+
+    async def _reload_if_changed(self) -> None:
+        # Files are read in a worker thread, because a disk may be slow.
+        seen = await asyncio.to_thread(self._signatures)
+        if seen == self._seen and not self._failures:
+            return
+        try:
+            loaded = await asyncio.to_thread(load_access, self._directory, self._tls)
+        except UserError as error:
+            self._failures += 1
+            if self._failures >= _FAILURES_REPORTED:
+                self._error = error.what
+            return
+        self._seen, self._error, self._failures = seen, "", 0
+        if loaded != self.loaded:
+            self.loaded = loaded
+            self._on_change(loaded)
+
+    def _signatures(self) -> tuple[tuple[int, ...], ...]:
+        return tuple(_signature(path) for path in self._files)
+
+
+def _signature(path: Path) -> tuple[int, ...]:
+    """Returns what changes when the file is replaced or edited, or the errno if it can't be examined."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        return (error.errno or -1,)
+    return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
+
+
+def _certificate_expiry(which: str, ends_s: int, now_s: float) -> CertificateExpiry:
+    name, argument = _CERTIFICATES[which]
+    return CertificateExpiry(
+        key=which,
+        name=name,
+        ends_on=datetime.fromtimestamp(ends_s, UTC).date().isoformat(),
+        left_s=ends_s - now_s,
+        remedy=f"On the robot: {credentials_command(f'rotate {argument}')}",
+    )

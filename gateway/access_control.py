@@ -1,0 +1,126 @@
+"""Who may call: credentials, certificates and the audit log, put together from the settings."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import grpc
+
+from gateway.access.audit import AuditLog
+from gateway.access.authenticator import Authenticator
+from gateway.access.directory import CredentialDirectory
+from gateway.access.lockout import Lockout
+from gateway.access.refusal_limiter import RefusalLimiter
+from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
+from gateway.config import SecuritySettings
+from gateway.rpc.interceptors.audit import Audit
+from gateway.rpc.interceptors.auth import Auth
+from gateway.rpc.ports import EventSink, StreamKey
+from gateway.rpc.tls import ServerTls
+from gateway.status.access import AccessView
+from gateway.status.event import ControlAction, ControlResult
+
+_KIB: Final = 1024
+_AUDIT_FILE: Final = "audit.jsonl"
+
+
+class AccessControl:
+    """Authentication, authorization and accounting of the operators' calls.
+
+    Args:
+        settings: who may call, and how.
+        events: where refused control actions are shown.
+        stream_key: renewed when a caller loses access.
+
+    Attributes:
+        audit: the interceptor that records control actions.
+        auth: the interceptor that authenticates; None where callers are not.
+
+    Raises:
+        UserError: credentials or certificates can't be read.
+    """
+
+    def __init__(self, settings: SecuritySettings, events: EventSink, stream_key: StreamKey) -> None:
+        directory = settings.credentials
+        file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
+        self._log = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
+        self.audit = Audit(events, self._log, RefusalLimiter())
+        self.auth: Auth | None = None
+        self._watch: CredentialReloader | None = None
+        self._tls: ServerTls | None = None
+        if directory is None:
+            return
+        files = CredentialDirectory(directory)
+        tls_files = tls_files_of(settings, files)
+        self._watch = CredentialReloader(files, tls_files, self._use)
+        self._authenticator = Authenticator(self._watch.loaded.store)
+        certificates = tls_files is not None and tls_files.client_ca is not None
+        self.auth = Auth(self._authenticator, Lockout(), self._watch, stream_key, certificates=certificates)
+        if self._watch.loaded.tls:
+            self._tls = ServerTls(self._watch.loaded.tls)
+
+    @property
+    def server_credentials(self) -> grpc.ServerCredentials | None:
+        """For TLS; None for plaintext."""
+        return self._tls.credentials() if self._tls else None
+
+    def view(self) -> AccessView:
+        """Returns the state of credentials, certificates and audit log, for the fault rules."""
+        error = self._log.error
+        return self._watch.view(error) if self._watch else AccessView(audit_error=error)
+
+    @contextmanager
+    def recording(self) -> Iterator[None]:
+        """Writes the audit log while the block lasts."""
+        with self._log.writing():
+            yield
+
+    async def run(self) -> None:
+        """Follows changes of the credential files, until cancelled."""
+        if self._watch is None or self.auth is None:
+            return
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._watch.run(), name="credentials")
+            tasks.create_task(self.auth.run(), name="revocation")
+
+    def _use(self, loaded: LoadedAccess) -> None:
+        self._authenticator.use(loaded.store)
+        if self._tls and loaded.tls:
+            self._tls.use(loaded.tls)
+        self._log.record(_reloaded(len(loaded.store.credentials)))
+
+
+def read_access(settings: SecuritySettings, directory: Path) -> LoadedAccess:
+    """Reads credentials and certificates as a gateway does that starts.
+
+    Args:
+        settings: who may call, and how.
+        directory: of the credentials.
+
+    Raises:
+        UserError: something can't be read.
+    """
+    files = CredentialDirectory(directory)
+    return load_access(files, tls_files_of(settings, files))
+
+
+def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:
+    """Returns the certificates that the settings name, else those of the directory; None without TLS."""
+    tls = settings.tls
+    if not tls.enabled:
+        return None
+    client_ca = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
+    return TlsFiles(tls.certificate or files.server.certificate, tls.key or files.server.key, client_ca)
+
+
+def _reloaded(count: int) -> ControlAction:
+    return ControlAction(
+        who="",
+        address="this robot",
+        method="credentials",
+        request="changed files",
+        result=ControlResult.ACCEPTED,
+        answer=f"{count} credentials and the newest certificates are in force",
+    )

@@ -1,0 +1,157 @@
+"""The gateway put together: the only place that knows all of its parts. App, benches and tests use it.
+
+A call passes rpc/server.py (interceptors, then services), reads state.py or asks links for a change, and is
+mapped back. The board inside the state is fed by the robot's sources; faults and events follow from it at
+each look.
+"""
+
+import logging
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from common.health import Health
+from gateway.access_control import AccessControl
+from gateway.config import GatewaySettings
+from gateway.links.link import Connector, ServiceLink
+from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.model import PreviewModel
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.preview.wire import PreviewConnector
+from gateway.links.reconciler import Reconciler
+from gateway.metrics.collector import GatewayCollector
+from gateway.metrics.loop_delay import LoopDelay
+from gateway.platform.sampler import PlatformSampler
+from gateway.rpc.event_stream import EventStream
+from gateway.rpc.interceptors.presence import Presence
+from gateway.rpc.interceptors.rate_limit import Admission, RateLimit
+from gateway.rpc.interceptors.stats import Stats
+from gateway.rpc.interceptors.validation import Validation
+from gateway.rpc.methods import CONTRACT
+from gateway.rpc.recipient import Recipients
+from gateway.rpc.response_cache import ResponseCache
+from gateway.rpc.server import SERVICE, Interceptors, Services
+from gateway.rpc.services.events import EventsService
+from gateway.rpc.services.info import InfoService
+from gateway.rpc.services.preview import PreviewService
+from gateway.rpc.services.status import StatusService
+from gateway.rpc.status_stream import StatusStream
+from gateway.shown_settings import shown_settings
+from gateway.state import State
+from gateway.status.board import Board
+
+_log = logging.getLogger(__name__)
+
+_PASSPHRASE_BYTES: Final = 24
+"""32 characters of base64: 192 bits, more than the key of SRT's AES-128 holds."""
+
+
+class Outside(Protocol):
+    """What the gateway reads from and speaks to, besides its operators."""
+
+    def feeding(self, board: Board) -> AbstractContextManager[None]:
+        """Writes the robot's values to the board while the block lasts."""
+
+    def preview(self) -> Connector[PreviewSpec, PreviewReport]:
+        """Returns what opens connections to the preview service."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gateway:
+    """All parts that run; app.py starts and stops them."""
+
+    settings: GatewaySettings
+    outside: Outside
+    state: State
+    preview_link: PreviewLink
+    access: AccessControl
+    status_stream: StatusStream
+    services: Services
+    interceptors: Interceptors
+    health: Health
+    loop_delay: LoopDelay
+    metrics: GatewayCollector
+
+
+def build(settings: GatewaySettings, outside: Outside) -> Gateway:
+    """Returns a gateway of which nothing runs yet.
+
+    Raises:
+        UserError: credentials or certificates can't be read.
+    """
+    # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
+    first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
+    model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
+    name = f"preview service at {settings.preview.socket}"
+    link = ServiceLink(name, outside.preview(), Reconciler(first_revision, model))
+    control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
+    stats = Stats(CONTRACT.methods_by_name)
+    state = State(settings, link, stats)
+    access = AccessControl(settings.security, state, control)
+    recipients = Recipients(settings.preview.advertised_host)
+    status_stream = StatusStream(state, time.monotonic)
+    event_stream = EventStream(state.events, state.event_added)
+    services = Services(
+        status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
+        preview=PreviewService(control, state, recipients),
+        events=EventsService(event_stream),
+        info=InfoService(state, stats, shown_settings(settings)),
+    )
+    interceptors = Interceptors(
+        stats=stats,
+        rate_limit=RateLimit(Admission(settings.limits)),
+        audit=access.audit,
+        auth=access.auth,
+        validation=Validation(settings.limits.request_bytes),
+        presence=Presence(state),
+    )
+    loop_delay = LoopDelay()
+    return Gateway(
+        settings=settings,
+        outside=outside,
+        state=state,
+        preview_link=link,
+        access=access,
+        status_stream=status_stream,
+        services=services,
+        interceptors=interceptors,
+        health=Health(SERVICE),
+        loop_delay=loop_delay,
+        metrics=GatewayCollector(state, stats, loop_delay, status_stream, event_stream),
+    )
+
+
+class ThisRobot:
+    """The robot that the gateway runs on: its ROS graph, its computer, its preview service.
+
+    Args:
+        settings: name the sources, and the preview's socket.
+    """
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self._settings = settings
+
+    @contextmanager
+    def feeding(self, board: Board) -> Iterator[None]:
+        """Samples ROS and the computer while the block lasts. A gateway without sources needs no ROS."""
+        with PlatformSampler(self._settings.platform, board):
+            if not self._settings.sources:
+                _log.info("no sources are configured; ROS is not used")
+                yield
+                return
+            # Late: a gateway without sources runs where ROS is not installed.
+            from gateway.ros.intake import intake  # noqa: PLC0415
+
+            with intake(self._settings.sources, board):
+                yield
+
+    def preview(self) -> PreviewConnector:
+        """Returns a connector to the configured socket."""
+        return PreviewConnector(self._settings.preview.socket)
+
+
+def _new_passphrase() -> str:
+    return secrets.token_urlsafe(_PASSPHRASE_BYTES)

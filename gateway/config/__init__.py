@@ -1,0 +1,31 @@
+"""The gateway's settings, one module per section; docs/configuration.md describes every key."""
+
+from gateway.config.faults import FaultSettings
+from gateway.config.security import AuditSettings, SecuritySettings, TlsSettings
+from gateway.config.serving import GrpcSettings, LimitSettings, MetricsSettings, is_loopback
+from gateway.config.settings import (
+    CONFIG_VARIABLE,
+    GatewaySettings,
+    PlatformSettings,
+    PreviewSettings,
+    load_settings,
+)
+from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
+
+__all__ = [
+    "CONFIG_VARIABLE",
+    "DEFAULT_SOURCES",
+    "AuditSettings",
+    "FaultSettings",
+    "GatewaySettings",
+    "GrpcSettings",
+    "LimitSettings",
+    "MetricsSettings",
+    "PlatformSettings",
+    "PreviewSettings",
+    "SecuritySettings",
+    "SourceSettings",
+    "TlsSettings",
+    "is_loopback",
+    "load_settings",
+]

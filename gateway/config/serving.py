@@ -1,0 +1,55 @@
+"""`grpc`, `limits`, `metrics`: where the gateway serves, and how much it serves to one caller."""
+
+import ipaddress
+from pathlib import Path
+
+from pydantic import Field
+
+from common.config import Section
+
+
+class GrpcSettings(Section):
+    """The address for operators."""
+
+    host: str = Field(default="127.0.0.1", min_length=1)
+    port: int = Field(default=50051, ge=0, le=65535)
+    """0 takes any free port, which the log names."""
+    socket: Path | None = None
+    """Additional Unix socket for health checks on this machine. Unencrypted; methods other than those of the
+    health service require a credential there, too."""
+
+
+class LimitSettings(Section):
+    """Limits per caller; requests beyond them are refused with RESOURCE_EXHAUSTED."""
+
+    connections: int = Field(default=256, ge=1, le=10_000)
+    """Connections served at once."""
+    connections_per_address: int = Field(default=128, ge=1, le=10_000)
+    """How many of them may come from one address, so that one computer can't take them all."""
+    streams_per_connection: int = Field(default=16, ge=1, le=1000)
+    requests_per_s: float = Field(default=500.0, gt=0)
+    """Refill rate of each connection's token bucket."""
+    burst: int = Field(default=1000, ge=1)
+    """Capacity of the bucket, in requests."""
+    request_bytes: int = Field(default=131_072, ge=1024, le=262_144)
+    """Largest request that is accepted."""
+
+
+class MetricsSettings(Section):
+    """The Prometheus endpoint: unencrypted and without authentication."""
+
+    host: str = Field(default="127.0.0.1", min_length=1)
+    port: int | None = Field(default=None, ge=0, le=65535)
+    """None disables it; 0 takes any free port, which the log names."""
+    insecure: bool = False
+    """Accepts that others on the network can read the metrics; required for any address but loopback."""
+
+
+def is_loopback(host: str) -> bool:
+    """Returns whether only this machine can reach the address. Names other than localhost count as public."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,120 @@
+"""The whole configuration: one YAML file, overridden by `GATEWAY__...` environment variables."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Final, Literal
+
+from pydantic import Field
+from pydantic_settings import SettingsConfigDict
+
+from common.config import Section, Settings, load
+from common.errors import ExitCode, UserError
+from gateway.config.faults import FaultSettings
+from gateway.config.security import SecuritySettings
+from gateway.config.serving import GrpcSettings, LimitSettings, MetricsSettings, is_loopback
+from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
+from gateway.status.snapshot import Rules, SourceRule
+
+CONFIG_VARIABLE: Final = "ROBOT_GATEWAY_CONFIG"
+"""Environment variable with the path of the file, where the command line has none."""
+
+
+class PreviewSettings(Section):
+    """The connection to the preview service, and from viewers to its stream."""
+
+    socket: Path = Path("/run/robot-gateway/preview.sock")
+    settle_ms: int = Field(default=4000, ge=0, le=60_000)
+    """How long SetPreviewMode waits for the requested state before it returns the present one."""
+    advertised_host: str | None = Field(default=None, min_length=1)
+    """Host of the stream for viewers; by default the address at which the caller reached the gateway."""
+    encrypted: bool | None = None
+    """Whether each session gets its own passphrase; the preview's configuration sets the key length. By
+    default it does if callers must authenticate."""
+
+
+class PlatformSettings(Section):
+    """Sampling of the robot's computer."""
+
+    interval_ms: int = Field(default=1000, ge=100)
+    stale_after_ms: int = Field(default=3000, gt=0)
+    disk_path: Path = Path("/")
+    """A path on the file system whose fill level is reported."""
+    interface: str | None = Field(default=None, min_length=1)
+    """The network interface that leads to the operator; by default the one of the default route."""
+
+
+class GatewaySettings(Settings):
+    """All settings of the gateway. The defaults suit the first robot."""
+
+    model_config = SettingsConfigDict(env_prefix="GATEWAY__")
+
+    name: str = Field(default="robot-gateway", min_length=1, max_length=64)
+    """Name of this robot's gateway for operators."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["human", "json"] = "human"
+    """One line of text, or one JSON object per line."""
+    grpc: GrpcSettings = GrpcSettings()
+    security: SecuritySettings = SecuritySettings()
+    limits: LimitSettings = LimitSettings()
+    preview: PreviewSettings = PreviewSettings()
+    platform: PlatformSettings = PlatformSettings()
+    faults: FaultSettings = FaultSettings()
+    metrics: MetricsSettings = MetricsSettings()
+    sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
+    """An empty list makes a gateway that needs no ROS."""
+
+    @property
+    def preview_encrypted(self) -> bool:
+        """Whether the stream has a passphrase."""
+        requested = self.preview.encrypted
+        return self.security.credentials is not None if requested is None else requested
+
+    def status_rules(self) -> Rules:
+        """Returns what the status expects of each source; the mux inputs are shown last."""
+        shown = sorted(self.sources, key=lambda source: source.label is not None)
+        rules = {source.spec: SourceRule(source.stale_after_ms, source.required) for source in shown}
+        return Rules(rules, self.platform.stale_after_ms)
+
+
+def load_settings(path: Path | None) -> GatewaySettings:
+    """Reads and checks the configuration, each section and all together.
+
+    Raises:
+        UserError: it can't be read, or something in it is wrong.
+    """
+    settings = load(GatewaySettings, path)
+    _check_exposure(settings)
+    _check_sources(settings)
+    return settings
+
+
+def _check_exposure(settings: GatewaySettings) -> None:
+    security = settings.security
+    if not (security.insecure or security.guarded or is_loopback(settings.grpc.host)):
+        what = "anyone on that network could read and control everything"
+        if security.credentials is not None:
+            what = "anyone on that network could read tokens and responses (security.tls.enabled is false)"
+        raise UserError(
+            f"grpc.host is {settings.grpc.host}: {what}",
+            "Authenticate callers ('robot-gateway credentials init' explains how), use 127.0.0.1 "
+            "and a tunnel, or accept it with 'security: {insecure: true}'",
+            exit_code=ExitCode.USAGE,
+        )
+    metrics = settings.metrics
+    open_metrics = metrics.port is not None and not is_loopback(metrics.host)
+    if open_metrics and not (security.insecure or metrics.insecure):
+        raise UserError(
+            f"metrics.host is {metrics.host}: anyone on that network could read the metrics",
+            "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",
+            exit_code=ExitCode.USAGE,
+        )
+
+
+def _check_sources(settings: GatewaySettings) -> None:
+    name, count = next(iter(Counter(source.name for source in settings.sources).most_common(1)), ("", 0))
+    if count > 1:
+        raise UserError(
+            f"sources lists '{name}' {count} times",
+            "Keep one topic for each kind, and one for each label of mux_input",
+            exit_code=ExitCode.USAGE,
+        )

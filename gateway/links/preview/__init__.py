@@ -1,0 +1,1 @@
+"""Link to the preview service, which makes the video."""

@@ -1,0 +1,110 @@
+"""Rules of the preview: requests, adoption, when a request is settled, and the view for clients."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from gateway.links.preview.counters import CounterTotals
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.reconciler import Reconciler
+from gateway.status.preview import PreviewState, PreviewView, Profile
+from gateway.status.values import Received
+
+PreviewReconciler = Reconciler[PreviewSpec, PreviewReport, PreviewView]
+
+_ENABLED: Final = frozenset({PreviewState.STARTING, PreviewState.RUNNING, PreviewState.FAULTED})
+"""States of a service that has applied an enabled preview."""
+_UNREACHABLE: Final = (
+    "preview service unreachable ({}). Start or restart it; the gateway reconnects by itself"
+)
+
+
+class PreviewModel:
+    """A Model of the preview.
+
+    Args:
+        new_passphrase: makes one per session; None if streams are not encrypted.
+    """
+
+    initial: Final = PreviewSpec()
+
+    def __init__(self, new_passphrase: Callable[[], str] | None = None) -> None:
+        self._new_passphrase = new_passphrase
+        self._totals = CounterTotals()
+        self._state = PreviewState.DISABLED
+
+    def spec(self, last: PreviewSpec, *, enabled: bool, profile: Profile | None) -> PreviewSpec:
+        """Returns the spec of a request after `last`; without a profile `last`'s stays, else BALANCED."""
+        profile = profile or last.profile
+        if not enabled:
+            return PreviewSpec(enabled=False, profile=profile)
+        passphrase = last.passphrase if last.enabled else ""
+        if not passphrase and self._new_passphrase:
+            passphrase = self._new_passphrase()
+        return PreviewSpec(enabled=True, profile=profile or Profile.BALANCED, passphrase=passphrase)
+
+    def adopt(self, spec: PreviewSpec, report: PreviewReport) -> tuple[PreviewSpec, bool]:
+        """Takes the running preview over; an encrypted one needs a passphrase that this gateway knows."""
+        enabled = report.state in _ENABLED
+        # Before its first request the service reports its default profile, which no operator chose.
+        chosen = report.profile if report.applied_revision else None
+        spec = replace(spec, enabled=enabled, profile=chosen or spec.profile)
+        if enabled and self._new_passphrase:
+            return self.spec(spec, enabled=True, profile=None), True
+        return spec, False
+
+    def take_report(self, spec: PreviewSpec, report: PreviewReport, *, reapplying: bool) -> None:
+        """Adds the counters to the totals."""
+        if reapplying and spec.enabled:
+            self._totals.next_start_is_restart()
+        self._totals.take(report.instance_id, report.counters)
+
+    def settled(self, spec: PreviewSpec, report: PreviewReport) -> bool:
+        """A switch of the profile is settled when the stream has it."""
+        if not spec.enabled:
+            return report.state is PreviewState.DISABLED
+        if report.state is PreviewState.RUNNING:
+            return _profile_in_force(spec, report) is spec.profile
+        return report.state is PreviewState.FAULTED
+
+    def view(self, reconciler: PreviewReconciler) -> PreviewView:
+        """Returns the view; a pipeline is in it only while the service is reachable."""
+        spec, last = reconciler.desired.spec, reconciler.report
+        current = last.value if last and reconciler.error is None else None
+        state, last_error = _state(reconciler, current)
+        found_here = current is None or reconciler.refusal is not None
+        if found_here and state is PreviewState.FAULTED and self._state is not state:
+            self._totals.add_fault()
+        self._state = state
+        measured = last.value.measurement if last and state is not PreviewState.DISABLED else None
+        return PreviewView(
+            state=state,
+            profile=_profile_in_force(spec, current),
+            last_error=last_error,
+            service_reachable=current is not None,
+            listener=last.value.listener if last else None,
+            stream=current.stream if current else None,
+            encoder=current.encoder if current else None,
+            # The newest figures; while the service is unreachable they stay and grow stale.
+            measured=Received(measured, last.at_s) if last and measured else None,
+            counters=self._totals.total,
+            passphrase=spec.passphrase,
+        )
+
+
+def _state(reconciler: PreviewReconciler, current: PreviewReport | None) -> tuple[PreviewState, str]:
+    """Returns the state and the last error."""
+    enabled = reconciler.desired.spec.enabled
+    if current is None and enabled:
+        return PreviewState.FAULTED, _UNREACHABLE.format(reconciler.error)
+    if current is None:
+        return PreviewState.DISABLED, ""
+    if reconciler.refusal is not None:
+        return PreviewState.FAULTED, f"preview service refused the request: {reconciler.refusal}"
+    if current.state is PreviewState.DISABLED and enabled and reconciler.pending():
+        return PreviewState.STARTING, ""  # About to be applied.
+    return current.state, "" if current.state is PreviewState.RUNNING else current.last_error
+
+
+def _profile_in_force(spec: PreviewSpec, report: PreviewReport | None) -> Profile | None:
+    return (report.profile if report and report.stream else None) or spec.profile

@@ -1,0 +1,129 @@
+"""Schema and client of the preview service (omniseer.preview.v1)."""
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import grpc
+from google.protobuf.message import Message
+
+from common import request_id
+from gateway.links.grpc_client import failed, lost, unix_channel
+from gateway.links.link import LinkLostError
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.reconciler import Desired
+from gateway.status.preview import (
+    Codec,
+    Counters,
+    Encoder,
+    Listener,
+    Measurement,
+    PreviewState,
+    Profile,
+    Stream,
+)
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceStub
+
+if TYPE_CHECKING:
+    # Exists in the generated stubs alone: the name that a type checker knows the asyncio form by.
+    from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceAsyncStub
+
+ValueT = TypeVar("ValueT", Listener, Stream, Encoder, Measurement, Counters)
+
+STATES: Final[Mapping[int, PreviewState]] = {
+    pb.LIFECYCLE_STATE_DISABLED: PreviewState.DISABLED,
+    pb.LIFECYCLE_STATE_STARTING: PreviewState.STARTING,
+    pb.LIFECYCLE_STATE_RUNNING: PreviewState.RUNNING,
+    pb.LIFECYCLE_STATE_STOPPING: PreviewState.STOPPING,
+    pb.LIFECYCLE_STATE_FAULTED: PreviewState.FAULTED,
+}
+PROFILES: Final[Mapping[Profile, pb.Profile.ValueType]] = {
+    Profile.LOW_BW: pb.PROFILE_LOW_BW,
+    Profile.BALANCED: pb.PROFILE_BALANCED,
+    Profile.HIGH_QUALITY: pb.PROFILE_HIGH_QUALITY,
+}
+CODECS: Final[Mapping[int, Codec]] = {pb.CODEC_H264: Codec.H264, pb.CODEC_H265: Codec.H265}
+_PROFILE_OF: Final[Mapping[int, Profile]] = {number: profile for profile, number in PROFILES.items()}
+
+
+class PreviewConnector:
+    """Connects to the preview service on the Unix socket where it listens, or will."""
+
+    def __init__(self, socket: Path) -> None:
+        self._socket = socket
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator["PreviewClient"]:
+        """Yields a client; connects with its first call."""
+        async with unix_channel(self._socket) as channel:
+            yield PreviewClient(channel)
+
+
+class PreviewClient:
+    """A ServiceClient of the preview service."""
+
+    def __init__(self, channel: grpc.aio.Channel) -> None:
+        self._stub: PreviewServiceAsyncStub = PreviewServiceStub(channel)
+
+    async def reports(self) -> AsyncIterator[PreviewReport]:
+        """Yields what WatchActualState reports."""
+        stream = self._stub.WatchActualState(pb.WatchActualStateRequest())
+        try:
+            while isinstance(message := await stream.read(), pb.WatchActualStateResponse):
+                yield from_wire(message.actual)
+        except grpc.aio.AioRpcError as error:
+            raise lost(error) from None
+
+    async def apply(self, desired: Desired[PreviewSpec]) -> PreviewReport:
+        """Calls ApplyDesiredState under the id of the request that caused it."""
+        metadata = ((request_id.HEADER, desired.request_id),) if desired.request_id else None
+        try:
+            reply = await self._stub.ApplyDesiredState(to_wire(desired), metadata=metadata)
+        except grpc.aio.AioRpcError as error:
+            raise failed(error) from None
+        return from_wire(reply.actual)
+
+
+def to_wire(desired: Desired[PreviewSpec]) -> pb.ApplyDesiredStateRequest:
+    """Returns the request that applies `desired`."""
+    spec = desired.spec
+    state = pb.DesiredState(revision=desired.revision, enabled=spec.enabled, passphrase=spec.passphrase)
+    if spec.profile:
+        state.profile = PROFILES[spec.profile]
+    return pb.ApplyDesiredStateRequest(desired=state)
+
+
+def from_wire(message: pb.ActualState) -> PreviewReport:
+    """Returns the report in a message.
+
+    Raises:
+        LinkLostError: the state is unknown, because the service is of another version than the gateway.
+    """
+    state = STATES.get(message.state)
+    if state is None:
+        raise LinkLostError(
+            f"it reports the unknown state number {message.state}; its version does not match"
+        )
+    codec = CODECS.get(message.stream.codec)
+    return PreviewReport(
+        instance_id=message.instance_id,
+        applied_revision=message.applied_revision,
+        state=state,
+        profile=_PROFILE_OF.get(message.profile),
+        last_error=message.last_error,
+        listener=_equal(Listener, message.listener) if message.HasField("listener") else None,
+        stream=_equal(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
+        encoder=_equal(Encoder, message.encoder) if message.HasField("encoder") else None,
+        measurement=_equal(Measurement, message.measurement) if message.HasField("measurement") else None,
+        counters=_equal(Counters, message.counters),
+    )
+
+
+def _equal(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
+    """Returns the equally named fields of a message, None for an unset optional one, and those converted."""
+    unset = {f.name for f in message.DESCRIPTOR.fields if f.has_presence and not message.HasField(f.name)}
+    values: Any = {f.name: None if f.name in unset else getattr(message, f.name) for f in fields(kind)}
+    return kind(**(values | converted))

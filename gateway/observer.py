@@ -1,0 +1,111 @@
+"""Compares each snapshot with the previous ones: tracks the faults and derives the events."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.status.event import (
+    EncoderFallback,
+    Event,
+    FaultCleared,
+    FaultRaised,
+    ModeChanged,
+    PreviewChanged,
+)
+from gateway.status.fault import Fault, Severity
+from gateway.status.faults.rules import FaultRules, conditions
+from gateway.status.faults.tracker import Changes, FaultTracker
+from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
+from gateway.status.snapshot import Snapshot
+from gateway.status.sources import MODE
+
+_SETTLED: Final = frozenset({PreviewState.DISABLED, PreviewState.RUNNING, PreviewState.FAULTED})
+"""STARTING and STOPPING lead from one of these to another and are no events of their own."""
+_PREVIEW: Final = "preview"
+
+
+class Observer:
+    """Derives the events from the snapshots; the only writer of the fault tracker.
+
+    The first snapshot is the baseline: it raises faults but no other events.
+
+    Args:
+        tracker: keeps the faults.
+        rules: parameters of the fault rules.
+    """
+
+    def __init__(self, tracker: FaultTracker, rules: FaultRules) -> None:
+        self._tracker = tracker
+        self._rules = rules
+        self._started_s: float | None = None
+        self._preview: tuple[PreviewState, Profile | None] | None = None
+        self._encoder: Encoder | None = None
+        self._mode = ""
+
+    def observe(self, snapshot: Snapshot) -> list[Event]:
+        """Returns the events that this snapshot brings, in order."""
+        first = self._started_s is None
+        if self._started_s is None:
+            self._started_s = snapshot.at_s
+        up_s = snapshot.at_s - self._started_s
+        present = conditions(snapshot, self._rules, self._tracker.active_ids, up_s)
+        faults = list(_fault_events(self._tracker.update(present, snapshot.at_s)))
+        others = [*self._preview_events(snapshot.preview), *self._mode_events(snapshot)]
+        return faults if first else [*faults, *others]
+
+    def _preview_events(self, preview: PreviewView) -> Iterator[Event]:
+        encoder = preview.encoder
+        if encoder is not None and encoder != self._encoder:
+            self._encoder = encoder
+            if encoder.fallback_reason:
+                yield _fallback(encoder)
+        if preview.state not in _SETTLED:
+            return
+        # While the preview is off, its profile is only that of the next start.
+        settled = (preview.state, preview.profile if preview.state is PreviewState.RUNNING else None)
+        if settled != self._preview:
+            self._preview = settled
+            yield _preview_changed(preview)
+
+    def _mode_events(self, snapshot: Snapshot) -> Iterator[Event]:
+        value = snapshot[MODE].value
+        mode = value.name if value else ""
+        if mode != self._mode:
+            self._mode = mode
+            sentence = f"robot mode: {mode}"
+            yield Event(Severity.INFO, "mission", sentence, ModeChanged(mode), sentence)
+
+
+def _fault_events(changes: Changes) -> Iterator[Event]:
+    for fault in changes.raised:
+        yield _raised(fault, f"{fault.condition.severity.value}: {fault.condition.message}")
+    for fault in changes.worsened:
+        yield _raised(fault, f"{fault.condition.severity.value} now: {fault.condition.message}")
+    for fault in changes.cleared:
+        sentence = f"cleared: {fault.condition.message}"
+        yield Event(Severity.INFO, fault.condition.component, sentence, FaultCleared(fault), sentence)
+
+
+def _raised(fault: Fault, sentence: str) -> Event:
+    condition = fault.condition
+    return Event(condition.severity, condition.component, condition.message, FaultRaised(fault), sentence)
+
+
+def _preview_changed(preview: PreviewView) -> Event:
+    detail = PreviewChanged(preview.state, preview.profile, "")
+    match preview.state:
+        case PreviewState.RUNNING:
+            sentence = f"preview running, {preview.profile.value if preview.profile else '?'}"
+        case PreviewState.FAULTED:
+            # Without a sentence: the overlay already has the one of the fault.
+            faulted = PreviewChanged(preview.state, preview.profile, preview.last_error)
+            return Event(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
+        case _:
+            sentence = "preview off"
+    return Event(Severity.INFO, _PREVIEW, sentence, detail, sentence)
+
+
+def _fallback(encoder: Encoder) -> Event:
+    """Without a sentence: the overlay already has the one of the fault."""
+    message = f"{encoder.name} encodes instead of {encoder.wanted}: {encoder.fallback_reason}"
+    detail = EncoderFallback(encoder.name, encoder.wanted, encoder.fallback_reason)
+    return Event(Severity.WARNING, _PREVIEW, message, detail)

@@ -1,0 +1,81 @@
+"""One call of an operator: where it comes from, who makes it, how long it may take."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+from urllib.parse import unquote
+
+from google.protobuf.message import Message
+
+from common import request_id
+from common.interceptors import Call, RpcContext
+from gateway.access.address_prefix import address_prefix
+from gateway.access.credential import Principal
+from gateway.rpc.methods import method_at
+
+_LOCAL_SOCKET: Final = "local socket"
+_REMEMBERED_CONNECTIONS: Final = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """The other end of a connection.
+
+    Attributes:
+        connection: gRPC's own name, the same for all calls of a connection: "ipv4:10.0.0.5:41234".
+        address: for people: "10.0.0.5:41234", or "local socket" for a Unix one.
+        host: the address without its port.
+        ip: IPv4 also where IPv6 carries it (RFC 4291 2.5.5.2); None for a Unix socket.
+        site: what one sender can't change at will, see `address_prefix`.
+    """
+
+    connection: str
+    address: str
+    host: str
+    ip: str | None
+    site: str
+
+
+@lru_cache(maxsize=_REMEMBERED_CONNECTIONS)
+def peer_of(connection: str) -> Peer:
+    """Returns the peer that gRPC calls `connection`."""
+    scheme, _, rest = unquote(connection).partition(":")
+    if scheme not in {"ipv4", "ipv6"}:
+        return Peer(connection, _LOCAL_SOCKET, _LOCAL_SOCKET, None, _LOCAL_SOCKET)
+    host = rest.rpartition(":")[0].strip("[]") or rest
+    ip = host.removeprefix("::ffff:") if "." in host else host
+    return Peer(connection, rest, host, ip, address_prefix(host))
+
+
+class CallContext(Call):
+    """What interceptors and handlers know of a call.
+
+    Attributes:
+        method: as the schema describes it.
+        peer: where the call comes from.
+        principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
+        request: the newest message of the caller; None before the first.
+        responded: whether a message has left for the caller.
+    """
+
+    __slots__ = ("method", "peer", "principal", "request", "responded")
+
+    principal: Principal | None
+    request: Message | None
+
+    def __init__(self, path: str, rpc: RpcContext, *, streaming: bool) -> None:
+        super().__init__(path, rpc, streaming=streaming)
+        self.method = method_at(path)
+        self.peer = peer_of(rpc.peer())
+        self.principal = None
+        self.request = None
+        self.responded = False
+
+    @property
+    def request_id(self) -> str:
+        """The ID that the caller gave the call in its metadata, or one of our own."""
+        return request_id.current()
+
+    def remaining_s(self) -> float | None:
+        """Returns the time until the caller's deadline; None without one."""
+        return self.rpc.time_remaining()

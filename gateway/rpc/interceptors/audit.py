@@ -1,0 +1,102 @@
+"""Records every control action: who asked for what, from where, and with what result."""
+
+import asyncio
+from typing import Any, Final
+
+from google.protobuf import text_format
+from google.protobuf.message import Message
+
+from common.errors import DomainError, NotAllowedError, NotAuthenticatedError, TooMuchError
+from common.interceptors import Interceptor
+from gateway.access.refusal_limiter import RefusalLimiter
+from gateway.rpc.call import CallContext
+from gateway.rpc.ports import AuditTrail, EventSink
+from gateway.status.event import ControlAction, ControlResult, Event
+from gateway.status.fault import Severity
+
+_COMPONENT: Final = "gateway"
+_MAX_TEXT: Final = 200
+"""Characters of a request or an answer: a request may be as long as its sender likes."""
+
+
+class Audit(Interceptor[CallContext]):
+    """Records control actions, and those that `Auth`, one further in, refused.
+
+    Args:
+        events: operators see the actions there.
+        trail: keeps them.
+        refusals: limits how many refusals of one caller are recorded: a flood of them must fill neither.
+    """
+
+    def __init__(self, events: EventSink, trail: AuditTrail, refusals: RefusalLimiter) -> None:
+        self._events = events
+        self._trail = trail
+        self._refusals = refusals
+        self._answers: dict[CallContext, str] = {}
+
+    def on_response(self, call: CallContext, response: Any) -> None:
+        """Keeps what the caller is answered until the call ends."""
+        if call.method.changes_robot:
+            self._answers[call] = getattr(response, "message", "")
+
+    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+        """Records the action, unless it was refused too often, or for its rate."""
+        answer = self._answers.pop(call, "")
+        if not call.method.changes_robot:
+            return
+        if isinstance(error, NotAuthenticatedError | NotAllowedError):
+            left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
+            if left_out is None:
+                return
+            more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
+            self._record(call, ControlResult.REFUSED, f"{error}{more}")
+        elif isinstance(error, TooMuchError):
+            return
+        elif isinstance(error, DomainError):
+            self._record(call, ControlResult.REFUSED, str(error))
+        elif isinstance(error, asyncio.CancelledError | GeneratorExit):
+            self._record(call, ControlResult.ACCEPTED, "the caller left before the answer")
+        elif error is not None:
+            self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
+        else:
+            self._record(call, ControlResult.ACCEPTED, answer)
+
+    def _record(self, call: CallContext, result: ControlResult, answer: str) -> None:
+        principal = call.principal
+        action = ControlAction(
+            who=principal.name if principal else "",
+            address=call.peer.address,
+            method=call.method.name,
+            request=_shortened(_as_text(call.request)) if call.request else "",
+            result=result,
+            answer=_shortened(answer),
+            role=principal.role.value if principal else "",
+            credential=principal.credential_ids[0] if principal else "",
+            request_id=call.request_id,
+        )
+        self._trail.record(action)
+        self._events.note(control_event(action))
+
+
+def control_event(action: ControlAction) -> Event:
+    """Returns the event that shows an action to operators."""
+    request = f" ({action.request})" if action.request else ""
+    who = action.who or action.address
+    message = f"{who} called {action.method}{request}, {action.result.value}: {action.answer}"
+    severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING
+    return Event(severity, _COMPONENT, message, action)
+
+
+def _as_text(request: Message) -> str:
+    """Fields at their default are left out, except for a bool: `enabled: false` is an order, too."""
+    false = [
+        f"{each.name}: false"
+        for each in request.DESCRIPTOR.fields
+        if each.type == each.TYPE_BOOL and not (each.has_presence or getattr(request, each.name))
+    ]
+    rest = text_format.MessageToString(request, as_one_line=True)
+    return " ".join([*false, rest] if rest else false)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _MAX_TEXT else f"{text[: _MAX_TEXT - 3]}..."

@@ -1,0 +1,188 @@
+"""Authentication and authorization of every call; streams whose credential is revoked end."""
+
+import asyncio
+import hashlib
+import logging
+import ssl
+from functools import lru_cache
+from typing import Final, NoReturn
+
+import grpc
+
+from common.errors import NotAllowedError, NotAuthenticatedError
+from common.grpc_errors import STATUS_CODES, metadata_of
+from common.interceptors import Interceptor, RpcContext
+from common.reasons import Reason
+from gateway.access.authenticator import Authenticator, combined
+from gateway.access.credential import Principal
+from gateway.access.lockout import Lockout
+from gateway.rpc.call import CallContext
+from gateway.rpc.methods import Method, Open
+from gateway.rpc.ports import CredentialFiles, StreamKey
+
+_log = logging.getLogger(__name__)
+
+CHECK_EVERY_S: Final = 0.5
+"""How often the credentials behind open streams are checked."""
+_ABORT_WITHIN_S: Final = 1.0
+"""How long a caller has to take the status of a stream that ends; one that doesn't read gets none."""
+TOKEN_HEADER: Final = "authorization"
+"""Bearer tokens travel as in HTTP (RFC 6750 2.1)."""
+_SCHEME: Final = "bearer"
+_CERTIFICATE: Final = "x509_pem_cert"
+"""gRPC's name of the verified client certificate in `auth_context`."""
+_REMEMBERED_CERTIFICATES: Final = 256
+
+
+class Auth(Interceptor[CallContext]):
+    """Refuses callers without a valid credential, or whose role does not suffice.
+
+    Args:
+        authenticator: knows the credentials.
+        lockout: delays those who show wrong ones.
+        files: read again when an unknown credential is shown.
+        stream_key: renewed when a caller that was admitted loses access.
+        certificates: whether connections show client certificates.
+    """
+
+    def __init__(
+        self,
+        authenticator: Authenticator,
+        lockout: Lockout,
+        files: CredentialFiles,
+        stream_key: StreamKey,
+        *,
+        certificates: bool,
+    ) -> None:
+        self._authenticator = authenticator
+        self._lockout = lockout
+        self._files = files
+        self._stream_key = stream_key
+        self._certificates = certificates
+        self._admitted: dict[tuple[str, ...], Principal] = {}
+        """By their credentials, of which there are as many as the robot has."""
+        self._streams: dict[CallContext, asyncio.Task[object]] = {}
+
+    async def on_call(self, call: CallContext) -> None:
+        """Sets the call's principal.
+
+        Raises:
+            NotAuthenticatedError: no valid credential was shown.
+            NotAllowedError: the method needs another role.
+            TooMuchError: too many wrong credentials came from there.
+        """
+        if call.method.needed is Open.EVERYBODY:
+            return
+        call.principal = principal = await self._authenticate(call)
+        _authorize(principal, call.method)
+        self._admitted[principal.credential_ids] = principal
+        if call.streaming:
+            task = asyncio.current_task()
+            assert task is not None, "gRPC serves each call in a task of its own"
+            self._streams[call] = task
+
+    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+        """Forgets a stream that has ended."""
+        self._streams.pop(call, None)
+
+    async def run(self) -> NoReturn:
+        """Ends the streams of callers that lose access, until cancelled."""
+        while True:
+            await asyncio.sleep(CHECK_EVERY_S)
+            await self.revoke()
+
+    async def revoke(self) -> None:
+        """Ends every stream whose credential is no longer valid, and renews the secret its caller knows."""
+        lost = [ids for ids, each in self._admitted.items() if not self._authenticator.still_valid(each)]
+        for credential_ids in lost:
+            del self._admitted[credential_ids]
+        if lost:
+            self._stream_key.renew_passphrase()
+        valid = self._authenticator.still_valid
+        ending = [call for call in self._streams if call.principal and not valid(call.principal)]
+        await asyncio.gather(*(self._end(call, self._streams.pop(call)) for call in ending))
+
+    async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
+        """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
+        error = NotAuthenticatedError(
+            "the credential that opened this stream is no longer valid", Reason.CREDENTIAL_REVOKED
+        )
+        who = call.principal.name if call.principal else ""
+        _log.info("access: %s of %s ended, its credential is no longer valid", call.method.name, who)
+        code = STATUS_CODES[NotAuthenticatedError]
+        aborting = call.rpc.abort(code, str(error), trailing_metadata=metadata_of(error, code))
+        try:
+            await asyncio.wait_for(aborting, _ABORT_WITHIN_S)
+        except (grpc.aio.BaseError, TimeoutError):
+            # Aborted (grpc.aio raises whenever it has); gone already; or the caller does not read.
+            pass
+        finally:
+            task.cancel()
+
+    async def _authenticate(self, call: CallContext) -> Principal:
+        token = token_of(call.rpc)
+        fingerprint = fingerprint_of(call.rpc) if self._certificates else None
+        if token is None and fingerprint is None:
+            raise NotAuthenticatedError(
+                "this robot asks callers for a credential; type: robotctl login", Reason.CREDENTIAL_MISSING
+            )
+        if not self._knows(token, fingerprint):
+            await self._files.reload_for_unknown()
+        by_certificate = None
+        if fingerprint is not None:
+            by_certificate = self._authenticator.authenticate_certificate(fingerprint)
+        by_token = self._of_token(call, token) if token is not None else None
+        if by_certificate and by_token:
+            return combined(by_certificate, by_token)
+        found = by_certificate or by_token
+        assert found is not None, "one of them was shown"
+        return found
+
+    def _knows(self, token: str | None, fingerprint: str | None) -> bool:
+        return (token is None or bool(self._authenticator.id_of_token(token))) and (
+            fingerprint is None or self._authenticator.knows_certificate(fingerprint)
+        )
+
+    def _of_token(self, call: CallContext, token: str) -> Principal:
+        host, owner = call.peer.host, self._authenticator.id_of_token(token)
+        self._lockout.admit(host, owner)
+        try:
+            principal = self._authenticator.authenticate_token(token)
+        except NotAuthenticatedError as error:
+            # An expired or revoked token is no guess: its secret was right.
+            if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(host, owner):
+                meant = f"credential {owner}" if owner else "no credential of this robot"
+                _log.warning("access: %s shows wrong tokens (%s) and is locked out", host, meant)
+            raise
+        self._lockout.succeeded(host, owner)
+        return principal
+
+
+def token_of(rpc: RpcContext) -> str | None:
+    """Returns the bearer token of a call; None without one, "" for another kind of authorization."""
+    for key, value in rpc.invocation_metadata() or ():
+        if key == TOKEN_HEADER:
+            scheme, _, text = (value if isinstance(value, str) else "").partition(" ")
+            return text.strip() if scheme.lower() == _SCHEME else ""
+    return None
+
+
+def fingerprint_of(rpc: RpcContext) -> str | None:
+    """Returns the SHA-256 of the client certificate, whose key TLS has verified; None without one."""
+    found = rpc.auth_context().get(_CERTIFICATE)
+    return _fingerprint(next(iter(found))) if found else None
+
+
+@lru_cache(maxsize=_REMEMBERED_CERTIFICATES)
+def _fingerprint(pem: bytes) -> str:
+    return hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem.decode("ascii"))).hexdigest()
+
+
+def _authorize(principal: Principal, method: Method) -> None:
+    needed = method.needed
+    if isinstance(needed, Open):
+        raise NotAllowedError(f"{method.name} declares no role, so nobody may call it")
+    if not principal.role.may(needed):
+        raise NotAllowedError(
+            f"{principal.name} is {principal.role.value}, and {method.name} needs {needed.value}"
+        )

@@ -1,0 +1,68 @@
+"""Which operators are present: addresses that have had a stream open for a while; they join and leave."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from common.interceptors import Interceptor
+from gateway.rpc.call import CallContext
+from gateway.rpc.ports import EventSink
+from gateway.status.event import ClientJoined, ClientLeft, Event
+from gateway.status.fault import Severity
+
+JOINED_AFTER_S: Final = 2.0
+"""How long a stream has been open before its client has joined: one look at the status, or a client that
+reconnects
+again and again, is no event."""
+_COMPONENT: Final = "gateway"
+
+
+@dataclass(slots=True)
+class _Client:
+    since_s: float
+    streams: int = 0
+    joined: bool = False
+
+
+class Presence(Interceptor[CallContext]):
+    """Reports clients that join and leave. The innermost interceptor: it sees admitted calls alone.
+
+    Args:
+        events: where it reports.
+        clock: seconds, monotonic.
+    """
+
+    def __init__(self, events: EventSink, clock: Callable[[], float] = time.monotonic) -> None:
+        self._events = events
+        self._clock = clock
+        self._clients: dict[str, _Client] = {}
+
+    async def on_call(self, call: CallContext) -> None:
+        """Counts an open stream of the contract."""
+        if call.streaming and call.method.of_contract:
+            client = self._clients.setdefault(call.peer.address, _Client(self._clock()))
+            client.streams += 1
+
+    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+        """Reports a client that had joined and closes its last stream."""
+        if not (call.streaming and call.method.of_contract):
+            return
+        address = call.peer.address
+        client = self._clients[address]
+        client.streams -= 1
+        if client.streams == 0:
+            del self._clients[address]
+            if client.joined:
+                self._note(f"{address} left", ClientLeft(address))
+
+    def report_joined(self) -> None:
+        """Reports clients that have been here long enough; to be called a few times a second."""
+        before_s = self._clock() - JOINED_AFTER_S
+        for address, client in self._clients.items():
+            if not client.joined and client.since_s <= before_s:
+                client.joined = True
+                self._note(f"{address} joined", ClientJoined(address))
+
+    def _note(self, message: str, detail: ClientJoined | ClientLeft) -> None:
+        self._events.note(Event(Severity.INFO, _COMPONENT, message, detail))

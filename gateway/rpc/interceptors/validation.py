@@ -1,0 +1,71 @@
+"""Parses requests and checks them against the rules that the schema declares (buf.validate)."""
+
+from typing import Any, Final
+
+from google.protobuf.message import DecodeError, Message
+from protovalidate import Validator, Violation
+
+from common.errors import FieldViolation, InvalidRequestError, TooMuchError
+from common.interceptors import Interceptor
+from common.reasons import Reason
+from gateway.rpc.call import CallContext
+
+_VALIDATOR: Final = Validator()
+"""Compiles the rules of each message once."""
+
+
+class Validation(Interceptor[CallContext]):
+    """Turns the bytes of each request into a valid message. The contract's methods alone receive bytes.
+
+    Args:
+        max_request_bytes: a longer request is not parsed.
+    """
+
+    def __init__(self, max_request_bytes: int) -> None:
+        self._max_request_bytes = max_request_bytes
+
+    def on_request(self, call: CallContext, request: Any) -> Any:
+        """Returns the message.
+
+        Raises:
+            TooMuchError: the request is too long.
+            InvalidRequestError: it can't be parsed, or breaks rules; each broken rule is named.
+        """
+        message_type = call.method.request_type
+        if message_type is None:
+            return request
+        if len(request) > self._max_request_bytes:
+            raise TooMuchError(
+                f"a request of {len(request)} bytes is too long; the limit is {self._max_request_bytes}",
+                Reason.MESSAGE_TOO_LARGE,
+            )
+        try:
+            message = message_type.FromString(request)
+        except DecodeError as error:
+            name = message_type.DESCRIPTOR.full_name
+            raise InvalidRequestError(f"the request can't be parsed as {name}") from error
+        call.request = message
+        # A message without fields can't break a rule.
+        if message_type.DESCRIPTOR.fields:
+            validate(message)
+        return message
+
+
+def validate(message: Message) -> None:
+    """Checks a message against its rules.
+
+    Raises:
+        InvalidRequestError: it breaks some; each is named.
+    """
+    found = _VALIDATOR.collect_violations(message)
+    if found:
+        violations = tuple(_field_violation(each) for each in found)
+        sentences = (f"{each.field}: {each.description}".removeprefix(": ") for each in violations)
+        raise InvalidRequestError("; ".join(sentences), violations)
+
+
+def _field_violation(violation: Violation) -> FieldViolation:
+    proto = violation.proto
+    path = proto.field.elements if proto.field else ()
+    field = ".".join(each.field_name or "" for each in path)
+    return FieldViolation(field, proto.message or proto.rule_id or "")

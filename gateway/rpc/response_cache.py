@@ -1,0 +1,48 @@
+"""Serialised responses of the polled methods, shared by all callers that ask within a moment.
+
+An operator's screen polls ten times a second, ten screens a hundred times: computing and serialising the
+same status for each would be most of the gateway's work. A response is reused for REUSE_S at most, so no
+age in it is wrong by more. A preview that changes makes a new one at once: a caller that has just switched
+it sees that.
+"""
+
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+from google.protobuf.message import Message
+
+from gateway.rpc.ports import State
+from gateway.rpc.recipient import Recipient
+from gateway.status.snapshot import Snapshot
+
+REUSE_S: Final = 0.005
+
+Build: TypeAlias = Callable[[Snapshot, Recipient], Message]
+"""A mapping of gateway/rpc/mapping."""
+
+
+class ResponseCache:
+    """The newest responses, by mapping and recipient.
+
+    Args:
+        state: where snapshots come from.
+        clock: seconds, monotonic; the one that snapshots are dated by.
+    """
+
+    def __init__(self, state: State, clock: Callable[[], float]) -> None:
+        self._state = state
+        self._clock = clock
+        self._snapshot = state.snapshot()
+        self._responses: dict[tuple[Build, Recipient], bytes] = {}
+
+    def response(self, build: Build, recipient: Recipient) -> bytes:
+        """Returns what `build` makes of a snapshot of this instant, serialised."""
+        expired = self._clock() - self._snapshot.at_s > REUSE_S
+        if expired or self._state.preview is not self._snapshot.preview:
+            self._snapshot = self._state.snapshot()
+            self._responses.clear()
+        key = (build, recipient)
+        response = self._responses.get(key)
+        if response is None:
+            response = self._responses[key] = build(self._snapshot, recipient).SerializeToString()
+        return response

@@ -1,0 +1,1 @@
+"""One servicer per resource. A handler receives, maps, calls, maps and replies."""

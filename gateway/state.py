@@ -1,0 +1,130 @@
+"""Everything the gateway knows: written by its parts, read as one snapshot."""
+
+import logging
+import secrets
+import time
+from typing import Final, Protocol
+
+from common.broadcast import Broadcast
+from common.version import project_revision, project_version
+from gateway.config import GatewaySettings
+from gateway.observer import Observer
+from gateway.platform.files import boot_id
+from gateway.status.access import UNGUARDED, AccessView
+from gateway.status.board import Board
+from gateway.status.event import Event
+from gateway.status.event_log import EventLog
+from gateway.status.faults.rules import FaultRules
+from gateway.status.faults.tracker import FaultTracker
+from gateway.status.preview import PreviewView
+from gateway.status.runtime import Runtime
+from gateway.status.snapshot import Identity, Snapshot, take
+
+_log = logging.getLogger(__name__)
+
+_RUN_ID_BYTES: Final = 8
+
+
+class PreviewSource(Protocol):
+    """The link to the preview service."""
+
+    @property
+    def view(self) -> PreviewView:
+        """The preview at this instant; a new object whenever it changed."""
+
+
+class CallCounts(Protocol):
+    """Statistics of the calls since the start."""
+
+    @property
+    def served(self) -> int:
+        """Calls that were answered."""
+
+    @property
+    def refused(self) -> int:
+        """Calls that were refused."""
+
+    def client_count(self) -> int:
+        """Returns how many connections are active."""
+
+
+class State:
+    """The board, the events and the faults. Used on the event loop; other threads write to the board only.
+
+    Args:
+        settings: what is expected of the robot.
+        preview: knows the preview.
+        calls: counts the calls.
+
+    Attributes:
+        event_added: notified after each event.
+        access: of the newest look at it.
+    """
+
+    def __init__(self, settings: GatewaySettings, preview: PreviewSource, calls: CallCounts) -> None:
+        faults = settings.faults
+        self._identity = Identity(
+            settings.name, project_version(), settings.security.insecure and not settings.security.guarded
+        )
+        self._rules = settings.status_rules()
+        self._preview = preview
+        self._calls = calls
+        self._revision, self._boot_id = project_revision(), boot_id()
+        self._started_s = time.monotonic()
+        self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
+        self._observer = Observer(
+            self._tracker,
+            FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000, faults.expiry_days),
+        )
+        self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
+        self.event_added = Broadcast()
+        self.access: AccessView = UNGUARDED
+
+    @property
+    def preview(self) -> PreviewView:
+        """The preview at this instant; a new object whenever it changed."""
+        return self._preview.view
+
+    def snapshot(self) -> Snapshot:
+        """Returns everything at this instant, from memory."""
+        now_s = time.monotonic()
+        return take(
+            identity=self._identity,
+            gateway=self._runtime(now_s),
+            rules=self._rules,
+            board=self.board,
+            preview=self._preview.view,
+            events=self.events.newest(),
+            faults=self._tracker.faults,
+            now_s=now_s,
+            access=self.access,
+        )
+
+    def observe(self, access: AccessView) -> Snapshot:
+        """Updates faults and events from a snapshot of this instant, and returns that.
+
+        Args:
+            access: the state of credentials and audit log at this instant.
+        """
+        self.access = access
+        now = self.snapshot()
+        for event in self._observer.observe(now):
+            self.note(event)
+        return now
+
+    def note(self, event: Event) -> None:
+        """Adds an event of this instant."""
+        _log.info("event: %s", event.sentence or event.message)
+        self.events.add(event, time.monotonic())
+        self.event_added.notify_all()
+
+    def _runtime(self, now_s: float) -> Runtime:
+        return Runtime(
+            revision=self._revision,
+            boot_id=self._boot_id,
+            uptime_ms=int((now_s - self._started_s) * 1000),
+            client_count=self._calls.client_count(),
+            requests_served=self._calls.served,
+            requests_refused=self._calls.refused,
+            run_id=self.events.run_id,
+        )

@@ -1,0 +1,103 @@
+"""The state of every configured source for operators: whether it is received, and if not, why."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from gateway.status.board import Publishers
+from gateway.status.freshness import Freshness
+from gateway.status.sources import SourceSpec
+
+
+class SourceState(Enum):
+    """State of a source at one instant."""
+
+    WAITING = "waiting"
+    """Nothing was received, and it has no publisher."""
+    SILENT = "silent"
+    """It has a publisher, but nothing was received."""
+    RECEIVING = "receiving"
+    STALE = "stale"
+    """The newest value is too old."""
+    QOS_MISMATCH = "qos_mismatch"
+    """The QoS of every publisher is incompatible with the gateway's."""
+    WRONG_TYPE = "wrong_type"
+    """Every publisher has another message type than configured."""
+    TYPE_MISSING = "type_missing"
+    """The message type is not installed beside the gateway."""
+
+
+@dataclass(frozen=True, slots=True)
+class SourceView:
+    """One configured source at one instant; `detail` explains the state, empty if all is well."""
+
+    spec: SourceSpec[Any]
+    state: SourceState
+    freshness: Freshness
+    required: bool
+    detail: str
+
+    @property
+    def name(self) -> str:
+        """Unique, stable name for programs."""
+        return self.spec.name
+
+
+_SENTENCES: Final[Mapping[SourceState, str]] = {
+    SourceState.WAITING: "no {name} since the gateway started, and nothing on the robot publishes it",
+    SourceState.SILENT: "the robot offers {name}, but nothing has arrived",
+    SourceState.RECEIVING: "",
+    SourceState.STALE: "{name} stopped coming",
+    SourceState.QOS_MISMATCH: "the robot offers {name} with delivery guarantees that exclude the gateway's",
+    SourceState.WRONG_TYPE: "the robot offers {name} in another form than the gateway is configured for",
+    SourceState.TYPE_MISSING: "{name} can't be read: its message type is not installed beside the gateway",
+}
+"""Total: a sentence for every state. It names no topic, node or type: those are the robot's own affair."""
+
+
+def source_view(
+    spec: SourceSpec[Any],
+    freshness: Freshness,
+    publishers: Publishers | None,
+    *,
+    required: bool,
+    unusable: bool,
+) -> SourceView:
+    """Returns the view of one source.
+
+    Args:
+        spec: the source.
+        freshness: of its newest value.
+        publishers: None before the graph was examined.
+        required: whether the configuration requires it.
+        unusable: whether it can't be subscribed.
+    """
+    state = _state(freshness, publishers, unusable=unusable)
+    return SourceView(spec, state, freshness, required, detail(state, spec.display_name, publishers))
+
+
+def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
+    """Returns the sentence on a source that people know by `name`; empty if all is well."""
+    if state is SourceState.RECEIVING and publishers and publishers.count > 1:
+        return f"{publishers.count} programs publish {name}: the values shown may be from any of them"
+    if state is SourceState.STALE and publishers and publishers.count == 0:
+        return f"{name} stopped coming: nothing on the robot publishes it any more"
+    if state is SourceState.QOS_MISMATCH and publishers:
+        return f"{_SENTENCES[state].format(name=name)}: {publishers.qos_mismatch}"
+    return _SENTENCES[state].format(name=name)
+
+
+def _state(freshness: Freshness, publishers: Publishers | None, *, unusable: bool) -> SourceState:
+    if unusable:
+        return SourceState.TYPE_MISSING
+    if freshness.fresh:
+        return SourceState.RECEIVING
+    if publishers and publishers.count:
+        if publishers.wrong_type:
+            return SourceState.WRONG_TYPE
+        if publishers.qos_mismatch:
+            return SourceState.QOS_MISMATCH
+        if not freshness.available:
+            return SourceState.SILENT
+    return SourceState.STALE if freshness.available else SourceState.WAITING

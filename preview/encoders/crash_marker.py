@@ -1,0 +1,103 @@
+"""Crash marker: which encoder was in use when the previous process crashed or hung.
+
+A driver can end this process, by a crash or by a hang that only the end of the process resolves. The encoder
+would prove itself in the next process's trial, be used and end that process, too; the marker makes the next
+process pass it over for a while. A process that was killed from outside (SIGKILL, SIGTERM) blames no encoder.
+
+Two files in the runtime directory: the marker, written when an encoder starts and removed when it has stopped
+properly, and the report that Python's fault handler writes on SIGSEGV, SIGABRT, SIGBUS, SIGFPE and SIGILL.
+"""
+
+import faulthandler
+import json
+import logging
+from pathlib import Path
+from typing import IO, Final
+
+from preview.encoders.selection import Selection
+
+_log = logging.getLogger(__name__)
+
+_MARKER: Final = "encoder-in-use.json"
+_REPORT: Final = "crash.txt"
+_IN_USE: Final = ""
+"""Reason of a marker that blames the encoder only together with a crash report."""
+
+
+class CrashMarkerFile:
+    """The marker of this process, and what the previous one left.
+
+    Args:
+        directory: runtime directory, created when missing. When it is not writable, a warning is logged and
+            the next process must find out by itself.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._marker = directory / _MARKER
+        self._report = directory / _REPORT
+        self._report_file: IO[bytes] | None = None
+
+    def blame_previous(self, selection: Selection) -> None:
+        """Has the encoder that ended the previous process passed over; starts this process's crash report."""
+        crash = self.begin_report()
+        try:
+            marker = json.loads(self._marker.read_text(encoding="utf-8"))
+            name, reason = str(marker["encoder"]), str(marker["why"])
+        except FileNotFoundError:
+            return
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            _log.warning("the crash marker %s can't be read: %s", self._marker, error)
+            return
+        self.clear()
+        if reason == _IN_USE and not crash:
+            _log.info("the previous process was ended from outside while encoder %s was in use", name)
+            return
+        reason = reason or f"the process crashed while it was in use ({crash})"
+        text = f"encoder {name} is passed over: {reason}"
+        _log.warning("%s", text)
+        selection.pass_over(name, text)
+
+    def begin_report(self) -> str:
+        """Enables the crash report of this process.
+
+        Returns:
+            The cause of the previous process's crash, for example "Segmentation fault"; empty for none.
+        """
+        previous = ""
+        try:
+            self._report.parent.mkdir(parents=True, exist_ok=True)
+            if self._report.exists():
+                previous = _cause(self._report.read_text(encoding="utf-8", errors="replace"))
+            # Kept open: on a signal the handler can only write to an open file.
+            self._report_file = self._report.open("wb")
+        except OSError as error:
+            _log.warning("no crash report in %s: %s", self._report, error)
+        else:
+            faulthandler.enable(self._report_file, all_threads=False)
+        return previous
+
+    def set(self, encoder: str, reason: str = _IN_USE) -> None:
+        """Writes the marker.
+
+        Args:
+            encoder: name of the encoder that is about to be used, or that hangs.
+            reason: what it did, for people. Empty: nothing yet; counts only if this process crashes.
+        """
+        try:
+            self._marker.parent.mkdir(parents=True, exist_ok=True)
+            self._marker.write_text(json.dumps({"encoder": encoder, "why": reason}), encoding="utf-8")
+        except OSError as error:
+            _log.warning("no crash marker for encoder %s in %s: %s", encoder, self._marker, error)
+
+    def clear(self) -> None:
+        """Removes the marker: no encoder is in use."""
+        try:
+            self._marker.unlink(missing_ok=True)
+        except OSError as error:
+            _log.warning("the crash marker %s can't be removed: %s", self._marker, error)
+
+
+def _cause(report: str) -> str:
+    """Returns CAUSE of the first line "Fatal Python error: CAUSE"."""
+    first = report.partition("\n")[0]
+    return first.partition(": ")[2] or first

@@ -1,0 +1,113 @@
+"""Selection of the encoder: the first one in the order that is proven and has not failed since. Pure."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from common.errors import UserError
+from preview.encoders.catalogue import Encoder
+from preview.values import EncoderChoice
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Result of the trial of an encoder.
+
+    Args:
+        present: whether the element exists on this machine.
+        proven: whether it encoded frames.
+        reason: why it is not present or not proven, for people; empty when proven.
+        first_byte_ms: time from the first frame in to the first byte out; None when not proven.
+    """
+
+    present: bool
+    proven: bool
+    reason: str = ""
+    first_byte_ms: float | None = None
+
+
+class Prober(Protocol):
+    """Runs trials of encoders and caches the results."""
+
+    @property
+    def verdicts(self) -> Mapping[str, Verdict]:
+        """Results so far, by encoder name."""
+
+    async def verdict(self, encoder: Encoder) -> Verdict:
+        """Returns the result for one encoder; runs its trial when there is none."""
+
+
+class Selection:
+    """Chooses encoders and remembers those that failed in a pipeline.
+
+    Args:
+        order: allowed encoders, best first.
+        forgive_after_s: how long a failed encoder is passed over.
+        prober: runs the trials.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        order: Sequence[Encoder],
+        forgive_after_s: float,
+        prober: Prober,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._order = tuple(order)
+        self._forgive_after_s = forgive_after_s
+        self._prober = prober
+        self._clock = clock
+        self._failures: dict[str, tuple[str, float]] = {}
+        """Reason and time of each failure, by encoder name."""
+
+    def pass_over(self, name: str, reason: str) -> None:
+        """Excludes an encoder that failed in a pipeline, for `forgive_after_s`."""
+        self._failures[name] = (reason, self._clock())
+
+    async def probe(self) -> bool:
+        """Runs trials in order until an encoder is proven that has not failed; False when there is none."""
+        for encoder in self._order:
+            await self._prober.verdict(encoder)
+            if any(proven.name not in self._failures for proven in self._proven()):
+                return True
+        return False
+
+    def choose(self) -> tuple[Encoder, EncoderChoice]:
+        """Returns the encoder to use, and the choice as reported in the status; to be called after `probe`.
+
+        When all proven encoders have failed, all failures are forgotten: another attempt is better than none.
+
+        Raises:
+            UserError: no encoder is proven.
+        """
+        now = self._clock()
+        recent = {n: (why, at) for n, (why, at) in self._failures.items() if now - at < self._forgive_after_s}
+        proven = self._proven()
+        if not proven:
+            raise UserError(
+                self._why_none(), "'robot-preview encoders' lists what works: add one to encoders.order"
+            )
+        self._failures = {} if all(encoder.name in recent for encoder in proven) else recent
+        chosen = next(encoder for encoder in proven if encoder.name not in self._failures)
+        wanted = self._order[0]
+        reason = "" if chosen is wanted else self._why_not(wanted)
+        return chosen, EncoderChoice(chosen.name, chosen.hardware, wanted.name, reason)
+
+    def _proven(self) -> list[Encoder]:
+        verdicts = self._prober.verdicts
+        return [e for e in self._order if e.name in verdicts and verdicts[e.name].proven]
+
+    def _why_not(self, encoder: Encoder) -> str:
+        if encoder.name in self._failures:
+            return self._failures[encoder.name][0]
+        verdict = self._prober.verdicts.get(encoder.name)
+        return verdict.reason if verdict else f"{encoder.name} was not tried"
+
+    def _why_none(self) -> str:
+        verdicts = self._prober.verdicts
+        names = [encoder.name for encoder in self._order]
+        tried = [f"{n}: {verdicts[n].reason}" for n in names if n in verdicts and verdicts[n].present]
+        found = "; ".join(tried) or "none of their GStreamer elements is installed"
+        return f"no encoder of {', '.join(names)} works ({found})"

@@ -1,0 +1,121 @@
+"""Sources: each kind as the first elements of a pipeline, checked before use.
+
+Pure: a source is a GStreamer description, property values that can't be quoted into it, and the remedy for
+its failure.
+"""
+
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from common.errors import UserError
+from preview.config import FileSource, GstSource, TestSource, V4l2Source
+
+CLASS_DIR = Path("/sys/class/video4linux")
+
+_REMEDY_CAMERA = "Check that the camera is connected and that this user may read it (group video)"
+_REMEDY_FILE = "Name a video file that this user may read, under source.path"
+_REMEDY_GST = "Try it with gst-launch-1.0, and correct source.description"
+
+
+@dataclass(frozen=True, slots=True)
+class SourcePlan:
+    """First elements of a pipeline.
+
+    Args:
+        label: name for people.
+        description: elements in the syntax of gst-launch, ending in raw video.
+        remedy: what to do when it fails.
+        properties: element name in the description -> property -> value, set after parsing.
+        any_rate: generates any size and frame rate; other sources are converted.
+        capture_fps: frame rate to negotiate with the source. None: its own.
+        loops: restarts at its end.
+    """
+
+    label: str
+    description: str
+    remedy: str
+    properties: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    any_rate: bool = False
+    capture_fps: int | None = None
+    loops: bool = False
+
+
+def plan(source: TestSource | V4l2Source | FileSource | GstSource, fastest_fps: int) -> SourcePlan:
+    """Returns the first elements for a configured source.
+
+    Args:
+        source: section of the configuration.
+        fastest_fps: frame rate of the fastest profile.
+
+    Raises:
+        UserError: the source can't be used: it is missing, unreadable or of another type.
+    """
+    match source:
+        case TestSource():
+            description = "videotestsrc is-live=true horizontal-speed=4"
+            return SourcePlan("test pattern", description, "", any_rate=True)
+        case V4l2Source():
+            return _camera(source, fastest_fps)
+        case FileSource():
+            return _file(source.path)
+        case GstSource():
+            return SourcePlan("source.description", source.description, _REMEDY_GST)
+
+
+def _camera(source: V4l2Source, fastest_fps: int) -> SourcePlan:
+    device = source.device or find_card(source.card)
+    try:
+        mode = Path(device).stat().st_mode
+    except OSError as error:
+        raise UserError(f"camera {device} can't be used: {error.strerror}", _REMEDY_CAMERA) from error
+    if not stat.S_ISCHR(mode):
+        raise UserError(f"camera {device} is not a device", "Name a device such as /dev/video11")
+    return SourcePlan(
+        f"camera {device}",
+        "v4l2src name=camera do-timestamp=true",
+        _REMEDY_CAMERA,
+        properties={"camera": {"device": device}},
+        capture_fps=source.fps or fastest_fps,
+    )
+
+
+def find_card(card: str, class_dir: Path = CLASS_DIR) -> str:
+    """Returns the device node of a card, the one with the lowest number when it has several.
+
+    Raises:
+        UserError: there is no such card; the error lists the existing ones.
+    """
+    names = {entry: _card_name(entry) for entry in class_dir.glob("video*")}
+    matches = [entry.name for entry, name in names.items() if name == card]
+    if matches:
+        return f"/dev/{min(matches, key=lambda name: int(name.removeprefix('video')))}"
+    found = ", ".join(sorted(set(filter(None, names.values())))) or "none"
+    raise UserError(f"no camera is called '{card}' (found: {found})", _REMEDY_CAMERA)
+
+
+def _card_name(entry: Path) -> str:
+    try:
+        return (entry / "name").read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return ""  # Unplugged in the meantime.
+
+
+def _file(path: Path) -> SourcePlan:
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except OSError as error:
+        raise UserError(f"video file {path} can't be read: {error.strerror}", _REMEDY_FILE) from error
+    if empty:
+        raise UserError(f"video file {path} is empty", _REMEDY_FILE)
+    return SourcePlan(
+        f"video file {path}",
+        # Only video is decoded; clocksync plays it at its own speed.
+        'filesrc name=file ! decodebin caps="video/x-raw(ANY)" expose-all-streams=false'
+        " ! clocksync name=pace",
+        _REMEDY_FILE,
+        properties={"file": {"location": str(path)}},
+        loops=True,
+    )

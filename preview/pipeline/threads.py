@@ -1,0 +1,48 @@
+"""The two ways between the event loop and other threads.
+
+GStreamer's threads only schedule calls on the loop, and calls that may block run in a thread of their own.
+Everything else in the service runs on the asyncio loop.
+"""
+
+import asyncio
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def call_on_loop(loop: asyncio.AbstractEventLoop, callback: Callable[..., None], *arguments: Any) -> None:
+    """Schedules a call on the loop, from any thread; ignored when the loop is closed.
+
+    The only thing that a streaming thread may do besides its work on the stream.
+    """
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(callback, *arguments)
+
+
+async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
+    """Runs a call that may block, or never return, in a daemon thread of its own, and returns its result.
+
+    Raises:
+        TimeoutError: no result within `deadline_s`. The thread is left behind and does not keep the process
+            from exiting.
+    """
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[T] = loop.create_future()
+
+    def settle(set_outcome: Callable[[Any], None], outcome: Any) -> None:
+        if not done.done():
+            set_outcome(outcome)
+
+    def run() -> None:
+        try:
+            result = work()
+        except BaseException as error:  # noqa: BLE001  # raised again by the awaiting coroutine
+            call_on_loop(loop, settle, done.set_exception, error)
+        else:
+            call_on_loop(loop, settle, done.set_result, result)
+
+    threading.Thread(target=run, name="blocking-call", daemon=True).start()
+    return await asyncio.wait_for(done, deadline_s)

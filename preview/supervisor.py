@@ -1,0 +1,427 @@
+"""Reconciles the preview with its desired state. The only owner of the lifecycle and of the pipeline.
+
+Every event (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on the
+loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway never
+waits for a pipeline, and no two state changes of a pipeline overlap.
+
+What can fail, how it is noticed, and what follows:
+
+| failure | noticed by | follows |
+|---|---|---|
+| no encoder works | selection: UserError | FAULTED, retry with backoff |
+| source unusable, element missing | building: UserError | FAULTED, retry with backoff |
+| port in use, address not local | ERROR of the listener | FAULTED, retry with backoff |
+| source fails or ends | ERROR of the source, EOS | FAULTED, retry with backoff; a file loops instead |
+| source stalls | watchdog: no frames come in | FAULTED, retry with backoff |
+| encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
+| encoder is silent, or gives empty buffers | watchdog: frames go in, none come out | next encoder at once |
+| encoder's driver blocks a start or an adjustment | deadline of the call | next encoder at once |
+| last proven encoder fails | as above, and no alternative | FAULTED, retry with backoff |
+| pipeline fails again after running steadily | 15 s in RUNNING before it | backoff starts again at 1 s |
+| pipeline fails while it is being stopped | its fault, in STOPPING | logged, otherwise ignored |
+| encoder hangs after a fault | teardown not finished after 0.3 s | left behind, port and source are free |
+| encoder hangs when the preview is disabled | teardown not finished in time | crash marker, HungError |
+| source or listener hangs when stopped | HungError of the pipeline | HungError |
+| driver crashes the process | crash marker of the encoder in use | next process passes the encoder over |
+| hardware preferred, only x264 works | selection | runs, and last_error says so |
+| gateway is gone | no watcher for without_gateway_s | disabled until the next request |
+
+HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
+or vanished viewer is no failure: the listener drops it, and the others notice nothing. When another encoder
+takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some tenths of a
+second and must reconnect, to a stream of possibly another codec.
+"""
+
+import asyncio
+import logging
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, Protocol
+
+from common.errors import UserError
+from preview.config import PreviewSettings
+from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.lifecycle import Event, Lifecycle, State
+from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.plan import Plan, make_plan
+from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState, Target
+
+_log = logging.getLogger(__name__)
+
+GRAPH: Final = "last-fault.dot"
+"""File in the runtime directory: the graph of the last failed pipeline."""
+STEADY_AFTER_S: Final = 15.0
+"""A pipeline that ran this long has recovered: the backoff starts again."""
+ENCODER_STOP_S: Final = 0.3
+"""How long the next pipeline waits for the encoder of a failed one."""
+
+
+class Pipeline(Protocol):
+    """One pipeline; `preview.pipeline.runner.Runner` is the real one."""
+
+    @property
+    def plan(self) -> Plan:
+        """What it is made of."""
+
+    @property
+    def stream(self) -> StreamState:
+        """Parameters of the stream being served."""
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """Newest statistics; None before the first window."""
+
+    async def start(self) -> None:
+        """Starts it. Failures are reported as events, also after this has returned."""
+
+    async def switch(self, profile: Profile, target: Target) -> None:
+        """Switches to another profile; viewers stay connected."""
+
+    async def stop(self) -> "asyncio.Task[bool]":
+        """Stops listener and source, and returns the teardown of the encoder; False when that hangs.
+
+        Raises:
+            HungError: the listener or the source hangs.
+        """
+
+    async def write_graph(self, path: Path) -> None:
+        """Writes its graph, for finding the cause of a fault."""
+
+
+class PipelineFactory(Protocol):
+    """Builds pipelines."""
+
+    def __call__(self, plan: Plan, events: PipelineEvents) -> Pipeline:
+        """Returns a pipeline that is not yet started.
+
+        Raises:
+            UserError: the pipeline can't be built.
+        """
+
+
+class EncoderSelector(Protocol):
+    """Knows which encoders work; `preview.encoders.selection.Selection` is the real one."""
+
+    async def probe(self) -> bool:
+        """Tries encoders until one works that has not failed; False when there is none."""
+
+    def choose(self) -> tuple[Encoder, EncoderChoice]:
+        """Returns the encoder to use.
+
+        Raises:
+            UserError: none works.
+        """
+
+    def pass_over(self, name: str, reason: str) -> None:
+        """Excludes an encoder for a while."""
+
+
+class CrashMarker(Protocol):
+    """Names the encoder to blame if this process dies; `crash_marker.CrashMarkerFile` is the real one."""
+
+    def set(self, encoder: str, reason: str = "") -> None:
+        """Marks an encoder as in use, or as the one that hangs because of `reason`."""
+
+    def clear(self) -> None:
+        """Removes the mark."""
+
+
+class Supervisor:
+    """The preview.
+
+    Args:
+        settings: of the service.
+        encoders: chooses the encoder of each pipeline.
+        marker: informs the next process if an encoder ends this one.
+        new_pipeline: builds pipelines.
+    """
+
+    def __init__(
+        self,
+        settings: PreviewSettings,
+        encoders: EncoderSelector,
+        marker: CrashMarker,
+        new_pipeline: PipelineFactory,
+    ) -> None:
+        self._settings = settings
+        self._encoders = encoders
+        self._marker = marker
+        self._new_pipeline = new_pipeline
+        self._instance_id = uuid.uuid4().hex
+        self._lifecycle = Lifecycle()
+        self._desired = DesiredState()
+        self._last_error = ""
+        self._pipeline: Pipeline | None = None
+        self._teardowns: dict[asyncio.Task[bool], str] = {}
+        """Encoders that have not stopped yet, by their teardown."""
+        self._running_since = 0.0
+        self._encoder_failed = False
+        self._retry_now = False
+        self._retry_timer: asyncio.TimerHandle | None = None
+        self._watchers = 0
+        self._unwatched_timer: asyncio.TimerHandle | None = None
+        self._wake = asyncio.Event()
+        self._changed = asyncio.Event()
+
+    # --- for the gateway ---
+
+    def apply(self, desired: DesiredState) -> ActualState:
+        """Accepts a desired state and returns the actual state at this moment.
+
+        The same revision again is the same request and changes nothing.
+        """
+        if desired.revision != self._desired.revision or desired.revision == 0:
+            profile = desired.profile if desired.enabled else self._desired.profile
+            self._desired = replace(desired, profile=profile)
+            mode = f"on, {profile.value}" if desired.enabled else "off"
+            _log.info("desired state %d: %s", desired.revision, mode)
+            self._follow_desired(new_request=True)
+        self._restart_unwatched_timer()
+        return self.actual()
+
+    def actual(self) -> ActualState:
+        """Returns the actual state."""
+        pipeline = self._pipeline
+        return ActualState(
+            instance_id=self._instance_id,
+            applied_revision=self._desired.revision,
+            state=self._lifecycle.state,
+            profile=pipeline.plan.profile if pipeline else self._desired.profile,
+            last_error=self._last_error,
+            counters=self._lifecycle.counters,
+            port=self._settings.srt.port,
+            latency_ms=self._settings.srt.latency_ms,
+            stream=pipeline.stream if pipeline else None,
+            encoder=pipeline.plan.choice if pipeline else None,
+            measurement=pipeline.measurement if pipeline else None,
+        )
+
+    @property
+    def changed(self) -> asyncio.Event:
+        """Set at the next change of the actual state; to be fetched anew before each reading of it."""
+        return self._changed
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Counts as a gateway that watches the service."""
+        self._watchers += 1
+        self._restart_unwatched_timer()
+        try:
+            yield
+        finally:
+            self._watchers -= 1
+            self._restart_unwatched_timer()
+
+    # --- reconciling: the pipeline follows the lifecycle; only the task of run() does this ---
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Reconciles until `stop`, then leaves no pipeline behind.
+
+        Raises:
+            HungError: a driver hangs; the process must end.
+        """
+        stopped = asyncio.create_task(stop.wait(), name="stop")
+        stopped.add_done_callback(lambda _: self._wake.set())
+        while not stop.is_set():
+            await self._wake.wait()
+            self._wake.clear()
+            await self._reconcile()
+        self._desired = replace(self._desired, enabled=False)
+        self._follow_desired(new_request=False)
+        await self._reconcile()
+
+    async def _reconcile(self) -> None:
+        while await self._step():
+            self._publish()
+
+    async def _step(self) -> bool:
+        """Does one thing that the lifecycle's state requires; False when there is none."""
+        pipeline, profile = self._pipeline, self._desired.profile
+        match self._lifecycle.state:
+            case State.STOPPING:
+                await self._finish_stopping()
+            case State.FAULTED:
+                return await self._recover()
+            case State.STARTING if pipeline is None:
+                await self._start()
+            case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
+                await self._switch_profile(pipeline)
+            case _:
+                return False
+        return True
+
+    async def _start(self) -> None:
+        await self._encoders.probe()
+        if self._lifecycle.state is not State.STARTING:
+            return
+        try:
+            encoder, choice = self._encoders.choose()
+            plan = make_plan(self._settings, self._desired, encoder, choice)
+            self._report_software_fallback(choice)
+            pipeline = self._pipeline = self._new_pipeline(plan, self)
+        except UserError as error:
+            self.failed(Fault(Blame.OTHER, str(error)))
+            return
+        self._retry_now = False
+        self._marker.set(encoder.name)
+        await pipeline.start()
+
+    def _report_software_fallback(self, choice: EncoderChoice) -> None:
+        """Software encoding on a robot with hardware encoders is an error, even though frames flow."""
+        if CATALOGUE[choice.wanted].hardware and not choice.hardware:
+            self._last_error = (
+                f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
+            )
+            _log.warning("%s", self._last_error)
+
+    async def _switch_profile(self, pipeline: Pipeline) -> None:
+        profile = self._desired.profile
+        _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
+        await pipeline.switch(profile, self._settings.profiles.targets[profile])
+
+    async def _recover(self) -> bool:
+        """Tears the failed pipeline down and arranges what follows; False when only waiting is left."""
+        if self._pipeline:
+            await self._pipeline.write_graph(self._settings.runtime_dir / GRAPH)
+            await self._tear_down(self._pipeline, wait_s=ENCODER_STOP_S)
+        if self._encoder_failed:
+            self._encoder_failed = False
+            if await self._encoders.probe():
+                self._lifecycle.count_fallback()
+                self._retry_now = True
+        if not self._desired.enabled:
+            self._move(Event.DISABLE)
+        elif self._retry_now:
+            self._retry_now = False
+            self._move(Event.RETRY)
+        else:
+            if self._retry_timer is None:
+                delay_s = self._lifecycle.retry_delay_s
+                _log.info("next attempt in %g s", delay_s)
+                self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
+            return False
+        return True
+
+    async def _finish_stopping(self) -> None:
+        if self._pipeline:
+            await self._tear_down(self._pipeline, wait_s=None)
+        if not self._desired.enabled:
+            await self._join_teardowns()
+        self._move(Event.STOPPED)
+        if self._desired.enabled:
+            # Another passphrase, or enabled again in the meantime.
+            self._last_error = ""
+            self._move(Event.ENABLE)
+
+    async def _tear_down(self, pipeline: Pipeline, wait_s: float | None) -> None:
+        """Stops a pipeline; waits for its encoder for `wait_s`, None: until its own deadline."""
+        teardown = await pipeline.stop()
+        self._teardowns[teardown] = pipeline.plan.encoder.name
+        await asyncio.wait({teardown}, timeout=wait_s)
+        self._pipeline = None
+        self._teardowns = {task: name for task, name in self._teardowns.items() if not _has_finished(task)}
+        if not self._teardowns:
+            self._marker.clear()
+
+    async def _join_teardowns(self) -> None:
+        """Waits for encoders that were left behind.
+
+        Raises:
+            HungError: one of them hangs; the crash marker names it.
+        """
+        if self._teardowns:
+            await asyncio.wait(self._teardowns)
+        hung = [name for task, name in self._teardowns.items() if not _has_finished(task)]
+        self._teardowns.clear()
+        if hung:
+            self._marker.set(hung[0], "it hung when it was stopped")
+            raise HungError(f"encoder {hung[0]} hung when it was stopped")
+
+    # --- events: move the lifecycle, on the loop, at once ---
+
+    def first_frame(self) -> None:
+        """Handles the first frame of the pipeline."""
+        self._running_since = asyncio.get_running_loop().time()
+        self._move(Event.FIRST_FRAME)
+
+    def measured(self) -> None:
+        """Handles new statistics of the pipeline."""
+        running_s = asyncio.get_running_loop().time() - self._running_since
+        if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
+            self._lifecycle.reset_backoff()
+        self._publish()
+
+    def failed(self, fault: Fault) -> None:
+        """Handles the fault of a pipeline, or of the attempt to build one."""
+        _log.error("%s", fault.text)
+        if self._lifecycle.state is State.STOPPING:
+            return
+        self._last_error = fault.text
+        self._move(Event.FAILURE)
+        if fault.blame is Blame.ENCODER and self._pipeline:
+            self._encoders.pass_over(self._pipeline.plan.encoder.name, fault.text)
+            self._encoder_failed = True
+
+    def _retry(self) -> None:
+        self._retry_timer = None
+        self._move(Event.RETRY)
+
+    def _follow_desired(self, *, new_request: bool) -> None:
+        """Moves the lifecycle towards the desired state, as far as no pipeline must be stopped first."""
+        state, torn_down = self._lifecycle.state, self._pipeline is None
+        if not self._desired.enabled:
+            if state is not State.DISABLED and (state is not State.FAULTED or torn_down):
+                self._move(Event.DISABLE)
+        elif state is State.DISABLED or (state is State.FAULTED and torn_down and new_request):
+            if state is State.DISABLED:
+                self._last_error = ""
+            self._move(Event.ENABLE)
+        elif state is State.FAULTED:
+            self._retry_now = self._retry_now or new_request
+        elif self._pipeline and self._pipeline.plan.passphrase != self._desired.passphrase:
+            # A new session: viewers that know the old passphrase must be disconnected.
+            self._move(Event.DISABLE)
+        self._wake.set()
+        self._publish()
+
+    def _restart_unwatched_timer(self) -> None:
+        """Restarts the timer that disables the preview when no gateway watches it."""
+        limit_s = self._settings.timeouts.without_gateway_s
+        if self._unwatched_timer:
+            self._unwatched_timer.cancel()
+            self._unwatched_timer = None
+        if self._watchers == 0 and self._desired.enabled and limit_s > 0:
+            loop = asyncio.get_running_loop()
+            self._unwatched_timer = loop.call_later(limit_s, self._disable_unwatched)
+
+    def _disable_unwatched(self) -> None:
+        self._unwatched_timer = None
+        limit_s = self._settings.timeouts.without_gateway_s
+        self._last_error = f"the preview stopped by itself: no gateway has watched it for {limit_s:g} s"
+        _log.warning("%s", self._last_error)
+        # Revision 0, so that the same revision counts as a new request.
+        self._desired = DesiredState(profile=self._desired.profile)
+        self._follow_desired(new_request=True)
+
+    def _move(self, event: Event) -> None:
+        before = self._lifecycle.state
+        after = self._lifecycle.handle(event)
+        if self._retry_timer and after is not State.FAULTED:
+            self._retry_timer.cancel()
+            self._retry_timer = None
+        if after is not before:
+            _log.info("%s -> %s (%s)", before.value, after.value, event.value)
+        self._wake.set()
+        self._publish()
+
+    def _publish(self) -> None:
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+
+def _has_finished(teardown: "asyncio.Task[bool]") -> bool:
+    """Whether an encoder is stopped; not while it is stopping, nor when it hangs."""
+    return teardown.done() and teardown.result()

@@ -1,0 +1,65 @@
+"""Calls of operators without a server: gRPC's context is a double, everything else is real."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import grpc
+
+from common.interceptors import Chain, Interceptor
+from gateway.rpc.call import CallContext
+from gateway.rpc.methods import CONTRACT
+
+PEER = "ipv4:10.0.0.5:41234"
+
+
+class RpcDouble:
+    """gRPC's context, as far as interceptors look at it."""
+
+    def __init__(self, peer: str, token: str | None) -> None:
+        self._peer = peer
+        self._token = token
+        self.aborted_with: grpc.StatusCode | None = None
+
+    def peer(self) -> str:
+        return self._peer
+
+    def invocation_metadata(self) -> tuple[tuple[str, str], ...]:
+        return () if self._token is None else (("authorization", f"Bearer {self._token}"),)
+
+    def time_remaining(self) -> None:
+        return None
+
+    def code(self) -> grpc.StatusCode | None:
+        return self.aborted_with
+
+    async def abort(self, code: grpc.StatusCode, details: str = "", trailing_metadata: Any = ()) -> None:
+        self.aborted_with = code
+        raise grpc.aio.AbortError(details)
+
+
+def call_of(
+    method: str = "Ping", peer: str = PEER, token: str | None = None, *, streaming: bool = False
+) -> CallContext:
+    rpc: Any = RpcDouble(peer, token)
+    return CallContext(f"/{CONTRACT.full_name}/{method}", rpc, streaming=streaming)
+
+
+async def serve(
+    interceptors: Sequence[Interceptor[Any]],
+    method: str,
+    behavior: Any,
+    request: Any = b"",
+    *,
+    peer: str = PEER,
+    token: str | None = None,
+) -> Any:
+    """What a caller gets: the response, or those of a stream; raises what the call ended with."""
+    chain = Chain(interceptors, CallContext)
+    handlers: Any = chain.service(CONTRACT, {method: behavior})
+    details: Any = SimpleNamespace(method=f"/{CONTRACT.full_name}/{method}")
+    handler: Any = handlers.service(details)
+    rpc = RpcDouble(peer, token)
+    if handler.response_streaming:
+        return [each async for each in handler.unary_stream(request, rpc)]
+    return await handler.unary_unary(request, rpc)

@@ -1,0 +1,125 @@
+"""What the supervisor expects of a pipeline, as tests for the real one and for its double."""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from common.errors import UserError
+from common.free import free_udp_port
+from preview.config import GstSource, PreviewSettings, ProfileSettings, ProfilesSettings, SrtSettings
+from preview.encoders.catalogue import CATALOGUE
+from preview.pipeline.events import Blame, Fault, PipelineEvents
+from preview.pipeline.plan import Plan, make_plan
+from preview.supervisor import Pipeline
+from preview.values import DesiredState, EncoderChoice, Profile, Target
+
+LIVE = "videotestsrc is-live=true"
+FASTER = Target(320, 240, 60, 900, 200)
+
+
+class Events:
+    """Counts events and keeps the faults."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.faults: list[Fault] = []
+        self._changed = asyncio.Event()
+
+    def first_frame(self) -> None:
+        self._count("first_frame")
+
+    def failed(self, fault: Fault) -> None:
+        self.faults.append(fault)
+        self._count("failed")
+
+    def measured(self) -> None:
+        self._count("measured")
+
+    async def wait_for(self, name: str, count: int = 1) -> None:
+        """Waits until an event has come `count` times."""
+        async with asyncio.timeout(20):
+            while self.counts[name] < count:
+                self._changed.clear()
+                await self._changed.wait()
+
+    def _count(self, name: str) -> None:
+        self.counts[name] += 1
+        self._changed.set()
+
+
+def plan_of(description: str, passphrase: str = "") -> Plan:
+    """A small stream of x264."""
+    small = ProfileSettings(width_px=320, height_px=240, bitrate_kbps=600, floor_kbps=150)
+    settings = PreviewSettings(
+        source=GstSource(description=description),
+        profiles=ProfilesSettings(balanced=small),
+        srt=SrtSettings(bind="127.0.0.1", port=free_udp_port(), latency_ms=20),
+    )
+    desired = DesiredState(1, True, Profile.BALANCED, passphrase)
+    return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"))
+
+
+class PipelineContract:
+    """A subclass provides `build`."""
+
+    build: Callable[[Plan, PipelineEvents], Pipeline]
+
+    async def test_it_reports_one_first_frame_and_then_statistics(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE, "correct horse battery"), events)
+        before = pipeline.measurement
+        assert before is None
+        assert not events.counts
+        await pipeline.start()
+        await events.wait_for("measured", 2)
+        assert events.counts["first_frame"] == 1
+        assert pipeline.measurement is not None
+        assert pipeline.measurement.fps > 0
+        stream = pipeline.stream
+        assert (stream.target.width_px, stream.bitrate_kbps, stream.bitrate_reason) == (320, 600, "")
+        assert stream.encrypted
+        assert await (await pipeline.stop())
+        assert not events.faults
+
+    async def test_another_profile_changes_the_running_pipeline(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE), events)
+        await pipeline.start()
+        await events.wait_for("first_frame")
+        await pipeline.switch(Profile.HIGH_QUALITY, FASTER)
+        assert pipeline.plan.profile is Profile.HIGH_QUALITY
+        assert (pipeline.stream.target, pipeline.stream.bitrate_kbps) == (FASTER, 900)
+        await events.wait_for("measured", events.counts["measured"] + 2)
+        assert await (await pipeline.stop())
+        assert events.counts["first_frame"] == 1
+        assert not events.faults
+
+    async def test_a_source_that_ends_is_one_fault_and_the_last_event(self, tmp_path: Path) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(f"{LIVE} num-buffers=5"), events)
+        await pipeline.start()
+        await events.wait_for("failed")
+        counts = dict(events.counts)
+        assert [fault.blame for fault in events.faults] == [Blame.SOURCE]
+        assert "has ended" in events.faults[0].text
+        await pipeline.write_graph(tmp_path / "new" / "graph.dot")
+        assert (tmp_path / "new" / "graph.dot").read_text(encoding="utf-8").startswith("digraph")
+        assert await (await pipeline.stop())
+        assert events.counts == counts
+
+    async def test_nothing_is_reported_once_it_is_being_stopped(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE), events)
+        await pipeline.start()
+        stopping = asyncio.create_task(pipeline.stop())
+        await asyncio.sleep(0)
+        counts = dict(events.counts)
+        assert await (await stopping)
+        assert events.counts == counts
+
+    async def test_what_can_not_be_built_is_an_error_for_people(self) -> None:
+        with pytest.raises(UserError, match="nonsense"):
+            self.build(plan_of("nonsense is-live=true"), Events())

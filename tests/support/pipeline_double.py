@@ -1,0 +1,136 @@
+"""A pipeline without GStreamer: serves imaginary frames, and fails as it is scripted.
+
+It passes the tests of pipeline_contract.py, as the real one does.
+"""
+
+import asyncio
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from common.errors import UserError
+from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.plan import Plan
+from preview.values import Measurement, Profile, StreamState, Target
+
+FIRST_FRAME_S = 0.05
+WINDOW_S = 0.5
+STOP_DEADLINE_S = 3.0
+
+
+@dataclass(frozen=True)
+class Script:
+    """What happens to a pipeline.
+
+    Args:
+        build_error: building it raises this.
+        fault: reported instead of the first frame, or `fault_after_s` after it.
+        fault_after_s: 0: no frame comes.
+        fault_in_switch: reported when the profile is switched.
+        fault_in_stop: reported while it is being stopped.
+        stop_s: how long its encoder takes to stop.
+        encoder_hangs: its encoder never stops.
+        listener_hangs: its listener never stops.
+    """
+
+    build_error: str = ""
+    fault: Fault | None = None
+    fault_after_s: float = 0.0
+    fault_in_switch: Fault | None = None
+    fault_in_stop: Fault | None = None
+    stop_s: float = 0.02
+    encoder_hangs: bool = False
+    listener_hangs: bool = False
+
+
+class PipelineDouble:
+    """One pipeline. A source description with "num-buffers" ends, as GStreamer's would."""
+
+    def __init__(self, plan: Plan, events: PipelineEvents, script: Script | None = None) -> None:
+        self.plan = plan
+        self.measurement: Measurement | None = None
+        self.stopped = False
+        self._events = events
+        self._script = script or _script_of(plan)
+        self._serving: asyncio.Task[None] | None = None
+        if self._script.build_error:
+            raise UserError(self._script.build_error)
+
+    @property
+    def stream(self) -> StreamState:
+        plan = self.plan
+        return StreamState(plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, plan.encrypted)
+
+    async def start(self) -> None:
+        self._serving = asyncio.create_task(self._serve())
+
+    async def switch(self, profile: Profile, target: Target) -> None:
+        self.plan = self.plan.switched(profile, target)
+        if self._script.fault_in_switch:
+            self._fail(self._script.fault_in_switch)
+
+    async def stop(self) -> "asyncio.Task[bool]":
+        if self._script.fault_in_stop:
+            self._fail(self._script.fault_in_stop)
+        self._end()
+        if self._script.listener_hangs:
+            await asyncio.sleep(STOP_DEADLINE_S)
+            raise HungError("the SRT listener hung when it was stopped")
+        self.stopped = True
+        return asyncio.create_task(self._stop_encoder())
+
+    async def write_graph(self, path: Path) -> None:
+        _write(path, "digraph double {}\n")
+
+    async def _serve(self) -> None:
+        script = self._script
+        await asyncio.sleep(FIRST_FRAME_S)
+        if script.fault is None or script.fault_after_s:
+            self._events.first_frame()
+        if script.fault:
+            asyncio.get_running_loop().call_later(script.fault_after_s, self._fail, script.fault)
+        while True:
+            await asyncio.sleep(WINDOW_S)
+            self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
+            self._events.measured()
+
+    def _fail(self, fault: Fault) -> None:
+        if self._end():
+            self._events.failed(fault)
+
+    def _end(self) -> bool:
+        """Ends the frames; False when they had ended before."""
+        serving, self._serving = self._serving, None
+        return serving is not None and serving.cancel()
+
+    async def _stop_encoder(self) -> bool:
+        await asyncio.sleep(STOP_DEADLINE_S if self._script.encoder_hangs else self._script.stop_s)
+        return not self._script.encoder_hangs
+
+
+class PipelineDoubles:
+    """Builds them; the scripts are used in turn, then every pipeline works."""
+
+    def __init__(self, *scripts: Script) -> None:
+        self.built: list[PipelineDouble] = []
+        self._scripts = list(scripts)
+
+    def __call__(self, plan: Plan, events: PipelineEvents) -> PipelineDouble:
+        script = self._scripts.pop(0) if self._scripts else Script()
+        pipeline = PipelineDouble(plan, events, script)
+        self.built.append(pipeline)
+        return pipeline
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def _script_of(plan: Plan) -> Script:
+    if "nonsense" in plan.source.description:
+        return Script(build_error="the pipeline can't be built: no element nonsense")
+    if "num-buffers" in plan.source.description:
+        return replace(
+            Script(), fault=Fault(Blame.SOURCE, f"{plan.source.label} has ended"), fault_after_s=0.2
+        )
+    return Script()

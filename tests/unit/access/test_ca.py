@@ -1,0 +1,77 @@
+"""Certificates have the issuer, names, purposes and validity that TLS verifies."""
+
+import time
+
+import pytest
+from cryptography import x509
+from cryptography.x509.oid import ExtendedKeyUsageOID
+from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
+
+from common.errors import UserError
+from gateway.access.ca import (
+    certificate_info,
+    issue_client_certificate,
+    issue_server_certificate,
+    key_matches,
+    new_ca,
+)
+
+DAY_S = 86_400
+CA = new_ca("lab", 100)
+
+
+def loaded(pem: bytes) -> x509.Certificate:
+    return x509.load_pem_x509_certificate(pem)
+
+
+def test_a_server_certificate_stands_up_to_a_strict_verifier() -> None:
+    pair = issue_server_certificate(CA, "lab", ("lab.local", "10.0.0.5"), 50)
+    verifier = (
+        PolicyBuilder()
+        .store(Store([loaded(CA.certificate)]))
+        .build_server_verifier(x509.DNSName("lab.local"))
+    )
+    assert verifier.verify(loaded(pair.certificate), [])
+    info = certificate_info(pair.certificate)
+    assert info.hosts == ("lab.local", "10.0.0.5")
+    assert info.ends_s - time.time() == pytest.approx(50 * DAY_S, abs=60)
+    begins_s = loaded(pair.certificate).not_valid_before_utc.timestamp()
+    assert begins_s - time.time() == pytest.approx(-DAY_S, abs=60)
+
+
+def test_another_ca_verifies_nothing() -> None:
+    pair = issue_server_certificate(new_ca("lab", 100), "lab", ("lab.local",), 50)
+    verifier = (
+        PolicyBuilder()
+        .store(Store([loaded(CA.certificate)]))
+        .build_server_verifier(x509.DNSName("lab.local"))
+    )
+    with pytest.raises(VerificationError):
+        verifier.verify(loaded(pair.certificate), [])
+
+
+def test_client_and_server_certificates_are_not_interchangeable() -> None:
+    def uses(pem: bytes) -> list[x509.ObjectIdentifier]:
+        return list(loaded(pem).extensions.get_extension_for_class(x509.ExtendedKeyUsage).value)
+
+    client = issue_client_certificate(CA, "anna", 10)
+    server = issue_server_certificate(CA, "lab", ("lab.local",), 10)
+    assert uses(client.certificate) == [ExtendedKeyUsageOID.CLIENT_AUTH]
+    assert uses(server.certificate) == [ExtendedKeyUsageOID.SERVER_AUTH]
+
+
+def test_nothing_outlives_the_ca() -> None:
+    pair = issue_client_certificate(CA, "anna", 1000)
+    assert certificate_info(pair.certificate).ends_s == certificate_info(CA.certificate).ends_s
+
+
+def test_keys_match_their_certificates_and_are_in_no_repr() -> None:
+    one, other = issue_client_certificate(CA, "anna", 1), issue_client_certificate(CA, "anna", 1)
+    assert key_matches(one)
+    assert not key_matches(type(one)(one.certificate, other.key))
+    assert "PRIVATE" not in repr(one)
+
+
+def test_an_invalid_host_is_one_line() -> None:
+    with pytest.raises(UserError, match="neither a host name nor an address"):
+        issue_server_certificate(CA, "lab", ("läb",), 1)

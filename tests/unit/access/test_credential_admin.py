@@ -1,0 +1,87 @@
+"""Administration: concurrent changes are all kept; a rotated secret replaces the old one."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from common.errors import UserError
+from gateway.access.credential import Kind, State
+from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
+from gateway.access.directory import CredentialDirectory
+from gateway.access.role import Role
+from gateway.access.store import Store
+
+NOW_S = 1_000_000.0
+
+
+@pytest.fixture
+def admin(tmp_path: Path) -> CredentialAdmin:
+    admin = CredentialAdmin(CredentialDirectory(tmp_path), "lab", lambda: NOW_S)
+    admin.initialize(("localhost",))
+    return admin
+
+
+def states(path: Path) -> list[tuple[str, str]]:
+    """Names and states, oldest first."""
+    kept = CredentialDirectory(path).read_store().credentials.values()
+    return [(each.name, each.state(NOW_S).value) for each in kept]
+
+
+def test_changes_at_once_are_all_kept(admin: CredentialAdmin, tmp_path: Path) -> None:
+    names = [f"person-{number}" for number in range(40)]
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda name: admin.add(CredentialRequest(name, Role.VIEWER)), names))
+    assert sorted(name for name, _ in states(tmp_path)) == sorted(names)
+
+
+def test_a_rotated_token_replaces_the_old_one_now_or_later(admin: CredentialAdmin, tmp_path: Path) -> None:
+    admin.add(CredentialRequest("anna", Role.OPERATOR))
+    new, bundle = admin.rotate("anna")
+    assert (new.name, new.role) == ("anna", Role.OPERATOR)
+    assert bundle.token
+    assert states(tmp_path) == [("anna", "revoked"), ("anna", "valid")]
+    admin.rotate(new.credential_id, overlap_s=60)
+    assert states(tmp_path) == [("anna", "revoked"), ("anna", "valid"), ("anna", "valid")]
+    kept = CredentialDirectory(tmp_path).read_store().credentials[new.credential_id]
+    assert kept.state(NOW_S + 60) is State.EXPIRED
+
+
+def test_who_has_two_is_asked_which(admin: CredentialAdmin) -> None:
+    first, _ = admin.add(CredentialRequest("anna", Role.VIEWER))
+    second, _ = admin.add(CredentialRequest("anna", Role.ADMIN))
+    with pytest.raises(UserError, match=f"{first.credential_id}, {second.credential_id}"):
+        admin.rotate("anna")
+    assert {each.credential_id for each in admin.revoke("anna")} == {
+        first.credential_id,
+        second.credential_id,
+    }
+
+
+def test_a_rotation_lasts_as_long_as_what_it_replaces(admin: CredentialAdmin) -> None:
+    admin.add(CredentialRequest("anna", Role.VIEWER, days=7))
+    assert admin.rotate("anna")[0].ends_s == NOW_S + 7 * 86_400
+
+
+def test_a_bundle_holds_what_the_list_does_not(admin: CredentialAdmin, tmp_path: Path) -> None:
+    _, token = admin.add(CredentialRequest("anna", Role.VIEWER))
+    _, certificate = admin.add(CredentialRequest("ben", Role.VIEWER, Kind.CERTIFICATE))
+    listed = CredentialDirectory(tmp_path).store_file.read_text()
+    assert token.token in token.text()
+    assert token.token.partition(".")[2] not in listed
+    assert "PRIVATE KEY" in certificate.text()
+    assert "PRIVATE KEY" not in listed
+    assert token.token not in repr(token)
+
+
+def test_a_change_that_fails_changes_nothing(admin: CredentialAdmin, tmp_path: Path) -> None:
+    admin.add(CredentialRequest("anna", Role.VIEWER))
+    before = CredentialDirectory(tmp_path).store_file.read_bytes()
+
+    def fail(_store: Store) -> tuple[Store, None]:
+        raise UserError("no")
+
+    with pytest.raises(UserError, match="no"):
+        CredentialDirectory(tmp_path).change_store(fail)
+    assert CredentialDirectory(tmp_path).store_file.read_bytes() == before
+    assert not list(tmp_path.glob(".*"))

@@ -1,0 +1,109 @@
+"""Answers to operators who switch the preview."""
+
+from pathlib import Path
+
+import pytest
+
+from gateway.links.link import ServiceLink
+from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.model import PreviewModel, PreviewReconciler
+from gateway.links.preview.state import PreviewReport
+from gateway.links.preview.wire import PreviewConnector
+from gateway.links.reconciler import Reconciler
+from gateway.status.preview import Counters, PreviewState, Profile
+
+OFF, ON = False, True
+
+
+class Ground:
+    """A preview whose service reports what the test says; no connection is made."""
+
+    def __init__(self) -> None:
+        model = PreviewModel()
+        self.reconciler: PreviewReconciler = Reconciler(1000, model)
+        self.link: PreviewLink = ServiceLink(
+            "preview", PreviewConnector(Path("/nonexistent")), self.reconciler
+        )
+        self.control = PreviewControl(self.link, model, settle_s=5.0)
+
+    def report(self, state: PreviewState, *, applied: bool = True, last_error: str = "") -> None:
+        desired = self.link.desired
+        self.reconciler.take_report(
+            PreviewReport(
+                "process-1",
+                desired.revision if applied else 0,
+                state,
+                desired.spec.profile,
+                last_error,
+                None,
+                None,
+                None,
+                None,
+                Counters(),
+            ),
+            0.0,
+        )
+
+    async def set_mode(self, enabled: bool, profile: Profile | None = None) -> str:
+        """With a deadline so near that the answer is the state at this moment."""
+        return await self.control.set_mode(enabled=enabled, profile=profile, remaining_s=0.1)
+
+
+@pytest.fixture
+def ground() -> Ground:
+    ground = Ground()
+    ground.report(PreviewState.DISABLED, applied=False)
+    return ground
+
+
+@pytest.mark.parametrize(
+    ("enabled", "state", "answer"),
+    [
+        (ON, PreviewState.RUNNING, "preview is already running, BALANCED; nothing changed"),
+        (ON, PreviewState.STARTING, "preview is not running yet (starting); check the status for progress"),
+        (OFF, PreviewState.DISABLED, "preview is off"),
+        (OFF, PreviewState.STOPPING, "preview is not off yet (stopping); check the status for progress"),
+        (OFF, PreviewState.FAULTED, "preview could not be turned off: no camera"),
+    ],
+)
+async def test_the_answer_to_a_request_that_was_made_before(
+    ground: Ground, enabled: bool, state: PreviewState, answer: str
+) -> None:
+    await ground.set_mode(ON)
+    if not enabled:
+        await ground.set_mode(OFF)
+    ground.report(state, last_error="no camera")
+    before = ground.link.desired
+    assert await ground.set_mode(enabled) == answer
+    assert ground.link.desired is before
+
+
+async def test_the_same_request_makes_a_faulted_preview_retry(ground: Ground) -> None:
+    await ground.set_mode(ON)
+    ground.report(PreviewState.FAULTED, last_error="no camera; plug one in")
+    before = ground.link.desired
+    answer = await ground.set_mode(ON)
+    assert answer == "preview has failed and the robot keeps trying: no camera; plug one in"
+    assert ground.link.desired.revision > before.revision
+    assert ground.link.desired.spec == before.spec
+
+
+async def test_without_the_service(ground: Ground) -> None:
+    ground.reconciler.take_loss("nothing answers on its socket")
+    assert await ground.set_mode(OFF) == (
+        "preview is off; its service is unreachable and gets the request when it is back"
+    )
+    assert await ground.set_mode(ON) == (
+        "preview has failed and the robot keeps trying: preview service unreachable (nothing answers on its"
+        " socket). Start or restart it; the gateway reconnects by itself"
+    )
+
+
+async def test_another_profile_is_a_new_request(ground: Ground) -> None:
+    await ground.set_mode(ON, Profile.LOW_BW)
+    ground.report(PreviewState.RUNNING)
+    before = ground.link.desired
+    await ground.set_mode(ON, Profile.HIGH_QUALITY)
+    assert ground.link.desired.revision > before.revision
+    ground.report(PreviewState.RUNNING)
+    assert await ground.set_mode(ON, None) == "preview is already running, HIGH_QUALITY; nothing changed"

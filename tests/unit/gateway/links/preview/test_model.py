@@ -1,0 +1,287 @@
+"""The preview's rows of the failure table of gateway.links, and a random walk against its invariants."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.links.link import ServiceLink
+from gateway.links.preview.control import PreviewControl
+from gateway.links.preview.model import PreviewModel, PreviewReconciler
+from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.preview.wire import PreviewConnector
+from gateway.links.reconciler import Desired
+from gateway.status.preview import Counters, Listener, Measurement, PreviewState, Profile, Stream
+from gateway.status.preview import PreviewState as S
+
+FIRST = 1000
+STREAM = Stream(1280, 720, 30.0, 2500, None, False, "")
+
+
+def report(
+    state: PreviewState = S.DISABLED,
+    revision: int = 0,
+    *,
+    instance: str = "a",
+    profile: Profile | None = None,
+    starts: int = 0,
+    faults: int = 0,
+    error: str = "",
+    measurement: Measurement | None = None,
+) -> PreviewReport:
+    return PreviewReport(
+        instance_id=instance,
+        applied_revision=revision,
+        state=state,
+        profile=profile,
+        last_error=error,
+        listener=Listener(7100, 125),
+        stream=STREAM if state is S.RUNNING else None,
+        encoder=None,
+        measurement=measurement,
+        counters=Counters(starts=starts, faults=faults),
+    )
+
+
+class Preview(PreviewReconciler):
+    """A reconciler of the preview, whose requests are worded as operators word them."""
+
+    def __init__(self, new_passphrase: Callable[[], str] | None = None) -> None:
+        self.model = PreviewModel(new_passphrase)
+        super().__init__(FIRST, self.model)
+
+    def switch(self, enabled: bool, profile: Profile | None = None) -> Desired[PreviewSpec]:
+        return self.request(self.model.spec(self.desired.spec, enabled=enabled, profile=profile))
+
+
+def numbered_passphrases() -> Callable[[], str]:
+    numbers = iter(range(10))
+    return lambda: f"passphrase-{next(numbers)}"
+
+
+def connected() -> Preview:
+    preview = Preview()
+    preview.take_report(report(), 0.0)
+    return preview
+
+
+def running(preview: Preview) -> Desired[PreviewSpec]:
+    desired = preview.switch(True, Profile.LOW_BW)
+    preview.take_report(report(S.RUNNING, desired.revision, profile=Profile.LOW_BW, starts=1), 1.0)
+    return desired
+
+
+def test_off_and_unreachable_reads_disabled() -> None:
+    view = Preview().view
+    assert (view.state, view.last_error, view.service_reachable) == (S.DISABLED, "", False)
+
+
+def test_on_and_unreachable_reads_faulted_and_says_what_to_do() -> None:
+    preview = Preview()
+    preview.switch(True)
+    assert preview.view.state is S.FAULTED
+    assert "preview service unreachable" in preview.view.last_error
+    assert "Start or restart it" in preview.view.last_error
+    assert preview.view.counters.faults == 1
+
+
+def test_a_request_before_the_first_contact_is_applied_at_it() -> None:
+    preview = Preview()
+    desired = preview.switch(True)
+    assert preview.pending() is None
+    preview.take_report(report(), 0.0)
+    assert preview.pending() == desired
+    assert preview.view.state is S.STARTING
+    assert desired.spec.profile is Profile.BALANCED
+
+
+def test_a_request_without_a_profile_keeps_the_last_one_even_across_off() -> None:
+    preview = connected()
+    running(preview)
+    assert preview.switch(False).spec.profile is Profile.LOW_BW
+    assert preview.switch(True).spec.profile is Profile.LOW_BW
+
+
+def test_the_service_lost_while_on_is_a_fault_and_its_return_a_restart() -> None:
+    preview = connected()
+    desired = running(preview)
+    assert preview.pending() is None
+
+    assert preview.take_loss("gone")
+    assert preview.view.state is S.FAULTED
+    assert preview.view.stream is None
+    assert not preview.take_loss("still gone")
+
+    preview.take_report(report(instance="b"), 2.0)
+    assert preview.pending() == desired
+    assert preview.view.state is S.STARTING
+    preview.take_report(
+        report(S.RUNNING, desired.revision, instance="b", starts=1, profile=Profile.LOW_BW), 3.0
+    )
+    assert preview.view.state is S.RUNNING
+    assert preview.view.counters == Counters(starts=2, restarts=1, faults=1)
+
+
+def test_the_same_process_seen_again_is_sent_nothing_and_counts_no_restart() -> None:
+    preview = connected()
+    desired = running(preview)
+    preview.take_loss("no report for 2.5 s")
+    preview.take_report(report(S.RUNNING, desired.revision, profile=Profile.LOW_BW, starts=1), 9.0)
+    assert preview.pending() is None
+    assert preview.view.counters == Counters(starts=1, faults=1)
+
+
+def test_a_refused_request_is_quoted_and_counts_as_a_fault() -> None:
+    preview = connected()
+    desired = preview.switch(True, Profile.HIGH_QUALITY)
+    preview.take_refusal(desired, "no such profile here")
+    assert preview.view.state is S.FAULTED
+    assert "no such profile here" in preview.view.last_error
+    assert preview.view.counters.faults == 1
+    assert preview.settled(desired)
+
+
+def test_a_fault_that_the_service_reports_is_counted_by_the_service_alone() -> None:
+    preview = connected()
+    desired = preview.switch(True)
+    preview.take_report(report(S.FAULTED, desired.revision, faults=1, error="no camera"), 1.0)
+    assert (preview.view.last_error, preview.view.counters.faults) == ("no camera", 1)
+
+
+def test_the_default_profile_of_a_service_without_a_request_is_not_adopted() -> None:
+    preview = Preview()
+    preview.take_report(report(revision=0, profile=Profile.HIGH_QUALITY), 0.0)
+    assert preview.view.profile is None
+    assert preview.switch(True).spec.profile is Profile.BALANCED
+
+
+def test_a_restarted_gateway_adopts_the_running_preview_and_changes_nothing() -> None:
+    preview = Preview()
+    preview.take_report(report(S.RUNNING, 77, profile=Profile.HIGH_QUALITY, starts=4), 0.0)
+    assert preview.pending() is None
+    assert preview.view.state is S.RUNNING
+    assert preview.desired.spec.enabled
+    assert preview.desired.spec.profile is Profile.HIGH_QUALITY
+    # And from then on it is the gateway's own: a new process gets it.
+    preview.take_report(report(instance="b"), 1.0)
+    pending = preview.pending()
+    assert pending is not None
+    assert pending.spec.enabled
+
+
+def test_a_restarted_gateway_with_encryption_starts_a_new_session() -> None:
+    preview = Preview(lambda: "made-up-passphrase")
+    preview.take_report(report(S.RUNNING, 77, profile=Profile.LOW_BW), 0.0)
+    assert preview.pending() == Desired(78, PreviewSpec(True, Profile.LOW_BW, "made-up-passphrase"))
+
+
+def test_a_switch_has_settled_only_when_the_stream_has_the_new_profile() -> None:
+    preview = connected()
+    running(preview)
+    desired = preview.switch(True, Profile.HIGH_QUALITY)
+    preview.take_report(report(S.RUNNING, desired.revision, profile=Profile.LOW_BW, starts=1), 2.0)
+    assert not preview.settled(desired)
+    preview.take_report(report(S.RUNNING, desired.revision, profile=Profile.HIGH_QUALITY, starts=1), 3.0)
+    assert preview.settled(desired)
+
+
+def test_off_has_settled_only_when_the_pipeline_is_gone() -> None:
+    preview = connected()
+    running(preview)
+    desired = preview.switch(False)
+    preview.take_report(report(S.STOPPING, desired.revision, starts=1), 2.0)
+    assert not preview.settled(desired)
+    preview.take_report(report(S.DISABLED, desired.revision, starts=1), 3.0)
+    assert preview.settled(desired)
+
+
+def test_figures_stay_while_the_service_is_unreachable_and_go_with_the_preview() -> None:
+    figures = Measurement(30.0, 2400.0, 1, 10, None, None)
+    preview = connected()
+    desired = preview.switch(True)
+    preview.take_report(report(S.RUNNING, desired.revision, measurement=figures), 5.0)
+    preview.take_loss("gone")
+    assert preview.view.measured is not None
+    assert (preview.view.measured.value, preview.view.measured.at_s) == (figures, 5.0)
+    preview.switch(False)
+    assert preview.view.measured is None
+
+
+def test_a_running_session_gets_another_passphrase_and_stays_as_it_is() -> None:
+    preview = Preview(numbered_passphrases())
+    control = PreviewControl(
+        ServiceLink("preview", PreviewConnector(Path("/nonexistent")), preview), preview.model, 1.0
+    )
+    untouched = preview.desired
+    control.renew_passphrase()
+    assert preview.desired is untouched, "nothing runs"
+    before = preview.switch(True, Profile.LOW_BW)
+    control.renew_passphrase()
+    after = preview.desired
+    assert (before.spec.passphrase, after.spec.passphrase) == ("passphrase-0", "passphrase-1")
+    assert replace(after.spec, passphrase="") == PreviewSpec(True, Profile.LOW_BW)
+    assert after.revision > before.revision
+    assert preview.view.passphrase == "passphrase-1"
+
+
+def test_a_session_without_encryption_has_no_passphrase_to_renew() -> None:
+    preview = Preview()
+    desired = preview.switch(True)
+    PreviewControl(
+        ServiceLink("preview", PreviewConnector(Path("/nonexistent")), preview), preview.model, 1.0
+    ).renew_passphrase()
+    assert preview.desired is desired
+
+
+def test_a_passphrase_lasts_for_a_session_and_shows_in_no_text() -> None:
+    preview = Preview(numbered_passphrases())
+    first = preview.switch(True, Profile.LOW_BW)
+    switched = preview.switch(True, Profile.HIGH_QUALITY)
+    off = preview.switch(False)
+    second = preview.switch(True)
+    assert [desired.spec.passphrase for desired in (first, switched, off, second)] == [
+        "passphrase-0",
+        "passphrase-0",
+        "",
+        "passphrase-1",
+    ]
+    assert "passphrase-" not in repr(second) + str(second.spec) + repr(preview.view)
+
+
+REQUESTS = st.tuples(st.just("request"), st.booleans(), st.sampled_from([None, *Profile]))
+REPORTS = st.tuples(st.just("report"), st.sampled_from("ab"), st.sampled_from(list(PreviewState)))
+LOSSES = st.tuples(st.just("loss"), st.none(), st.none())
+
+
+@given(steps=st.lists(REQUESTS | REPORTS | LOSSES, max_size=40))
+def test_the_view_agrees_with_every_history(steps: list[tuple[str, object, object]]) -> None:
+    """Revisions and counts only grow; without contact the preview reads faulted if it shall run."""
+    preview, reachable = Preview(), False
+    applied = {"a": 0, "b": 0}
+    previous = preview.view
+    for kind, first, second in steps:
+        revision = preview.desired.revision
+        if kind == "request":
+            desired = preview.switch(bool(first), second if isinstance(second, Profile) else None)
+            assert desired.revision > revision
+        elif kind == "report":
+            assert isinstance(first, str)
+            assert isinstance(second, PreviewState)
+            preview.take_report(report(second, applied[first], instance=first), 0.0)
+            pending = preview.pending()
+            if pending:
+                applied[first] = pending.revision
+            reachable = True
+        else:
+            preview.take_loss("gone")
+            reachable = False
+        view = preview.view
+        assert view.service_reachable == reachable
+        if not reachable:
+            assert view.state is (S.FAULTED if preview.desired.spec.enabled else S.DISABLED)
+            assert bool(view.last_error) == preview.desired.spec.enabled
+        assert view.counters.faults >= previous.counters.faults
+        assert (view is previous) == (view == previous), "a new object for each change, and for nothing else"
+        previous = view

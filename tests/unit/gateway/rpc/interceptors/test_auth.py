@@ -1,0 +1,115 @@
+"""Callers that lose access are noticed once, and only those that had been admitted."""
+
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+
+from common.errors import NotAuthenticatedError
+from gateway.access.authenticator import Authenticator
+from gateway.access.credential import Credential, Kind
+from gateway.access.lockout import Lockout
+from gateway.access.role import Role
+from gateway.access.store import Store
+from gateway.access.token import Token, hash_of, new_token
+from gateway.rpc.call import CallContext
+from gateway.rpc.interceptors.auth import Auth
+from tests.support.calls import serve
+
+
+class Ground:
+    """An interceptor, its list of credentials, and what it has asked for."""
+
+    def __init__(self) -> None:
+        self.tokens = {name: new_token(name[0] * 12) for name in ("anna", "ben", "carla")}
+        self.credentials = {name: _credential(name, token) for name, token in self.tokens.items()}
+        self.authenticator = Authenticator(Store(MappingProxyType({})))
+        self.reload()
+        self.renewals = 0
+        self.looks = 0
+        self.auth = Auth(self.authenticator, Lockout(), self, self, certificates=False)
+
+    async def reload_for_unknown(self) -> None:
+        self.looks += 1
+        self.reload()
+
+    def renew_passphrase(self) -> None:
+        self.renewals += 1
+
+    def reload(self) -> None:
+        """As when the gateway has read its files again."""
+        listed = {each.credential_id: each for each in self.credentials.values()}
+        self.authenticator.use(Store(MappingProxyType(listed)))
+
+    def revoke(self, *names: str) -> None:
+        for name in names:
+            self.credentials[name] = replace(self.credentials[name], revoked_s=1)
+        self.reload()
+
+    async def ping(self, name: str) -> Any:
+        async def answer(_request: Any, call: CallContext) -> bytes:
+            assert call.principal is not None
+            return call.principal.name.encode()
+
+        return await serve([self.auth], "Ping", answer, token=self.tokens[name].text())
+
+
+def _credential(name: str, token: Token) -> Credential:
+    return Credential(
+        credential_id=token.credential_id,
+        name=name,
+        role=Role.VIEWER,
+        kind=Kind.TOKEN,
+        proof=hash_of(token),
+        made_s=0,
+    )
+
+
+@pytest.fixture
+def ground() -> Ground:
+    return Ground()
+
+
+async def test_nothing_happens_while_all_credentials_are_valid(ground: Ground) -> None:
+    assert await ground.ping("anna") == b"anna"
+    await ground.auth.revoke()
+    assert ground.renewals == 0
+
+
+async def test_an_admitted_caller_that_loses_access_is_noticed_once(ground: Ground) -> None:
+    for name in ("anna", "ben", "ben"):
+        await ground.ping(name)
+    ground.revoke("anna", "ben")
+    for _ in range(3):
+        await ground.auth.revoke()
+    assert ground.renewals == 1
+    with pytest.raises(NotAuthenticatedError, match="was revoked"):
+        await ground.ping("anna")
+    await ground.auth.revoke()
+    assert ground.renewals == 1
+
+
+async def test_a_caller_that_was_never_admitted_knows_no_secret(ground: Ground) -> None:
+    await ground.ping("anna")
+    ground.revoke("carla")
+    with pytest.raises(NotAuthenticatedError):
+        await ground.ping("carla")
+    await ground.auth.revoke()
+    assert ground.renewals == 0
+
+
+async def test_a_credential_added_since_the_last_look_is_accepted_at_once(ground: Ground) -> None:
+    ground.tokens["dora"] = new_token("d" * 12)
+    ground.credentials["dora"] = _credential("dora", ground.tokens["dora"])
+    assert await ground.ping("dora") == b"dora"
+    assert ground.looks == 1
+    assert await ground.ping("dora") == b"dora"
+    assert ground.looks == 1, "known ones cause no look"
+
+
+async def test_an_unknown_credential_causes_one_look_and_is_refused(ground: Ground) -> None:
+    ground.tokens["eve"] = new_token("e" * 12)
+    with pytest.raises(NotAuthenticatedError):
+        await ground.ping("eve")
+    assert ground.looks == 1

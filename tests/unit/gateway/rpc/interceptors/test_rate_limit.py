@@ -1,0 +1,173 @@
+"""Every connection has its share, and none has the share of another."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import TooMuchError
+from common.reasons import Reason
+from gateway.config import LimitSettings
+from gateway.rpc.call import peer_of
+from gateway.rpc.interceptors.rate_limit import (
+    FORGIVEN_AFTER_S,
+    QUIET_AFTER_S,
+    REFUSAL_DELAY_S,
+    REFUSAL_SPACING_S,
+    Admission,
+)
+
+SMALL = LimitSettings(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
+
+
+class Clock:
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def admission(clock: Clock) -> Admission:
+    return Admission(SMALL, clock)
+
+
+def refusal(admission: Admission, peer: str) -> TooMuchError:
+    with pytest.raises(TooMuchError) as seen:
+        admission.take_token(peer_of(peer))
+    return seen.value
+
+
+def test_a_burst_is_served_and_then_one_by_one(admission: Admission, clock: Clock) -> None:
+    for _ in range(SMALL.burst):
+        admission.take_token(peer_of("a"))
+    error = refusal(admission, "a")
+    assert error.reason is Reason.TOO_MANY_REQUESTS
+    assert error.retry_after_s == pytest.approx(0.1)
+    clock.now_s += 0.1001
+    admission.take_token(peer_of("a"))
+    assert refusal(admission, "a").retry_after_s == pytest.approx(0.1, rel=0.01)
+
+
+def test_who_was_refused_saves_nothing_up_until_it_is_forgiven(admission: Admission, clock: Clock) -> None:
+    for _ in range(SMALL.burst):
+        admission.take_token(peer_of("a"))
+    refusal(admission, "a")
+    clock.now_s += FORGIVEN_AFTER_S * 0.9
+    admission.take_token(peer_of("a"))
+    refusal(admission, "a")
+    clock.now_s += FORGIVEN_AFTER_S
+    for _ in range(SMALL.burst):
+        admission.take_token(peer_of("a"))
+
+
+def test_what_one_has_spent_the_other_still_has(admission: Admission) -> None:
+    for _ in range(SMALL.burst):
+        admission.take_token(peer_of("a"))
+    refusal(admission, "a")
+    admission.take_token(peer_of("b"))
+
+
+def test_streams_are_counted_while_they_are_open(admission: Admission) -> None:
+    admission.take_token(peer_of("a"))
+    admission.open_stream(peer_of("a"))
+    admission.open_stream(peer_of("a"))
+    with pytest.raises(TooMuchError) as seen:
+        admission.open_stream(peer_of("a"))
+    assert seen.value.reason is Reason.TOO_MANY_STREAMS
+    admission.close_stream(peer_of("a"))
+    admission.open_stream(peer_of("a"))
+
+
+def test_a_new_connection_takes_the_place_of_the_quietest(admission: Admission, clock: Clock) -> None:
+    for peer in ("a", "b", "c"):
+        admission.take_token(peer_of(peer))
+    error = refusal(admission, "d")
+    assert error.reason is Reason.TOO_MANY_CONNECTIONS
+    assert error.retry_after_s
+    clock.now_s += QUIET_AFTER_S
+    admission.take_token(peer_of("a"))
+    admission.take_token(peer_of("d"))
+    assert admission.connection_count == 3
+    admission.take_token(peer_of("c"))
+    assert refusal(admission, "b").reason is Reason.TOO_MANY_CONNECTIONS, "b was the quietest"
+
+
+def test_one_address_may_take_its_part_of_the_connections_and_no_more(clock: Clock) -> None:
+    admission = Admission(LimitSettings(connections=4, connections_per_address=2), clock)
+    for peer in ("ipv4:10.0.0.5:1", "ipv4:10.0.0.5:2"):
+        admission.take_token(peer_of(peer))
+    error = refusal(admission, "ipv4:10.0.0.5:3")
+    assert error.reason is Reason.TOO_MANY_CONNECTIONS
+    assert "of one address" in str(error)
+    for peer in ("ipv4:10.0.0.6:1", "ipv6:[2001:db8::5]:1"):
+        admission.take_token(peer_of(peer))
+    assert "all are taken" in str(refusal(admission, "ipv4:10.0.0.7:1"))
+    clock.now_s += QUIET_AFTER_S
+    for peer in ("ipv4:10.0.0.5:2", "ipv4:10.0.0.6:1"):
+        admission.take_token(peer_of(peer))
+    admission.take_token(peer_of("ipv4:10.0.0.5:3"))
+    assert "of one address" in str(refusal(admission, "ipv4:10.0.0.5:1")), (
+        "its quietest gave way, not another's"
+    )
+    admission.take_token(peer_of("ipv4:10.0.0.7:1"))
+    assert admission.connection_count == 4
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.floats(0, 3)), max_size=60))
+def test_no_address_ever_has_more_than_its_part(asked: list[tuple[int, int, float]]) -> None:
+    clock = Clock()
+    admission = Admission(LimitSettings(connections=6, connections_per_address=3), clock)
+    served: dict[str, float] = {}
+    for host, port, pause_s in asked:
+        clock.now_s += pause_s
+        peer = f"ipv4:10.0.0.{host}:{port}"
+        try:
+            admission.take_token(peer_of(peer))
+        except TooMuchError:
+            busy = [each for each, at_s in served.items() if clock.now_s - at_s < QUIET_AFTER_S]
+            same = [each for each in busy if each.rpartition(":")[0] == peer.rpartition(":")[0]]
+            assert len(same) >= 3 or len(busy) >= 6, "refused only where its part, or everything, is taken"
+            continue
+        served[peer] = clock.now_s
+        assert admission.connection_count <= 6
+
+
+def test_who_has_a_stream_open_is_never_put_out(admission: Admission, clock: Clock) -> None:
+    for peer in ("a", "b", "c"):
+        admission.take_token(peer_of(peer))
+        admission.open_stream(peer_of(peer))
+    clock.now_s += 3600
+    assert refusal(admission, "d").reason is Reason.TOO_MANY_CONNECTIONS
+
+
+def test_delayed_refusals_are_spaced(admission: Admission, clock: Clock) -> None:
+    delays = [admission.refusal_delay_s() for _ in range(3)]
+    assert delays == pytest.approx([REFUSAL_DELAY_S + each * REFUSAL_SPACING_S for each in range(3)])
+    clock.now_s += 60
+    assert admission.refusal_delay_s() == pytest.approx(REFUSAL_DELAY_S)
+
+
+@given(st.lists(st.tuples(st.sampled_from("abcdef"), st.floats(0, 0.3)), max_size=200))
+def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tuple[str, float]]) -> None:
+    clock = Clock()
+    admission = Admission(LimitSettings(connections=100, requests_per_s=10, burst=5), clock)
+    served: dict[str, list[float]] = {}
+    refused: list[TooMuchError] = []
+    for peer, pause_s in asked:
+        clock.now_s += pause_s
+        try:
+            admission.take_token(peer_of(peer))
+        except TooMuchError as error:
+            refused.append(error)
+        else:
+            served.setdefault(peer, []).append(clock.now_s)
+    assert all(0 < (error.retry_after_s or 0) <= 0.1 + 1e-9 for error in refused)
+    for instants in served.values():
+        for number, first_s in enumerate(instants):
+            for later, last_s in enumerate(instants[number:], start=1):
+                assert later <= 5 + (last_s - first_s) * 10 + 1e-6

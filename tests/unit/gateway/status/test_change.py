@@ -1,0 +1,77 @@
+"""What wakes watchers, and what does not."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+
+from gateway.status.board import Board
+from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.preview import Measurement, PreviewState
+from gateway.status.runtime import Runtime
+from gateway.status.snapshot import Snapshot, SourceRule
+from gateway.status.sources import MODE, ODOMETRY
+from gateway.status.values import Mode, Odometry, Received
+from tests.support.status import OFF, snapshot_of
+
+FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
+
+
+def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
+    values: dict[str, Any] = {
+        "board": Board({ODOMETRY: Received(Odometry(0.5, 0, 0), 99.9), MODE: Received(Mode("idle"), 99.0)}),
+        "sources": {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(60_000, required=False)},
+        "preview": replace(OFF, measured=Received(Measurement(30, 2500, 1, 10, None, None), 99.9)),
+        "faults": (FAULT,),
+        "gateway": Runtime("r", "b", 1000, 1, 1, 0),
+    }
+    return snapshot_of(now_s=now_s, **(values | changed))
+
+
+BEFORE = change_key(snapshot())
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        pytest.param(snapshot(now_s=100.5), id="time goes by"),
+        pytest.param(snapshot(gateway=Runtime("r", "b", 2000, 7, 99, 3)), id="others ask"),
+        pytest.param(
+            snapshot(
+                board=Board(
+                    {ODOMETRY: Received(Odometry(0.5, 0, 0), 99.99), MODE: Received(Mode("idle"), 99.5)}
+                )
+            ),
+            id="the same values come again",
+        ),
+        pytest.param(snapshot(faults=(replace(FAULT, seen_s=100.2),)), id="a fault goes on"),
+    ],
+)
+def test_this_is_no_change(later: Snapshot) -> None:
+    assert change_key(later) == BEFORE
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        pytest.param(
+            snapshot(board=Board({ODOMETRY: Received(Odometry(0.6, 0, 0), 99.9)})), id="another speed"
+        ),
+        pytest.param(snapshot(now_s=101.5), id="it grows stale"),
+        pytest.param(snapshot(faults=()), id="a fault is gone"),
+        pytest.param(snapshot(faults=(replace(FAULT, cleared_s=100.0),)), id="a fault is over"),
+        pytest.param(snapshot(preview=replace(OFF, state=PreviewState.RUNNING)), id="the preview runs"),
+        pytest.param(
+            snapshot(preview=replace(OFF, measured=Received(Measurement(29, 2500, 1, 10, None, None), 99.9))),
+            id="the preview is slower",
+        ),
+    ],
+)
+def test_this_is_a_change(later: Snapshot) -> None:
+    assert change_key(later) != BEFORE
+
+
+def test_every_field_of_the_snapshot_is_projected_or_excluded_by_name() -> None:
+    assert PROJECTIONS.keys() | EXCLUDED == {field.name for field in fields(Snapshot)}
+    assert not PROJECTIONS.keys() & EXCLUDED

@@ -1,0 +1,93 @@
+"""Freshness and health against the plainest model of the same rules."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gateway.status.board import Board
+from gateway.status.freshness import NEVER, Freshness, sample
+from gateway.status.health import Health, HealthState, assess
+from gateway.status.snapshot import SourceRule
+from gateway.status.sources import ODOMETRY, VISION
+from gateway.status.values import Odometry, Received, Vision
+from tests.support.status import snapshot_of
+
+SECONDS = st.floats(min_value=0, max_value=1e7, allow_nan=False)
+LIMITS = st.integers(min_value=1, max_value=100_000)
+
+
+def test_nothing_received_is_not_available_and_has_no_age() -> None:
+    assert sample(None, 1000, 12.0).freshness == NEVER
+
+
+def test_a_value_is_stale_only_when_older_than_the_limit() -> None:
+    received = Received("value", 10.0)
+    assert sample(received, 1000, 11.0).freshness == Freshness(available=True, stale=False, age_ms=1000)
+    assert sample(received, 1000, 11.002).freshness == Freshness(available=True, stale=True, age_ms=1002)
+
+
+def test_a_value_received_after_the_instant_has_no_negative_age() -> None:
+    assert sample(Received("value", 10.5), 1000, 10.0).freshness.age_ms == 0
+
+
+@given(at_s=SECONDS, passed_s=SECONDS, limit_ms=LIMITS)
+def test_age_is_the_time_passed_and_staleness_follows(at_s: float, passed_s: float, limit_ms: int) -> None:
+    seen = sample(Received("value", at_s), limit_ms, at_s + passed_s).freshness
+    # Whole milliseconds, and the clock's own rounding at large values.
+    assert abs(seen.age_ms - passed_s * 1000) <= 1.01
+    assert seen.available
+    assert seen.stale == (seen.age_ms > limit_ms)
+
+
+def model(odometry: tuple[bool, float | None], vision: tuple[bool, float | None]) -> str:
+    """The contract's sentence, for (required, age in ms or None) of each; limits 1000 and 2000 ms."""
+    lines = [
+        (odometry, 1000, "waiting for odometry", "odometry stale"),
+        (vision, 2000, "waiting for vision telemetry", "vision telemetry stale"),
+    ]
+    for (required, age_ms), limit_ms, waiting, stale in lines:
+        if required and age_ms is None:
+            return waiting
+        if required and age_ms is not None and age_ms > limit_ms:
+            return stale
+    return "robot healthy"
+
+
+AGES = st.none() | st.integers(min_value=0, max_value=5000)
+
+
+@given(
+    odometry_required=st.sampled_from([True, False, None]),
+    vision_required=st.sampled_from([True, False, None]),
+    odometry_age_ms=AGES,
+    vision_age_ms=AGES,
+)
+def test_health_follows_the_contract_line_by_line(
+    odometry_required: bool | None,
+    vision_required: bool | None,
+    odometry_age_ms: int | None,
+    vision_age_ms: int | None,
+) -> None:
+    """None for "required" is a robot that is configured without the source."""
+    now_s = 1000.0
+    sources = {
+        spec: SourceRule(limit, required)
+        for spec, limit, required in [(ODOMETRY, 1000, odometry_required), (VISION, 2000, vision_required)]
+        if required is not None
+    }
+    # Half a millisecond off, so that no age sits on a rounding edge.
+    board = Board()
+    if odometry_age_ms is not None:
+        board[ODOMETRY] = Received(Odometry(0, 0, 0), now_s - (odometry_age_ms + 0.5) / 1000)
+    if vision_age_ms is not None:
+        board[VISION] = Received(Vision(0, 0, 0, 0, 0), now_s - (vision_age_ms + 0.5) / 1000)
+
+    health = snapshot_of(board, sources, now_s=now_s).health
+
+    expected = model((odometry_required is True, odometry_age_ms), (vision_required is True, vision_age_ms))
+    assert health.summary == expected
+    assert health.ready == (expected == "robot healthy")
+    assert (health.state is HealthState.OK) == health.ready
+
+
+def test_a_robot_without_both_sources_is_healthy() -> None:
+    assert assess([]) == Health(HealthState.OK, "robot healthy")

@@ -1,0 +1,103 @@
+"""What a process learns from the marker and the crash report of the previous one."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from preview.encoders.crash_marker import CrashMarkerFile
+
+# A process of its own each time: the fault handler of the test's process is pytest's.
+LIVES = """
+import os, sys
+from pathlib import Path
+from preview.encoders.crash_marker import CrashMarkerFile
+marker = CrashMarkerFile(Path(sys.argv[1]))
+class Selection:
+    def pass_over(self, name, reason): print(reason, end="; ")
+if sys.argv[3:]:
+    marker.blame_previous(Selection())
+    marker.set(sys.argv[3])
+else:
+    print(marker.begin_report(), flush=True)
+sys.stdout.flush()
+os.kill(os.getpid(), int(sys.argv[2]))
+"""
+ROOT = Path(__file__).parents[3]
+
+
+def life(directory: Path, *uses: str, ends_by: signal.Signals = signal.SIGTERM) -> str:
+    """Runs a process until it ends by a signal; returns what it learned of the previous one.
+
+    Args:
+        directory: runtime directory.
+        uses: encoder that it uses; none: only the crash report is read.
+        ends_by: signal.
+    """
+    process = subprocess.run(
+        [sys.executable, "-c", LIVES, directory, str(int(ends_by)), *uses],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert process.returncode == -ends_by
+    return process.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("number", "cause"),
+    [
+        (signal.SIGSEGV, "Segmentation fault"),
+        (signal.SIGABRT, "Aborted"),
+        (signal.SIGBUS, "Bus error"),
+        (signal.SIGKILL, ""),
+        (signal.SIGTERM, ""),
+    ],
+)
+def test_only_a_crash_leaves_a_report(tmp_path: Path, number: signal.Signals, cause: str) -> None:
+    directory = tmp_path / "not" / "there"
+    assert life(directory, ends_by=number) == ""
+    assert life(directory) == cause
+
+
+def test_a_report_counts_once(tmp_path: Path) -> None:
+    life(tmp_path, ends_by=signal.SIGSEGV)
+    assert life(tmp_path)
+    assert life(tmp_path) == ""
+
+
+def test_a_directory_that_cannot_be_made_is_survived(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert life(tmp_path / "file") == ""
+    CrashMarkerFile(tmp_path / "file").set("mpp-h265")
+    CrashMarkerFile(tmp_path / "file").clear()
+
+
+def test_an_encoder_in_use_is_blamed_for_a_crash_and_not_for_a_kill(tmp_path: Path) -> None:
+    assert life(tmp_path, "mpp-h265", ends_by=signal.SIGSEGV) == ""
+    assert life(tmp_path, "va-h265", ends_by=signal.SIGKILL) == (
+        "encoder mpp-h265 is passed over: the process crashed while it was in use (Segmentation fault);"
+    )
+    assert life(tmp_path, "x264") == ""
+
+
+def test_an_encoder_that_hung_is_blamed_without_a_crash(tmp_path: Path) -> None:
+    CrashMarkerFile(tmp_path).set("mpp-h265", "it hung when it was stopped")
+    assert life(tmp_path, "x264") == "encoder mpp-h265 is passed over: it hung when it was stopped;"
+
+
+def test_a_cleared_marker_blames_no_encoder(tmp_path: Path) -> None:
+    marker = CrashMarkerFile(tmp_path)
+    marker.set("mpp-h265")
+    marker.clear()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"encoder": "mpp-h265"}', "\0"])
+def test_a_damaged_marker_is_ignored(tmp_path: Path, content: str) -> None:
+    (tmp_path / "encoder-in-use.json").write_text(content, encoding="utf-8")
+    assert life(tmp_path, "x264") == ""

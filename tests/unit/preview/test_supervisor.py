@@ -1,0 +1,566 @@
+"""The supervisor with pipeline doubles, in virtual time: every row of its failure table, and its requests."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+from preview import supervisor
+from preview.config import FileSource, PreviewSettings, TestSource, TimeoutSettings
+from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.selection import Selection, Verdict
+from preview.lifecycle import Counters, State
+from preview.pipeline.events import Blame, Fault, HungError
+from preview.supervisor import ENCODER_STOP_S, GRAPH, STEADY_AFTER_S, Supervisor
+from preview.values import ActualState, DesiredState, Profile
+from tests.support.pipeline_double import FIRST_FRAME_S, STOP_DEADLINE_S, PipelineDoubles, Script
+from tests.support.virtual_time import in_virtual_time
+
+PROVEN = Verdict(present=True, proven=True, first_byte_ms=5)
+NO_OUTPUT = Verdict(present=True, proven=False, reason="it produced no output")
+ENCODER = Fault(Blame.ENCODER, "encoder mpp-h265 failed: hardware fault")
+SILENT = Fault(Blame.ENCODER, "encoder mpp-h265 has produced no frame for 1.0 s")
+STUCK = Fault(Blame.ENCODER, "encoder mpp-h265 hung when the profile was changed")
+SOURCE = Fault(Blame.SOURCE, "camera /dev/video0 has ended.")
+STALLED = Fault(Blame.SOURCE, "camera /dev/video0 has sent no frame for 1.5 s.")
+PORT = Fault(Blame.LISTENER, "UDP port 7100 on 0.0.0.0 can't be used")
+ON = DesiredState(1, True, Profile.BALANCED)
+OFF = DesiredState(2, False)
+AGAIN = DesiredState(3, True, Profile.BALANCED)
+
+Test = TypeVar("Test", bound=Callable[..., object])
+tested: set[str] = set()
+
+
+def row(failure: str) -> Callable[[Test], Test]:
+    """Marks the test of a row of the failure table, by its first column."""
+
+    def mark(test: Test) -> Test:
+        tested.add(failure)
+        return test
+
+    return mark
+
+
+def test_every_row_of_the_failure_table_has_a_test() -> None:
+    rows = [line.split("|")[1].strip() for line in str(supervisor.__doc__).splitlines() if line[:1] == "|"]
+    assert rows[:2] == ["failure", "---"]
+    assert set(rows[2:]) == tested
+
+
+class Prober:
+    """Knows the results of all trials; a trial takes `trial_s`."""
+
+    def __init__(self, trial_s: float = 0.0, **results: Verdict) -> None:
+        self.verdicts: dict[str, Verdict] = {}
+        self._trial_s = trial_s
+        self._results = {name.replace("_", "-"): result for name, result in results.items()}
+
+    async def verdict(self, encoder: Encoder) -> Verdict:
+        if encoder.name not in self.verdicts:
+            await asyncio.sleep(self._trial_s)
+        self.verdicts[encoder.name] = self._results.get(encoder.name, PROVEN)
+        return self.verdicts[encoder.name]
+
+
+class Marker:
+    """Keeps what the crash marker says now."""
+
+    def __init__(self) -> None:
+        self.encoder = ""
+        self.reason = ""
+
+    def set(self, encoder: str, reason: str = "") -> None:
+        self.encoder, self.reason = encoder, reason
+
+    def clear(self) -> None:
+        self.encoder = self.reason = ""
+
+
+class Preview:
+    """A supervisor and what it works with.
+
+    Args:
+        directory: runtime directory.
+        scripts: what happens to its pipelines, in turn.
+        prober: knows which encoders work; default: all.
+        order: allowed encoders.
+        settings: that differ from the defaults.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        *scripts: Script,
+        prober: Prober | None = None,
+        order: tuple[str, ...] = ("mpp-h265", "va-h265", "x264"),
+        **settings: object,
+    ) -> None:
+        loop = asyncio.get_running_loop()
+        values = {"source": TestSource(), "runtime_dir": directory, **settings}
+        self.pipelines = PipelineDoubles(*scripts)
+        self.marker = Marker()
+        self.selection = Selection([CATALOGUE[name] for name in order], 600, prober or Prober(), loop.time)
+        made = PreviewSettings(**values)  # type: ignore[arg-type]
+        self.supervisor = Supervisor(made, self.selection, self.marker, self.pipelines)
+        self.stop = asyncio.Event()
+
+    @asynccontextmanager
+    async def serving(self, *, dies_of: str = "") -> AsyncIterator["Preview"]:
+        """Runs the supervisor, watched by a gateway; then stops it, or waits until a hang ends it."""
+        running = asyncio.create_task(self.supervisor.run(self.stop))
+        with self.supervisor.watched():
+            yield self
+            assert not running.done()
+            if dies_of:
+                with pytest.raises(HungError, match=dies_of):
+                    await running
+                return
+        self.stop.set()
+        await running
+
+    async def until(self, holds: Callable[[ActualState], bool]) -> ActualState:
+        """Waits for a condition of the actual state, at most some virtual minutes."""
+        async with asyncio.timeout(300):
+            while True:
+                changed, actual = self.supervisor.changed, self.supervisor.actual()
+                if holds(actual):
+                    return actual
+                await changed.wait()
+
+    async def reaches(self, state: State) -> ActualState:
+        return await self.until(lambda actual: actual.state is state)
+
+    async def runs_with(self, encoder: str) -> ActualState:
+        def holds(actual: ActualState) -> bool:
+            return bool(actual.state is State.RUNNING and actual.encoder and actual.encoder.name == encoder)
+
+        return await self.until(holds)
+
+
+def now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+async def retried(preview: Preview, text: str) -> None:
+    """The first attempt fails with `text`, the second one, a second later, works."""
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        faulted = await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        assert faulted.last_error == text
+        running = await preview.reaches(State.RUNNING)
+        assert now() - faulted_at == pytest.approx(1.0, abs=0.2)
+        assert running.counters == Counters(starts=2, restarts=1, faults=1)
+        assert running.encoder == preview.pipelines.built[-1].plan.choice
+        assert running.encoder.fallback_reason == ""
+
+
+async def replaced(preview: Preview, fault: Fault) -> None:
+    """The first encoder fails, the second one takes over at once."""
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        running = await preview.runs_with("va-h265")
+        assert now() - faulted_at < ENCODER_STOP_S + 2 * FIRST_FRAME_S
+        assert running.encoder
+        assert (running.encoder.wanted, running.encoder.fallback_reason) == ("mpp-h265", fault.text)
+        assert running.last_error == fault.text
+        assert running.counters == Counters(starts=2, restarts=1, faults=1, fallbacks=1)
+
+
+# --- the rows of the failure table ---
+
+
+@row("no encoder works")
+@in_virtual_time
+async def test_without_an_encoder(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, prober=Prober(x264=NO_OUTPUT), order=("x264",))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        state = await preview.until(lambda actual: actual.counters.faults == 2)
+        assert "no encoder of x264 works (x264: it produced no output)" in state.last_error
+        assert "'robot-preview encoders' lists what works" in state.last_error
+        assert now() == pytest.approx(1.0)
+        assert not preview.pipelines.built
+
+
+@row("source unusable, element missing")
+@in_virtual_time
+async def test_a_pipeline_that_can_not_be_built(tmp_path: Path) -> None:
+    await retried(Preview(tmp_path, Script(build_error="no element h265parse")), "no element h265parse")
+
+
+@row("source unusable, element missing")
+@in_virtual_time
+async def test_a_source_that_appears_later(tmp_path: Path) -> None:
+    film = tmp_path / "film.mkv"
+    preview = Preview(tmp_path, source=FileSource(path=film))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        assert str(film) in (await preview.reaches(State.FAULTED)).last_error
+        film.write_bytes(b"x")
+        assert (await preview.reaches(State.RUNNING)).counters.restarts == 1
+
+
+@row("port in use, address not local")
+@in_virtual_time
+async def test_a_port_in_use(tmp_path: Path) -> None:
+    await retried(Preview(tmp_path, Script(fault=PORT)), PORT.text)
+
+
+@row("source fails or ends")
+@in_virtual_time
+async def test_a_source_that_ends(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE, fault_after_s=5))
+    await retried(preview, SOURCE.text)
+    assert (tmp_path / GRAPH).read_text(encoding="utf-8").startswith("digraph")
+    assert all(pipeline.stopped for pipeline in preview.pipelines.built)
+
+
+@row("source stalls")
+@in_virtual_time
+async def test_a_source_that_stalls(tmp_path: Path) -> None:
+    await retried(Preview(tmp_path, Script(fault=STALLED, fault_after_s=5)), STALLED.text)
+
+
+@row("encoder can't be opened or fails")
+@pytest.mark.parametrize("after_s", [0, 5])
+@in_virtual_time
+async def test_an_encoder_that_fails(tmp_path: Path, after_s: float) -> None:
+    await replaced(Preview(tmp_path, Script(fault=ENCODER, fault_after_s=after_s)), ENCODER)
+
+
+@row("encoder is silent, or gives empty buffers")
+@pytest.mark.parametrize("after_s", [0, 5])
+@in_virtual_time
+async def test_a_silent_encoder(tmp_path: Path, after_s: float) -> None:
+    await replaced(Preview(tmp_path, Script(fault=SILENT, fault_after_s=after_s)), SILENT)
+
+
+@row("encoder's driver blocks a start or an adjustment")
+@in_virtual_time
+async def test_a_driver_that_blocks_a_profile_change(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault_in_switch=STUCK))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.runs_with("mpp-h265")
+        preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
+        state = await preview.runs_with("va-h265")
+        assert state.profile is Profile.LOW_BW
+        assert state.encoder
+        assert state.encoder.fallback_reason == STUCK.text
+
+
+@row("last proven encoder fails")
+@in_virtual_time
+async def test_without_an_alternative_the_encoder_is_tried_again(tmp_path: Path) -> None:
+    await retried(
+        Preview(tmp_path, Script(fault=ENCODER, fault_after_s=1), order=("mpp-h265",)), ENCODER.text
+    )
+
+
+@row("pipeline fails again after running steadily")
+@in_virtual_time
+async def test_the_backoff_starts_again_after_a_steady_run(tmp_path: Path) -> None:
+    soon, late = Script(fault=SOURCE, fault_after_s=1), Script(fault=SOURCE, fault_after_s=STEADY_AFTER_S + 1)
+    preview = Preview(tmp_path, soon, soon, soon, late, soon)
+    delays_s = []
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        for count in range(1, 6):
+            await preview.until(lambda actual, count=count: actual.counters.faults == count)  # type: ignore[misc]
+            faulted_at = now()
+            await preview.reaches(State.STARTING)
+            delays_s.append(round(now() - faulted_at))
+    assert delays_s == [1, 2, 4, 1, 2]
+
+
+@row("pipeline fails while it is being stopped")
+@in_virtual_time
+async def test_a_fault_of_the_teardown_is_ignored(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault_in_stop=ENCODER))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        preview.supervisor.apply(OFF)
+        assert preview.supervisor.actual().state is State.STOPPING
+        state = await preview.reaches(State.DISABLED)
+        assert (state.last_error, state.counters) == ("", Counters(starts=1))
+
+
+@row("encoder hangs after a fault")
+@in_virtual_time
+async def test_an_encoder_that_hangs_is_left_behind(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SILENT, encoder_hangs=True))
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        await preview.runs_with("va-h265")
+        assert now() - faulted_at == pytest.approx(ENCODER_STOP_S + FIRST_FRAME_S, abs=0.05)
+        # The process goes on, also with another session, until the preview is disabled.
+        await asyncio.sleep(10 * STOP_DEADLINE_S)
+        preview.supervisor.apply(DesiredState(5, True, Profile.BALANCED, "another session"))
+        await preview.runs_with("va-h265")
+        assert len(preview.pipelines.built) == 3
+        preview.supervisor.apply(OFF)
+    assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
+
+
+@row("encoder hangs after a fault")
+@in_virtual_time
+async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SILENT, stop_s=2))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.runs_with("va-h265")
+        assert preview.marker.encoder == "va-h265"
+        preview.supervisor.apply(OFF)
+        await preview.reaches(State.DISABLED)
+        assert now() == pytest.approx(2 + FIRST_FRAME_S, abs=0.1), (
+            "disabled when the slow encoder has stopped"
+        )
+
+
+@row("encoder hangs when the preview is disabled")
+@in_virtual_time
+async def test_an_encoder_that_hangs_at_the_end(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(encoder_hangs=True))
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        preview.supervisor.apply(OFF)
+    assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
+
+
+@row("source or listener hangs when stopped")
+@pytest.mark.parametrize("fault", [None, SOURCE])
+@in_virtual_time
+async def test_a_listener_that_hangs(tmp_path: Path, fault: Fault | None) -> None:
+    preview = Preview(tmp_path, Script(fault=fault, fault_after_s=1, listener_hangs=True))
+    async with preview.serving(dies_of="the SRT listener hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        if fault is None:
+            preview.supervisor.apply(OFF)
+    assert preview.marker.reason == "", "no encoder is blamed"
+
+
+@row("driver crashes the process")
+@in_virtual_time
+async def test_the_crash_marker_names_the_encoder_as_long_as_it_is_in_use(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=1))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.runs_with("mpp-h265")
+        assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "")
+        await preview.runs_with("va-h265")
+        assert preview.marker.encoder == "va-h265"
+        preview.supervisor.apply(OFF)
+        await preview.reaches(State.DISABLED)
+        assert preview.marker.encoder == ""
+    # The next process reads the marker (test_crash_marker.py) and passes that encoder over.
+    following = Preview(tmp_path)
+    following.selection.pass_over("mpp-h265", "encoder mpp-h265 is passed over: the process crashed")
+    async with following.serving():
+        following.supervisor.apply(ON)
+        await following.runs_with("va-h265")
+
+
+@row("hardware preferred, only x264 works")
+@in_virtual_time
+async def test_software_for_hardware(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, prober=Prober(mpp_h265=NO_OUTPUT, va_h265=NO_OUTPUT))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        state = await preview.runs_with("x264")
+        assert state.last_error == (
+            "no hardware encoder works, so the CPU encodes with x264: it produced no output"
+        )
+        assert state.counters == Counters(starts=1)
+
+
+@row("gateway is gone")
+@in_virtual_time
+async def test_unwatched_it_stops_and_the_same_revision_enables_it_again(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, timeouts=TimeoutSettings(without_gateway_s=20))
+    running = asyncio.create_task(preview.supervisor.run(preview.stop))
+    with preview.supervisor.watched():
+        preview.supervisor.apply(ON)
+        await asyncio.sleep(100)
+        assert preview.supervisor.actual().state is State.RUNNING
+    await asyncio.sleep(15)
+    preview.supervisor.apply(ON)  # A gateway that only applies postpones it, too.
+    await asyncio.sleep(15)
+    assert preview.supervisor.actual().state is State.RUNNING
+    state = await preview.reaches(State.DISABLED)
+    assert now() == pytest.approx(135, abs=1)
+    assert state.last_error == "the preview stopped by itself: no gateway has watched it for 20 s"
+    assert (state.applied_revision, state.profile) == (0, Profile.BALANCED)
+    preview.supervisor.apply(ON)
+    assert (await preview.reaches(State.RUNNING)).last_error == ""
+    with preview.supervisor.watched():
+        await asyncio.sleep(100)
+        left_at = now()
+    await preview.reaches(State.DISABLED)
+    assert now() - left_at == pytest.approx(20, abs=1)
+    preview.stop.set()
+    await running
+
+
+# --- requests ---
+
+
+@in_virtual_time
+async def test_enable_and_disable(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        before = preview.supervisor.actual()
+        assert (before.state, before.applied_revision, before.stream) == (State.DISABLED, 0, None)
+        answer = preview.supervisor.apply(ON)
+        assert (answer.state, answer.applied_revision, answer.stream) == (State.STARTING, 1, None)
+        state = await preview.until(lambda actual: actual.measurement is not None)
+        assert (state.state, state.profile) == (State.RUNNING, Profile.BALANCED)
+        assert state.stream == preview.pipelines.built[0].stream
+        preview.supervisor.apply(OFF)
+        after = await preview.reaches(State.DISABLED)
+        assert (after.applied_revision, after.profile, after.stream) == (2, Profile.BALANCED, None)
+        assert after.counters == Counters(starts=1)
+        assert preview.pipelines.built[0].stopped
+
+
+@in_virtual_time
+async def test_the_same_revision_changes_nothing(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        assert preview.supervisor.apply(ON).state is State.RUNNING
+        assert preview.supervisor.apply(DesiredState(ON.revision, False)).state is State.RUNNING
+        await asyncio.sleep(10)
+        assert len(preview.pipelines.built) == 1
+
+
+@in_virtual_time
+async def test_enabled_again_while_it_stops(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        preview.supervisor.apply(OFF)
+        assert preview.supervisor.apply(AGAIN).state is State.STOPPING
+        state = await preview.reaches(State.RUNNING)
+        assert (state.applied_revision, state.counters) == (3, Counters(starts=2))
+
+
+@in_virtual_time
+async def test_disabled_during_the_trials_nothing_is_built(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, prober=Prober(trial_s=2))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await asyncio.sleep(1)
+        preview.supervisor.apply(OFF)
+        await preview.reaches(State.DISABLED)
+        assert now() == pytest.approx(2)
+        assert not preview.pipelines.built
+
+
+@in_virtual_time
+async def test_another_profile_keeps_the_pipeline(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
+        state = await preview.until(lambda actual: actual.profile is Profile.LOW_BW)
+        assert state.stream
+        assert (state.state, state.stream.target.fps) == (State.RUNNING, 15)
+        assert len(preview.pipelines.built) == 1
+
+
+@in_virtual_time
+async def test_another_passphrase_rebuilds_the_pipeline(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(build_error="no camera"))
+    async with preview.serving():
+        preview.supervisor.apply(DesiredState(1, True, Profile.BALANCED, "correct horse"))
+        assert (await preview.reaches(State.RUNNING)).last_error == "no camera"
+        changed = DesiredState(2, True, Profile.BALANCED, "battery staple")
+        assert preview.supervisor.apply(changed).state is State.STOPPING
+        assert (await preview.reaches(State.RUNNING)).last_error == "", "a new session"
+        old, new = preview.pipelines.built
+        assert old.stopped
+        assert new.plan.passphrase == "battery staple"
+
+
+@pytest.mark.parametrize("order", [("mpp-h265", "va-h265"), ("mpp-h265",)])
+@in_virtual_time
+async def test_a_new_request_retries_at_once(tmp_path: Path, order: tuple[str, ...]) -> None:
+    faults = [Script(fault=SOURCE)] * 5
+    preview = Preview(tmp_path, *faults, order=order)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.until(lambda actual: actual.counters.faults == 5)
+        faulted_at = now()
+        await asyncio.sleep(1)
+        assert preview.supervisor.apply(AGAIN).state is State.STARTING
+        await preview.reaches(State.RUNNING)
+        assert now() - faulted_at == pytest.approx(1 + FIRST_FRAME_S, abs=0.1)
+        await asyncio.sleep(100)  # The retry that was scheduled is cancelled.
+
+
+@in_virtual_time
+async def test_a_new_request_during_the_teardown_retries_right_after_it(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE, stop_s=0.2))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        assert preview.supervisor.apply(AGAIN).state is State.FAULTED
+        state = await preview.reaches(State.RUNNING)
+        assert now() - faulted_at == pytest.approx(0.2 + FIRST_FRAME_S, abs=0.1)
+        assert (state.applied_revision, state.counters.restarts) == (3, 1)
+
+
+@in_virtual_time
+async def test_disabled_while_faulted(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE, stop_s=1))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        preview.supervisor.apply(OFF)
+        state = await preview.reaches(State.DISABLED)
+        assert state.last_error == SOURCE.text
+        await asyncio.sleep(100)
+        assert len(preview.pipelines.built) == 1
+
+
+@in_virtual_time
+async def test_a_request_for_a_retry_does_not_outlive_a_disable(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE), Script(fault=SOURCE))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        preview.supervisor.apply(AGAIN)
+        preview.supervisor.apply(DesiredState(4, False))
+        await preview.reaches(State.DISABLED)
+        preview.supervisor.apply(DesiredState(5, True))
+        await preview.until(lambda actual: actual.counters.faults == 2)
+        faulted_at = now()
+        await preview.reaches(State.STARTING)
+        assert now() - faulted_at == pytest.approx(1, abs=0.1)
+
+
+@in_virtual_time
+async def test_at_the_end_no_pipeline_is_left(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+    assert preview.pipelines.built[0].stopped
+    assert preview.supervisor.actual().state is State.DISABLED
+    assert preview.marker.encoder == ""
