@@ -11,6 +11,7 @@ from console.client.mapping.methods import (
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
     PreviewRequest,
+    WatchRequest,
 )
 from console.client.options import ClientOptions
 from console.client.results import (
@@ -110,7 +111,9 @@ class AsyncGatewayClient:
         """Returns the offset of the robot's clock. Each call improves `clock`."""
         return await self._calls.ping(self.clock)
 
-    def watch_status(self, min_interval_s: float = 0.1) -> AsyncIterator[WatchedStatus | Outage]:
+    def watch_status(
+        self, min_interval_s: float = 0.1, *, include_detections: bool = False
+    ) -> AsyncIterator[WatchedStatus | Outage]:
         """Yields the status at once, on every change, and once a second without one. Never ends.
 
         A slow reader gets the newest next. A broken connection is made again; meanwhile an `Outage` comes
@@ -118,11 +121,12 @@ class AsyncGatewayClient:
 
         Args:
             min_interval_s: Least time between two statuses; the gateway looks for changes 20 times a second.
+            include_detections: Whether each has the detections; new ones then count as a change.
 
         Raises:
             GatewayError: No gateway answers at the beginning, or it refuses; not for a later outage.
         """
-        return self._streams.status(min_interval_s)
+        return self._streams.status(WatchRequest(min_interval_s, include_detections))
 
     def events(
         self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN

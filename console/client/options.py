@@ -1,7 +1,6 @@
 """A client's deadlines, retries and keepalive."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common import backoff
@@ -22,12 +21,6 @@ class Backoff:
     def start(self) -> backoff.Backoff:
         """Returns the pauses, beginning with the first."""
         return backoff.Backoff(self.first_s, self.longest_s, self.factor)
-
-    def pauses(self) -> Iterator[float]:
-        """Yields the pause before each further attempt, in seconds, without end."""
-        pauses = self.start()
-        while True:
-            yield pauses.next_s()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

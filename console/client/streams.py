@@ -13,6 +13,7 @@ from console.client.mapping.methods import (
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
     Method,
+    WatchRequest,
 )
 from console.client.options import ClientOptions
 from console.client.results import CaughtUp, Event, EventGap, WatchedStatus
@@ -81,13 +82,12 @@ class Streams:
         self.reconnects = 0
         """Connections after the first one of each stream, of all streams together."""
 
-    async def status(self, min_interval_s: float) -> AsyncGenerator[WatchedStatus | Outage]:
+    async def status(self, request: WatchRequest) -> AsyncGenerator[WatchedStatus | Outage]:
         """Yields statuses and outages; polls where the gateway does not stream its status."""
-        if min_interval_s <= _LONGEST_INTERVAL_S:
-            silent_s = max(_STATUS_SILENT_S, min_interval_s)
-            watched = self._reconnecting(
-                WATCH_SYSTEM_STATUS, lambda: min_interval_s, silent_s, newest_only=True
-            )
+        interval_s = request.min_interval_s
+        if interval_s <= _LONGEST_INTERVAL_S:
+            silent_s = max(_STATUS_SILENT_S, interval_s)
+            watched = self._reconnecting(WATCH_SYSTEM_STATUS, lambda: request, silent_s, newest_only=True)
             try:
                 async with aclosing(watched):
                     async for item in watched:
@@ -95,7 +95,7 @@ class Streams:
             except Unsupported:
                 # The gateway is older than this method.
                 pass
-        async with aclosing(self._poll(max(min_interval_s, _SHORTEST_POLL_S))) as polled:
+        async with aclosing(self._poll(max(interval_s, _SHORTEST_POLL_S))) as polled:
             async for answer in polled:
                 yield answer
 

@@ -12,7 +12,7 @@ from google.protobuf.message import Message
 from console.client.mapping import enums
 from console.client.mapping.events import event_item
 from console.client.mapping.info import gateway_info
-from console.client.mapping.overlay import overlay_snapshot
+from console.client.mapping.overlay import detections, overlay_snapshot
 from console.client.mapping.preview import preview
 from console.client.mapping.status import system_status
 from console.client.results import (
@@ -48,8 +48,21 @@ class PreviewRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class WatchRequest:
+    """A subscription to the status.
+
+    Args:
+        min_interval_s: Least time between two statuses.
+        include_detections: Whether each carries the detections; new ones then count as a change.
+    """
+
+    min_interval_s: float
+    include_detections: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class EventsRequest:
-    """A subscription.
+    """A subscription to events.
 
     Args:
         after: Where to resume; None begins with the oldest event that the gateway keeps.
@@ -101,12 +114,19 @@ def _preview_change(answer: wire.SetPreviewModeResponse) -> PreviewChange:
     return PreviewChange(accepted=answer.accepted, message=answer.message, preview=preview(answer.preview))
 
 
-def _watch_request(min_interval_s: float) -> Message:
-    return wire.WatchSystemStatusRequest(min_interval_ms=round(min_interval_s * _MS_PER_S))
+def _watch_request(request: WatchRequest) -> Message:
+    return wire.WatchSystemStatusRequest(
+        min_interval_ms=round(request.min_interval_s * _MS_PER_S),
+        include_detections=request.include_detections,
+    )
 
 
 def _watched_status(answer: wire.WatchSystemStatusResponse) -> WatchedStatus:
-    return WatchedStatus(status=system_status(answer.status), monotonic_ns=answer.monotonic_ns)
+    return WatchedStatus(
+        status=system_status(answer.status),
+        monotonic_ns=answer.monotonic_ns,
+        detections=detections(answer.detections) if answer.HasField("detections") else None,
+    )
 
 
 def _events_request(request: EventsRequest) -> Message:
@@ -143,7 +163,7 @@ GET_GATEWAY_INFO: Final[Method[None, GatewayInfo]] = Method(
 PING: Final[Method[None, RobotTime]] = Method(
     "Ping", lambda _: wire.PingRequest(), wire.PingResponse, _robot_time
 )
-WATCH_SYSTEM_STATUS: Final[Method[float, WatchedStatus]] = Method(
+WATCH_SYSTEM_STATUS: Final[Method[WatchRequest, WatchedStatus]] = Method(
     "WatchSystemStatus", _watch_request, wire.WatchSystemStatusResponse, _watched_status
 )
 SUBSCRIBE_EVENTS: Final[Method[EventsRequest, Event | EventGap | CaughtUp | None]] = Method(

@@ -10,7 +10,7 @@ def overlay_snapshot(message: wire.OverlaySnapshot) -> OverlaySnapshot:
     """Returns status, detections and events of one instant."""
     return OverlaySnapshot(
         status=system_status(message.status),
-        detections=_detections(message.detections),
+        detections=detections(message.detections),
         events=tuple(
             OperatorEvent(sequence=event.sequence, age_ms=event.age_ms, message=event.message)
             for event in message.events
@@ -18,7 +18,8 @@ def overlay_snapshot(message: wire.OverlaySnapshot) -> OverlaySnapshot:
     )
 
 
-def _detections(message: wire.DetectionOverlayStatus) -> Detections:
+def detections(message: wire.DetectionOverlayStatus) -> Detections:
+    """Returns the newest detections."""
     here = message.available
     return Detections(
         **sample(message),

@@ -18,7 +18,13 @@ from console.client.results.event import (
 )
 from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.info import GatewayFacts, GatewayInfo, MethodCounts
-from console.client.results.overlay import Detection, Detections, OperatorEvent, OverlaySnapshot
+from console.client.results.overlay import (
+    Detection,
+    Detections,
+    OperatorEvent,
+    OverlaySnapshot,
+    WatchedStatus,
+)
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
     Encoder,
@@ -48,5 +54,4 @@ from console.client.results.status import (
     TeleopCommand,
     TeleopState,
     Vision,
-    WatchedStatus,
 )

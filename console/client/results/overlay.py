@@ -53,3 +53,14 @@ class OverlaySnapshot:
     detections: Detections
     events: tuple[OperatorEvent, ...]
     """The newest 8, oldest first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WatchedStatus:
+    """A status with its time on the robot's monotonic clock and, on request, the detections of that time."""
+
+    status: SystemStatus
+    monotonic_ns: int | None
+    """None where an older gateway was polled."""
+    detections: Detections | None = None
+    """None where they were not requested, or the gateway is too old to send them."""

@@ -129,15 +129,6 @@ class SystemStatus:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WatchedStatus:
-    """A status with its time on the robot's monotonic clock."""
-
-    status: SystemStatus
-    monotonic_ns: int | None
-    """None where an older gateway was polled."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotTime:
     """Both clocks of the robot's computer, read together."""
 

@@ -147,3 +147,14 @@ def test_an_older_gateway_is_polled(tmp_path: Path) -> None:
         polled = [next_status(stream) for _ in range(3)]
     assert [each.monotonic_ns for each in polled] == [None] * 3
     assert double.calls.count("GetSystemStatus") >= 3
+
+
+async def test_detections_come_with_the_status_on_request(gateway: GatewayProgram) -> None:
+    async with AsyncGatewayClient(f"127.0.0.1:{gateway.port}") as client, asyncio.timeout(20):
+        requested = await anext(client.watch_status(include_detections=True))
+        plain = await anext(client.watch_status())
+    assert isinstance(requested, WatchedStatus)
+    assert requested.detections is not None
+    assert not requested.detections.available, "no source is configured"
+    assert isinstance(plain, WatchedStatus)
+    assert plain.detections is None

@@ -25,6 +25,7 @@ from console.client.mapping.methods import (
     EventsRequest,
     Method,
     PreviewRequest,
+    WatchRequest,
 )
 from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
 from omniseer.gateway.v1 import (
@@ -215,6 +216,7 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
         "gateway.requests_refused",
     ),
     "DetectionOverlayStatus.available": ("age_ms", "source_width_px", "source_height_px", "count"),
+    "WatchSystemStatusResponse.detections": ("detections",),
 }
 """Flag that may be down, or field that may be unset -> what is None then in the result of its message."""
 
@@ -477,9 +479,12 @@ def test_every_field_of_a_subscription_is_set() -> None:
     assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
 
 
-def test_the_interval_of_a_watch_is_sent_in_ms() -> None:
-    request = robot_gateway_pb2.WatchSystemStatusRequest.FromString(WATCH_SYSTEM_STATUS.encode(0.25))
+def test_every_field_of_a_watch_is_set() -> None:
+    request = robot_gateway_pb2.WatchSystemStatusRequest.FromString(
+        WATCH_SYSTEM_STATUS.encode(WatchRequest(0.25, include_detections=True))
+    )
     assert request.min_interval_ms == 250
+    assert request.include_detections
     assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
 
 

@@ -20,6 +20,7 @@ from console.client.mapping.methods import (
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
     Method,
+    WatchRequest,
 )
 from console.client.options import Backoff, ClientOptions
 from console.client.results import CaughtUp, EventPosition, WatchedStatus
@@ -126,22 +127,22 @@ def kinds(steps: list[Any]) -> list[str]:
 
 async def test_what_is_read_is_yielded() -> None:
     driver = Driver(STATUS, STATUS)
-    steps = await driver.run(driver.streams.status(0.5))
+    steps = await driver.run(driver.streams.status(WatchRequest(0.5)))
     assert kinds(steps) == ["Open", "Read", "Yielded", "Read", "Yielded", "Read"]
-    assert steps[0] == Open(WATCH_SYSTEM_STATUS, 0.5, newest_only=True)
+    assert steps[0] == Open(WATCH_SYSTEM_STATUS, WatchRequest(0.5), newest_only=True)
     assert steps[2] == Yielded(STATUS)
 
 
 async def test_silence_is_an_outage_later_than_the_gateways_keepalive() -> None:
     driver = Driver(STATUS)
-    steps = await driver.run(driver.streams.status(3.0))
+    steps = await driver.run(driver.streams.status(WatchRequest(3.0)))
     assert steps[1].within_s == OPTIONS.answer_within_s, "the first comes at once"
     assert steps[-1].within_s == 3.0 + OPTIONS.answer_within_s
 
 
 async def test_an_outage_is_reported_and_retried_with_growing_pauses() -> None:
     driver = Driver(STATUS, *[GONE] * 5, STATUS, GONE)
-    steps = await driver.run(driver.streams.status(0.1))
+    steps = await driver.run(driver.streams.status(WatchRequest(0.1)))
     outages = [step.item.attempt for step in steps if isinstance(step, Yielded) and step.item is not STATUS]
     assert outages == [1, 2, 3, 4, 5, 1]
     pauses = [step.seconds for step in steps if isinstance(step, Sleep)]
@@ -152,14 +153,14 @@ async def test_an_outage_is_reported_and_retried_with_growing_pauses() -> None:
 async def test_a_robot_that_never_answered_is_given_up() -> None:
     driver = Driver(*[GONE] * 20)
     with pytest.raises(Unreachable):
-        await driver.run(driver.streams.status(0.1))
+        await driver.run(driver.streams.status(WatchRequest(0.1)))
     assert driver.transport.now_s <= 1.0
 
 
 @pytest.mark.parametrize("error", [DeadlineExceeded("silent"), Overloaded("too much")])
 async def test_silence_and_a_full_gateway_are_outages(error: GatewayError) -> None:
     driver = Driver(STATUS, error)
-    assert Yielded(Outage(error, 1)) in await driver.run(driver.streams.status(0.1))
+    assert Yielded(Outage(error, 1)) in await driver.run(driver.streams.status(WatchRequest(0.1)))
 
 
 async def test_an_error_that_no_retry_mends_ends_the_stream() -> None:
@@ -179,7 +180,7 @@ async def test_events_resume_where_they_stopped() -> None:
 
 async def test_a_gateway_without_the_stream_is_polled() -> None:
     driver = Driver(Unsupported("older"), None, GONE, None)
-    asked = (await driver.run(driver.streams.status(0.5)))[2:]
+    asked = (await driver.run(driver.streams.status(WatchRequest(0.5))))[2:]
     per_poll = ["Call", "Yielded", "Sleep"]
     assert kinds(asked) == [*per_poll, *per_poll, *per_poll, "Call"]
     assert asked[0].method is GET_SYSTEM_STATUS
@@ -189,12 +190,12 @@ async def test_a_gateway_without_the_stream_is_polled() -> None:
 
 async def test_an_interval_longer_than_any_gateway_streams_is_polled() -> None:
     driver = Driver()
-    assert isinstance((await driver.run(driver.streams.status(61.0)))[0], Call)
+    assert isinstance((await driver.run(driver.streams.status(WatchRequest(61.0))))[0], Call)
 
 
 async def test_closing_the_stream_ends_its_call() -> None:
     driver = Driver(STATUS, STATUS)
-    stream = driver.streams.status(0.5)
+    stream = driver.streams.status(WatchRequest(0.5))
     assert await anext(stream) is STATUS
     assert driver.transport.open_calls == 1
     await stream.aclose()
