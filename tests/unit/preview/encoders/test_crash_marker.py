@@ -25,7 +25,7 @@ else:
 sys.stdout.flush()
 os.kill(os.getpid(), int(sys.argv[2]))
 """
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
 def life(directory: Path, *uses: str, ends_by: signal.Signals = signal.SIGTERM) -> str:
