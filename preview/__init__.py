@@ -1,1 +1,1 @@
-"""The video side: GStreamer pipelines on demand, served over SRT."""
+"""Preview service: GStreamer pipelines on demand, served over SRT."""

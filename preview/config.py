@@ -14,8 +14,6 @@ from common.config import Section, Settings
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
 from preview.values import Codec, Profile, Target
 
-MAX_WIDTH_PX = 3840
-MAX_HEIGHT_PX = 2160
 MAX_FPS = 120
 MAX_BITRATE_KBPS = 100_000
 
@@ -65,8 +63,8 @@ Source = Annotated[TestSource | V4l2Source | FileSource | GstSource, Field(discr
 class ProfileSettings(Section):
     """Stream parameters of one profile."""
 
-    width_px: int = Field(default=1280, ge=64, le=MAX_WIDTH_PX, multiple_of=2)
-    height_px: int = Field(default=720, ge=64, le=MAX_HEIGHT_PX, multiple_of=2)
+    width_px: int = Field(default=1280, ge=64, le=3840, multiple_of=2)
+    height_px: int = Field(default=720, ge=64, le=2160, multiple_of=2)
     fps: int = Field(default=30, ge=1, le=MAX_FPS)
     bitrate_kbps: int = Field(default=2500, ge=50, le=MAX_BITRATE_KBPS)
     floor_kbps: int = Field(default=500, ge=50, le=MAX_BITRATE_KBPS)

@@ -1,8 +1,8 @@
 """Reconciles the preview with its desired state. The only owner of the lifecycle and of the pipeline.
 
-Whatever happens (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on
-the loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway
-never waits for a pipeline, and no two state changes of a pipeline overlap.
+Every event (a request, a first frame, a fault, a timer) only moves the pure lifecycle, at once and on the
+loop; then one task, `run`, brings the pipeline to the lifecycle's state. So an answer to the gateway never
+waits for a pipeline, and no two state changes of a pipeline overlap.
 
 What can fail, how it is noticed, and what follows:
 
@@ -298,15 +298,12 @@ class Supervisor:
             self._retry_now = False
             self._move(Event.RETRY)
         else:
-            self._schedule_retry()
+            if self._retry_timer is None:
+                delay_s = self._lifecycle.retry_delay_s
+                _log.info("next attempt in %g s", delay_s)
+                self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
             return False
         return True
-
-    def _schedule_retry(self) -> None:
-        if self._retry_timer is None:
-            delay_s = self._lifecycle.retry_delay_s
-            _log.info("next attempt in %g s", delay_s)
-            self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
 
     async def _finish_stopping(self) -> None:
         if self._pipeline:
@@ -384,7 +381,7 @@ class Supervisor:
             self._move(Event.ENABLE)
         elif state is State.FAULTED:
             self._retry_now = self._retry_now or new_request
-        elif self._pipeline and self._pipeline.plan.listener.passphrase != self._desired.passphrase:
+        elif self._pipeline and self._pipeline.plan.passphrase != self._desired.passphrase:
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         self._wake.set()

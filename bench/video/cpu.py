@@ -88,11 +88,11 @@ def _round(source: Camera, robot: product.Robot) -> _Round | None:
 
 def _same_encoder() -> str:
     """What the preview service tells x264enc for BALANCED, as a command line says it."""
-    spelling = CATALOGUE["x264"].spelling
+    properties = CATALOGUE["x264"].properties
     values = {
-        **spelling.fixed,
+        **properties.fixed,
         "bitrate": BITRATE_KBPS,
         "key-int-max": GOP_FRAMES,
-        spelling.vbv_ms: vbv_ms(BITRATE_KBPS),
+        properties.vbv_ms: vbv_ms(BITRATE_KBPS),
     }
     return " ".join(["x264enc", *(f"{name}={value}" for name, value in values.items())])

@@ -1,14 +1,15 @@
 """The options that every command has, before or after its name."""
 
+import os
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 import typer
 
 from common.errors import UserError
-from console.cli.session import Session, open_session
+from console.cli.session import Session, standard_output
 from console.client import DEFAULT_TARGET
-from console.robots import read_robots_file
+from console.robots import choose, read_robots_file
 
 
 def robot_names(incomplete: str) -> list[tuple[str, str]]:
@@ -62,13 +63,14 @@ def keep_global_options(context: typer.Context, target: str | None, robot: str |
 def session_of(
     context: typer.Context, target: str | None, as_json: bool, robot: str | None = None
 ) -> Session:
-    """Returns the session of a command. Options after its name take precedence over those before.
+    """Returns a session on standard output. An option after the command's name overrides one before it.
 
     Raises:
         UserError: No robot has this name, or the file of known robots is wrong.
     """
     before: GlobalOptions = context.obj
-    return open_session(target or before.target, robot or before.robot, json_requested(context, as_json))
+    choice = choose(target or before.target, robot or before.robot, os.environ)
+    return Session(choice.robot, json_requested(context, as_json), standard_output(), choice.name)
 
 
 def json_requested(context: typer.Context, as_json: bool) -> bool:

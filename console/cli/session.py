@@ -11,7 +11,7 @@ from rich.console import Console, RenderableType
 
 from common.errors import ExitCode, UserError
 from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
-from console.robots import Robot, choose, read_credentials, read_robots_file
+from console.robots import Robot, read_credentials, read_robots_file
 
 # In a pipe or a file long lines are better than broken ones.
 _WIDTH_OF_A_FILE = 160
@@ -67,16 +67,6 @@ class Session:
     def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
         """Prints one JSON document and flushes the output."""
         print_json(self.out, value, on_one_line=on_one_line)
-
-
-def open_session(target: str | None, robot: str | None, as_json: bool) -> Session:
-    """Returns a session on standard output with the chosen robot.
-
-    Raises:
-        UserError: No robot has this name, or the file of known robots is wrong.
-    """
-    choice = choose(target, robot, os.environ)
-    return Session(choice.robot, as_json, standard_output(), choice.name)
 
 
 def standard_output() -> Console:

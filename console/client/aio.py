@@ -1,7 +1,6 @@
 """The asyncio client. The blocking one (blocking.py) is a facade over it."""
 
 from collections.abc import AsyncIterator
-from types import TracebackType
 from typing import Self
 
 from console.client.clock import Clock, Offset
@@ -149,10 +148,5 @@ class AsyncGatewayClient:
     async def __aenter__(self) -> Self:
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         await self.close()

@@ -1,8 +1,8 @@
 """Maps gRPC codes and the gateway's reasons to the client's exceptions. Both tables are total."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final
 
 import grpc
 
@@ -112,16 +112,6 @@ _NOT_TRUSTED: Final = (
 """The same for a TLS handshake that failed because of the server's certificate."""
 
 
-class _Coded(Protocol):
-    """The interface of an RPC error, which gRPC's types do not declare."""
-
-    def code(self) -> grpc.StatusCode: ...
-
-    def details(self) -> str | None: ...
-
-    def trailing_metadata(self) -> Iterable[Any] | None: ...
-
-
 def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> GatewayError:
     """Returns the exception for a failed call.
 
@@ -130,9 +120,10 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
         target: The robot's address, for the message.
         timeout_s: The deadline of the call.
     """
-    coded = cast("_Coded", failure)
-    code, refusal = coded.code(), refusal_in(coded.trailing_metadata())
-    details = coded.details() or code.name
+    # Both gRPC APIs raise errors with these methods, but share no class that declares them.
+    call: Any = failure
+    code, refusal = call.code(), refusal_in(call.trailing_metadata())
+    details = call.details() or code.name
     if code is grpc.StatusCode.UNAVAILABLE and (why := _message_for(details, _NOT_TRUSTED)):
         return NotTrusted(f"what answers at {target} is not trusted: {why}")
     family = REASONS.get(refusal.reason, ERRORS[code])

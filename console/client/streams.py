@@ -16,6 +16,7 @@ from console.client.mapping.methods import (
 )
 from console.client.options import ClientOptions
 from console.client.results import CaughtUp, Event, EventGap, WatchedStatus
+from console.client.unary import UnaryTransport
 
 RequestT = TypeVar("RequestT")
 ResultT = TypeVar("ResultT")
@@ -53,19 +54,13 @@ class ResponseStream(Protocol):
         """Ends the call."""
 
 
-class StreamTransport(Protocol):
+class StreamTransport(UnaryTransport, Protocol):
     """What streams need of a transport."""
 
     def open(
         self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool
     ) -> ResponseStream:
         """Starts a server-streaming call."""
-
-    async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
-        """Returns the result of one attempt, or raises a `GatewayError`."""
-
-    async def sleep(self, seconds: float) -> None:
-        """Sleeps, or raises `Cancelled` when the client is closed."""
 
 
 class Streams:

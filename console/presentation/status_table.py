@@ -133,7 +133,7 @@ def preview_rows(preview: PreviewStatus) -> Iterator[Row]:
         yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
     if preview.measured.available:
         freshness = preview.measured.freshness
-        text = _stream(preview.measured, preview.target_bitrate_kbps)
+        text = _video(preview.measured, False, preview.target_bitrate_kbps)
         stream_age = age(preview.measured.age_ms)
         yield Row("stream", _MARKS[freshness], FRESHNESS_STYLES[freshness], text, stream_age)
     if preview.endpoint and preview.state is PreviewState.RUNNING:
@@ -295,22 +295,16 @@ def _network(network: Network, compact: bool) -> str:
     )
 
 
-def _video(measured: PreviewMeasurement, _compact: bool) -> str:
+def _video(measured: PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
+    rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     return joined(
-        quantity(measured.fps, "fps", 0),
-        quantity(measured.bitrate_kbps, "kbit/s", 0),
-        plural(measured.viewer_count, "viewer"),
-        f"loss {quantity(measured.worst_loss_percent, '%')}" if measured.worst_loss_percent else "",
-    )
-
-
-def _stream(measured: PreviewMeasurement, target_kbps: int) -> str:
-    return joined(
-        f"{quantity(measured.bitrate_kbps, 'kbit/s', 0)} of {target_kbps}",
+        quantity(measured.bitrate_kbps, "kbit/s", 0) + ("" if compact else f" of {target_kbps}"),
         quantity(measured.fps, "fps"),
         plural(measured.viewer_count, "viewer"),
-        "" if measured.worst_rtt_ms is None else f"round trip {quantity(measured.worst_rtt_ms, 'ms')}",
-        "" if measured.worst_loss_percent is None else f"loss {quantity(measured.worst_loss_percent, '%')}",
+        "" if compact or rtt_ms is None else f"round trip {quantity(rtt_ms, 'ms')}",
+        ""
+        if loss_percent is None or (compact and not loss_percent)
+        else f"loss {quantity(loss_percent, '%')}",
     )
 
 

@@ -1,7 +1,6 @@
 """Decodes one compressed stream into frames without waiting for the next one."""
 
 import time
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -11,32 +10,8 @@ from console.receiver.frame import Frame, PixelFormat, Plane
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
-
-@dataclass(frozen=True, slots=True)
-class Codec:
-    """GStreamer's names for one codec.
-
-    Args:
-        name: "h264" or "h265".
-        caps: media type of the stream.
-        parser: element that finds the parameter sets.
-        decoder: software decoder.
-    """
-
-    name: str
-    caps: str
-    parser: str
-    decoder: str
-
-
-CODECS = {
-    codec.caps: codec
-    for codec in (
-        Codec("h264", "video/x-h264", "h264parse", "avdec_h264"),
-        Codec("h265", "video/x-h265", "h265parse", "avdec_h265"),
-    )
-}
-
+CODECS = {"video/x-h264": "h264", "video/x-h265": "h265"}
+"""Codec by media type of its stream; GStreamer's parser, software decoder and caps are named after it."""
 _BAD = "gstreamer1.0-plugins-bad"
 _PACKAGES = {
     "capssetter": "gstreamer1.0-plugins-good",
@@ -103,7 +78,7 @@ class DecodingBranch:
     the slices of one frame instead of working at several frames.
 
     Args:
-        codec: of the stream.
+        codec: of the stream, "h264" or "h265".
         queue: takes every frame, on a GStreamer thread.
         options: pixel format and decoders.
 
@@ -111,19 +86,19 @@ class DecodingBranch:
         UserError: an element is not installed.
     """
 
-    def __init__(self, codec: Codec, queue: FrameQueue, options: ReceiverOptions) -> None:
+    def __init__(self, codec: str, queue: FrameQueue, options: ReceiverOptions) -> None:
         self._codec = codec
         self._queue = queue
         self._pixels = options.pixels
-        self._decoder = options.decoders.get(codec.name, codec.decoder)
+        self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
         self._layout: Any = None
         caps = f"video/x-raw,format={self._pixels.value}"
         self._sink = element("appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps=caps)
         self._handler = self._sink.connect("new-sample", self._on_sample)
         self._elements = [
-            element("capssetter", caps=f"{codec.caps},alignment=au"),
-            element(codec.parser),
+            element("capssetter", caps=f"video/x-{codec},alignment=au"),
+            element(f"{codec}parse"),
             element(self._decoder, thread_type="slice"),
             element("videoconvert"),
             self._sink,
@@ -168,7 +143,7 @@ class DecodingBranch:
         return Frame(
             width=info.width,
             height=info.height,
-            codec=self._codec.name,
+            codec=self._codec,
             pts_ns=None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts,
             arrival_s=arrival_s,
             corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),

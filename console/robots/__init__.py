@@ -7,14 +7,3 @@ from console.robots.robots_file import Robot, RobotsFile, read_robots_file, robo
 
 read_book = read_robots_file
 """The name that scripts know it by (docs/client.md)."""
-
-__all__ = [
-    "Credentials",
-    "Robot",
-    "RobotsFile",
-    "choose",
-    "read_book",
-    "read_credentials",
-    "read_robots_file",
-    "robots_file_path",
-]

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Final, TypeAlias
+from typing import Final
 
 from common.errors import UserError
 from console.receiver.decoder_probe import HARDWARE, proven_decoder
@@ -10,8 +10,6 @@ from console.receiver.errors import StreamError, UndecodableError
 
 _TRIALS_TIMEOUT_S: Final = 3.0
 """How long the first connection waits for trials; after that it begins in software."""
-
-Prove: TypeAlias = Callable[[str], str | None]
 
 
 class Decoders:
@@ -21,7 +19,7 @@ class Decoders:
         prove: returns the hardware decoder for a codec, or None; tests pass a double.
     """
 
-    def __init__(self, prove: Prove = proven_decoder) -> None:
+    def __init__(self, prove: Callable[[str], str | None] = proven_decoder) -> None:
         self._prove = prove
         self._proven: dict[str, str] = {}
         self._software_only = self._waited = False

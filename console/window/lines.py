@@ -34,9 +34,9 @@ class TintedLine(QFrame):
         self.grid.setVerticalSpacing(1)
         self.grid.addWidget(self.marker, 0, 0, TOP)
 
-    def show_style(self, style: SeverityStyle) -> None:
-        """Changes shape and ground."""
-        self.marker.show_style(style)
+    def show_style(self, style: SeverityStyle, *, blank: bool = False) -> None:
+        """Changes shape and ground; a blank shape keeps its place."""
+        self.marker.show_style(style, blank=blank)
         self._colour_ground()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
@@ -165,7 +165,6 @@ class NoteLine(ItemLine):
 
     def show_item(self, item: Note) -> None:
         """Shows one note."""
-        self.show_style(item.style)
-        self.marker.show_blank(not item.text)
+        self.show_style(item.style, blank=not item.text)
         set_text(self.text, item.text)
         self.text.setToolTip(item.text)

@@ -74,35 +74,21 @@ class DimLabel(QLabel):
 
 
 class Marker(QWidget):
-    """A small shape: a disc with a tick, a triangle with "!", a square with a cross, an empty ring.
+    """A small shape: a disc with a tick, a triangle with "!", a square with a cross, an empty ring."""
 
-    Args:
-        style: selects the shape.
-    """
-
-    def __init__(self, style: SeverityStyle = SeverityStyle.QUIET) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._severity = style
+        self.severity = SeverityStyle.QUIET
+        """The style shown."""
         self._blank = False
         side = self.fontMetrics().height()
         self.setFixedSize(side, side)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
 
-    @property
-    def severity(self) -> SeverityStyle:
-        """The style shown."""
-        return self._severity
-
-    def show_style(self, style: SeverityStyle) -> None:
-        """Changes the shape."""
-        if style is not self._severity:
-            self._severity = style
-            self.update()
-
-    def show_blank(self, blank: bool) -> None:
-        """Hides the shape, but keeps its place."""
-        if blank is not self._blank:
-            self._blank = blank
+    def show_style(self, style: SeverityStyle, *, blank: bool = False) -> None:
+        """Changes the shape; a blank one keeps its place."""
+        if (style, blank) != (self.severity, self._blank):
+            self.severity, self._blank = style, blank
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
@@ -111,9 +97,8 @@ class Marker(QWidget):
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        draw_shape(
-            painter, QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5), self._severity, self.palette()
-        )
+        box = QRectF(self.rect()).adjusted(1.5, 1.5, -1.5, -1.5)
+        draw_shape(painter, box, self.severity, self.palette())
 
 
 def draw_shape(painter: QPainter, box: QRectF, style: SeverityStyle, palette: QPalette) -> None:

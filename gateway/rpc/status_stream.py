@@ -9,12 +9,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from gateway.rpc.mapping.status import system_status
+from gateway.rpc.mapping.status import detections_message, system_status
 from gateway.rpc.ports import SnapshotSource
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.response_cache import REUSE_S
 from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot
+from gateway.status.sources import DETECTIONS
 from gateway.status.watch_pacing import TICK_MS, WatchPacing
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
 
@@ -30,6 +31,7 @@ _NS_PER_S: Final = 1_000_000_000
 @dataclass(eq=False, slots=True)
 class _Watcher:
     pacing: WatchPacing
+    with_detections: bool
     wake: asyncio.Future[None] | None = None
     """What it waits for; None while a response is on the way to it."""
 
@@ -48,10 +50,11 @@ class StatusStream:
         self._watchers: set[_Watcher] = set()
         self._watched = asyncio.Event()
         self._tick = 0
-        self._version = 0
+        self._versions = {False: 0, True: 0}
+        """Of the status without and with detections."""
         self._snapshot = state.snapshot()
         self._change_key = change_key(self._snapshot)
-        self._responses: dict[Recipient, bytes] = {}
+        self._responses: dict[tuple[Recipient, bool], bytes] = {}
         self.skipped = 0
         """Responses that came due while the one before was still on its way: those readers got newer ones."""
 
@@ -74,24 +77,27 @@ class StatusStream:
             self._refresh()
             self._wake_due()
 
-    async def responses(self, min_interval_ms: int, recipient: Recipient) -> AsyncIterator[bytes]:
+    async def responses(
+        self, min_interval_ms: int, recipient: Recipient, *, with_detections: bool = False
+    ) -> AsyncIterator[bytes]:
         """Yields serialised responses until the caller leaves: one at once, then whenever one is due."""
         loop = asyncio.get_running_loop()
         # A caller that has just switched the preview, and then watches, sees that in the first response.
         self._refresh_if_older_than(REUSE_S)
-        with self._watching(min_interval_ms) as watcher:
+        with self._watching(min_interval_ms, with_detections) as watcher:
             while True:
-                yield self._newest(recipient)
+                yield self._newest(recipient, with_detections)
                 # The next one may have come due while this one was on its way.
-                if not watcher.pacing.due(self._tick, self._version):
+                if not self._due(watcher):
                     watcher.wake = loop.create_future()
                     await watcher.wake
                     watcher.wake = None
-                watcher.pacing.sent(self._tick, self._version)
+                watcher.pacing.sent(self._tick, self._versions[with_detections])
 
     @contextmanager
-    def _watching(self, min_interval_ms: int) -> Iterator[_Watcher]:
-        watcher = _Watcher(WatchPacing(min_interval_ms, self._tick, self._version))
+    def _watching(self, min_interval_ms: int, with_detections: bool) -> Iterator[_Watcher]:
+        pacing = WatchPacing(min_interval_ms, self._tick, self._versions[with_detections])
+        watcher = _Watcher(pacing, with_detections)
         self._watchers.add(watcher)
         self._watched.set()
         try:
@@ -100,28 +106,35 @@ class StatusStream:
             self._watchers.discard(watcher)
 
     def _refresh(self) -> None:
-        self._snapshot = self._state.snapshot()
+        before, self._snapshot = self._snapshot, self._state.snapshot()
         self._responses.clear()
         seen = change_key(self._snapshot)
-        if seen != self._change_key:
+        changed = seen != self._change_key
+        if changed:
             self._change_key = seen
-            self._version += 1
+            self._versions[False] += 1
+        if changed or _detections_changed(before, self._snapshot):
+            self._versions[True] += 1
 
     def _refresh_if_older_than(self, seconds: float) -> None:
         if self._clock() - self._snapshot.at_s > seconds:
             self._refresh()
 
-    def _newest(self, recipient: Recipient) -> bytes:
+    def _due(self, watcher: _Watcher) -> bool:
+        return watcher.pacing.due(self._tick, self._versions[watcher.with_detections])
+
+    def _newest(self, recipient: Recipient, with_detections: bool) -> bytes:
         # Older than a tick only for the first watcher after a while, or when the loop was held up.
         self._refresh_if_older_than(_TICK_S)
-        response = self._responses.get(recipient)
+        key = (recipient, with_detections)
+        response = self._responses.get(key)
         if response is None:
-            response = self._responses[recipient] = _serialised(self._snapshot, recipient)
+            response = self._responses[key] = _serialised(self._snapshot, recipient, with_detections)
         return response
 
     def _wake_due(self) -> None:
         """Wakes groups spread over the tick: any other call waits for one group only."""
-        watchers = [each for each in self._watchers if each.pacing.due(self._tick, self._version)]
+        watchers = [each for each in self._watchers if self._due(each)]
         due = [each.wake for each in watchers if each.wake is not None]
         self.skipped += len(watchers) - len(due)
         loop = asyncio.get_running_loop()
@@ -136,7 +149,15 @@ def _wake(waiting: Iterable[asyncio.Future[None]]) -> None:
             each.set_result(None)
 
 
-def _serialised(snapshot: Snapshot, recipient: Recipient) -> bytes:
+def _detections_changed(before: Snapshot, after: Snapshot) -> bool:
+    """By identity: each message makes a new value, and comparing a hundred boxes would cost more."""
+    old, new = before[DETECTIONS], after[DETECTIONS]
+    return old.value is not new.value or old.freshness.stale != new.freshness.stale
+
+
+def _serialised(snapshot: Snapshot, recipient: Recipient, with_detections: bool) -> bytes:
     return WatchSystemStatusResponse(
-        status=system_status(snapshot, recipient), monotonic_ns=int(snapshot.at_s * _NS_PER_S)
+        status=system_status(snapshot, recipient),
+        monotonic_ns=int(snapshot.at_s * _NS_PER_S),
+        detections=detections_message(snapshot[DETECTIONS]) if with_detections else None,
     ).SerializeToString()

@@ -1,1 +1,1 @@
-"""Which encoders exist, which of them this machine really has, and which one is used."""
+"""Encoders: the catalogue, the trials that prove them, and the selection."""

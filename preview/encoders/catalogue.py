@@ -1,4 +1,4 @@
-"""Catalogue of encoder elements, as data: how each family spells the properties that we need.
+"""Catalogue of encoder elements, as data: the properties of each family.
 
 GStreamer ranks are useless for choosing an encoder, and property names and units differ between families. So
 each family states here the properties for bit rate, GOP length and low latency, and its input caps.
@@ -33,7 +33,7 @@ class KeyFrameBy(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Spelling:
+class ElementProperties:
     """Property names and values of a family of elements.
 
     Args:
@@ -55,7 +55,7 @@ class Spelling:
     fixed: Mapping[str, str] = field(default_factory=dict)
     vbv_ms: str = ""
     vbv_options: str = ""
-    controls: Mapping[str, str | int] = field(default_factory=dict)
+    controls: Mapping[str, str] = field(default_factory=dict)
     input_caps: str = "video/x-raw,format=NV12"
     upload: str = ""
     key_frame_by: KeyFrameBy = KeyFrameBy.EVENT
@@ -70,104 +70,88 @@ class Encoder:
     element: str
     codec: Codec
     hardware: bool
-    spelling: Spelling
+    properties: ElementProperties
 
 
-_MPP = Spelling(
+def _values(text: str) -> dict[str, str]:
+    """Returns properties written as in gst-launch: "name=value name=value"."""
+    return dict(pair.split("=", 1) for pair in text.split())
+
+
+_MPP = ElementProperties(
     # `bps` upstream, `bitrate` in forks; bit/s in both.
     bitrate=("bps", "bitrate"),
     unit=Unit.BIT_PER_S,
     gop=("gop",),
     # max-pending: frames kept in the encoder; the default is 16.
-    fixed={"header-mode": "each-idr", "rc-mode": "cbr", "max-pending": "1"},
+    fixed=_values("header-mode=each-idr rc-mode=cbr max-pending=1"),
 )
-_V4L2 = Spelling(
+_V4L2 = ElementProperties(
     # Properties of its own exist from GStreamer 1.29 only; before, everything is a V4L2 control.
     bitrate=(),
     gop=(),
-    controls={
-        "video_bitrate": "bitrate",
-        "video_bitrate_mode": 1,
-        "video_gop_size": "gop",
-        "video_b_frames": 0,
-        "repeat_sequence_header": 1,
-    },
+    controls=_values(
+        "video_bitrate=bitrate video_bitrate_mode=1 video_gop_size=gop video_b_frames=0"
+        " repeat_sequence_header=1"
+    ),
 )
-_VA = Spelling(fixed={"rate-control": "cbr", "b-frames": "0", "ref-frames": "1"})
-_NV = Spelling(
+_VA = ElementProperties(fixed=_values("rate-control=cbr b-frames=0 ref-frames=1"))
+_NV = ElementProperties(
     gop=("gop-size",),
-    fixed={
-        "rc-mode": "cbr",
-        "bframes": "0",
-        "b-frames": "0",
-        "zerolatency": "true",
-        "zero-reorder-delay": "true",
-        "rc-lookahead": "0",
-        "preset": "low-latency-hq",
-        "repeat-sequence-header": "true",
-    },
+    fixed=_values(
+        "rc-mode=cbr bframes=0 b-frames=0 zerolatency=true zero-reorder-delay=true rc-lookahead=0"
+        " preset=low-latency-hq repeat-sequence-header=true"
+    ),
 )
-_NVV4L2 = Spelling(
+_NVV4L2 = ElementProperties(
     unit=Unit.BIT_PER_S,
     gop=("iframeinterval", "idrinterval"),
-    fixed={"control-rate": "1", "insert-sps-pps": "true", "num-B-Frames": "0", "maxperf-enable": "true"},
+    fixed=_values("control-rate=1 insert-sps-pps=true num-B-Frames=0 maxperf-enable=true"),
     input_caps="video/x-raw(memory:NVMM),format=NV12",
     upload="nvvidconv",
     key_frame_by=KeyFrameBy.SIGNAL,
 )
-_QSV = Spelling(
-    gop=("gop-size",),
-    fixed={"rate-control": "cbr", "b-frames": "0", "low-latency": "true", "idr-interval": "0"},
+_QSV = ElementProperties(
+    gop=("gop-size",), fixed=_values("rate-control=cbr b-frames=0 low-latency=true idr-interval=0")
 )
-_MSDK = Spelling(
+_MSDK = ElementProperties(
     gop=("gop-size",),
     # The default of b-frames is -1, the driver's choice.
-    fixed={"rate-control": "cbr", "b-frames": "0", "low-delay-brc": "true", "async-depth": "1"},
+    fixed=_values("rate-control=cbr b-frames=0 low-delay-brc=true async-depth=1"),
 )
-_X264 = Spelling(
-    fixed={
-        "tune": "zerolatency",
-        "speed-preset": "superfast",
-        "bframes": "0",
-        "byte-stream": "true",
-        "intra-refresh": "false",
-    },
+_X264 = ElementProperties(
+    fixed=_values("tune=zerolatency speed-preset=superfast bframes=0 byte-stream=true intra-refresh=false"),
     # The default of 600 ms allows key frames so large that they cost latency.
     vbv_ms="vbv-buf-capacity",
     input_caps="video/x-raw,format={ I420, NV12 }",
 )
-_X265 = Spelling(
+_X265 = ElementProperties(
     # The element has no VBV property: it is among the options, as is everything that may delay a frame.
-    fixed={
-        "tune": "zerolatency",
-        "speed-preset": "ultrafast",
-        "option-string": "bframes=0:open-gop=0:repeat-headers=1",
-    },
+    fixed=_values(
+        "tune=zerolatency speed-preset=ultrafast option-string=bframes=0:open-gop=0:repeat-headers=1"
+    ),
     vbv_options="option-string",
     input_caps="video/x-raw,format=I420",
 )
 
 
-def _pair(family: str, h265: str, h264: str, spelling: Spelling, *more: tuple[str, str]) -> list[Encoder]:
-    """Returns the entries of a hardware family, H.265 first; `more` are (suffix, element) for H.265."""
+def _hardware(family: str, properties: ElementProperties) -> list[Encoder]:
+    """Returns the two entries of a hardware family, whose elements are named alike in all families."""
     return [
-        Encoder(f"{family}-h265", family, h265, Codec.H265, True, spelling),
-        *(
-            Encoder(f"{family}-h265{suffix}", family, element, Codec.H265, True, spelling)
-            for suffix, element in more
-        ),
-        Encoder(f"{family}-h264", family, h264, Codec.H264, True, spelling),
+        Encoder(f"{family}-{codec.value}", family, f"{family}{codec.value}enc", codec, True, properties)
+        for codec in (Codec.H265, Codec.H264)
     ]
 
 
 _ENTRIES: Final = (
-    *_pair("mpp", "mpph265enc", "mpph264enc", _MPP),
-    *_pair("nvv4l2", "nvv4l2h265enc", "nvv4l2h264enc", _NVV4L2),
-    *_pair("v4l2", "v4l2h265enc", "v4l2h264enc", _V4L2),
-    *_pair("va", "vah265enc", "vah264enc", _VA, ("-lp", "vah265lpenc")),
-    *_pair("nv", "nvh265enc", "nvh264enc", _NV),
-    *_pair("qsv", "qsvh265enc", "qsvh264enc", _QSV),
-    *_pair("msdk", "msdkh265enc", "msdkh264enc", _MSDK),
+    *_hardware("mpp", _MPP),
+    *_hardware("nvv4l2", _NVV4L2),
+    *_hardware("v4l2", _V4L2),
+    *_hardware("va", _VA),
+    Encoder("va-h265-lp", "va", "vah265lpenc", Codec.H265, True, _VA),
+    *_hardware("nv", _NV),
+    *_hardware("qsv", _QSV),
+    *_hardware("msdk", _MSDK),
     Encoder("x264", "x264", "x264enc", Codec.H264, False, _X264),
     Encoder("x265", "x265", "x265enc", Codec.H265, False, _X265),
 )

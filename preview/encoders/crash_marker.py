@@ -12,7 +12,9 @@ import faulthandler
 import json
 import logging
 from pathlib import Path
-from typing import IO, Final, Protocol
+from typing import IO, Final
+
+from preview.encoders.selection import Selection
 
 _log = logging.getLogger(__name__)
 
@@ -20,13 +22,6 @@ _MARKER: Final = "encoder-in-use.json"
 _REPORT: Final = "crash.txt"
 _IN_USE: Final = ""
 """Reason of a marker that blames the encoder only together with a crash report."""
-
-
-class Selection(Protocol):
-    """Encoder selection that can exclude an encoder."""
-
-    def pass_over(self, name: str, reason: str) -> None:
-        """Excludes an encoder for a while."""
 
 
 class CrashMarkerFile:

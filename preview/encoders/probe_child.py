@@ -46,6 +46,33 @@ class _Counts:
     parsed: int = 0
     key_frames: int = 0
 
+    def on_input(self, _pad: Any, _info: Any) -> Any:
+        self.first_in_at = time.monotonic()
+        return Gst.PadProbeReturn.REMOVE
+
+    def on_encoded(self, _pad: Any, info: Any) -> Any:
+        self.encoded += 1
+        self.encoded_bytes += info.get_buffer().get_size()
+        if self.encoded_bytes:
+            self.first_out_at = self.first_out_at or time.monotonic()
+        return Gst.PadProbeReturn.OK
+
+    def on_parsed(self, _pad: Any, info: Any) -> Any:
+        self.parsed += 1
+        self.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
+        return Gst.PadProbeReturn.OK
+
+    def outcome(self) -> Outcome:
+        if self.encoded == 0:
+            return Outcome("it produced no output")
+        if self.encoded_bytes == 0:
+            return Outcome("it produced only empty buffers")
+        if self.parsed < _ENOUGH:
+            return Outcome(f"only {self.parsed} of {FRAMES} frames could be parsed")
+        if self.key_frames == 0:
+            return Outcome("its stream has no key frame")
+        return Outcome(first_byte_ms=(self.first_out_at - self.first_in_at) * 1000)
+
 
 def main() -> None:
     """Runs one trial; the arguments are the encoder's name, width, height, frames/s and kbit/s.
@@ -71,7 +98,12 @@ def main() -> None:
 def trial(pipeline: Any) -> Outcome:
     """Encodes FRAMES moving frames and evaluates the output."""
     counts = _Counts()
-    _watch(pipeline, counts)
+    for element, pad, probe in (
+        ("encoder", "sink", counts.on_input),
+        ("encoder", "src", counts.on_encoded),
+        ("out", "sink", counts.on_parsed),
+    ):
+        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
         return Outcome(_first_error(pipeline) or "it can't be started")
     message = pipeline.get_bus().timed_pop_filtered(
@@ -81,7 +113,7 @@ def trial(pipeline: Any) -> Outcome:
     consequence = counts.encoded_bytes == 0 and message.src is pipeline.get_by_name("parser")
     if message.type == Gst.MessageType.ERROR and not consequence:
         return Outcome(message.parse_error()[0].message)
-    return _judge(counts)
+    return counts.outcome()
 
 
 def build(encoder: Encoder, target: Target) -> Any:
@@ -103,43 +135,6 @@ def build(encoder: Encoder, target: Target) -> Any:
     kbps = target.bitrate_kbps
     properties.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
-
-
-def _watch(pipeline: Any, counts: _Counts) -> None:
-    def entered(_pad: Any, _info: Any) -> Any:
-        counts.first_in_at = counts.first_in_at or time.monotonic()
-        return Gst.PadProbeReturn.REMOVE
-
-    def encoded(_pad: Any, info: Any) -> Any:
-        counts.encoded += 1
-        counts.encoded_bytes += info.get_buffer().get_size()
-        if counts.encoded_bytes:
-            counts.first_out_at = counts.first_out_at or time.monotonic()
-        return Gst.PadProbeReturn.OK
-
-    def parsed(_pad: Any, info: Any) -> Any:
-        counts.parsed += 1
-        counts.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
-        return Gst.PadProbeReturn.OK
-
-    for element, pad, probe in (
-        ("encoder", "sink", entered),
-        ("encoder", "src", encoded),
-        ("out", "sink", parsed),
-    ):
-        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
-
-
-def _judge(counts: _Counts) -> Outcome:
-    if counts.encoded == 0:
-        return Outcome("it produced no output")
-    if counts.encoded_bytes == 0:
-        return Outcome("it produced only empty buffers")
-    if counts.parsed < _ENOUGH:
-        return Outcome(f"only {counts.parsed} of {FRAMES} frames could be parsed")
-    if counts.key_frames == 0:
-        return Outcome("its stream has no key frame")
-    return Outcome(first_byte_ms=(counts.first_out_at - counts.first_in_at) * 1000)
 
 
 def _first_error(pipeline: Any) -> str:

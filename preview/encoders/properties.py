@@ -26,7 +26,7 @@ def chain(encoder: Encoder) -> str:
     return " ! ".join(
         [
             "videoscale ! videoconvert",
-            *([encoder.spelling.upload] if encoder.spelling.upload else []),
+            *([encoder.properties.upload] if encoder.properties.upload else []),
             "capsfilter name=size",
             f"{encoder.element} name=encoder",
             f"{_PARSERS[encoder.codec]} name=parser config-interval=-1",
@@ -38,7 +38,7 @@ def chain(encoder: Encoder) -> str:
 def size_caps(encoder: Encoder, target: Target) -> Any:
     """Returns the caps of the encoder's input, for the capsfilter `size`."""
     return Gst.Caps.from_string(
-        f"{encoder.spelling.input_caps},width={target.width_px},height={target.height_px}"
+        f"{encoder.properties.input_caps},width={target.width_px},height={target.height_px}"
         ",pixel-aspect-ratio=1/1"
     )
 
@@ -54,17 +54,17 @@ def configure(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int
         highest_kbps: highest bit rate that a profile may switch to. x265's options can't change while it
             runs, and it cuts a bit rate above `vbv-maxrate` down to it.
     """
-    spelling = encoder.spelling
+    names = encoder.properties
     size_kbit = max(1, highest_kbps * vbv_ms(highest_kbps) // 1000)
-    for name, value in spelling.fixed.items():
-        vbv = f":vbv-maxrate={highest_kbps}:vbv-bufsize={size_kbit}" if name == spelling.vbv_options else ""
+    for name, value in names.fixed.items():
+        vbv = f":vbv-maxrate={highest_kbps}:vbv-bufsize={size_kbit}" if name == names.vbv_options else ""
         _set(element, name, value + vbv)
     set_rates(element, encoder, bitrate_kbps, gop_frames)
 
 
 def set_rates(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: int) -> None:
     """Sets bit rate and GOP length, as a change of profile does."""
-    for name in encoder.spelling.gop:
+    for name in encoder.properties.gop:
         _set(element, name, str(gop_frames))
     set_bitrate(element, encoder, bitrate_kbps, gop_frames)
 
@@ -78,16 +78,16 @@ def set_bitrate(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: i
         bitrate_kbps: the bit rate.
         gop_frames: GOP length in effect; V4L2 controls are set together.
     """
-    spelling = encoder.spelling
-    for name in spelling.bitrate:
-        _set(element, name, str(bitrate_kbps * spelling.unit.value))
-    if spelling.vbv_ms:
-        _set(element, spelling.vbv_ms, str(vbv_ms(bitrate_kbps)))
-    if spelling.controls:
-        values = {"bitrate": bitrate_kbps * 1000, "gop": gop_frames}
-        controls = ((n, values[v] if isinstance(v, str) else v) for n, v in spelling.controls.items())
+    names = encoder.properties
+    for name in names.bitrate:
+        _set(element, name, str(bitrate_kbps * names.unit.value))
+    if names.vbv_ms:
+        _set(element, names.vbv_ms, str(vbv_ms(bitrate_kbps)))
+    if names.controls:
+        rates = {"bitrate": bitrate_kbps * 1000, "gop": gop_frames}
+        controls = [f"{name}=(int){rates.get(value, value)}" for name, value in names.controls.items()]
         # One structure; the element hands it to the driver at once, even while playing.
-        _set(element, "extra-controls", ",".join(["controls", *(f"{n}=(int){v}" for n, v in controls)]))
+        _set(element, "extra-controls", ",".join(["controls", *controls]))
 
 
 def vbv_ms(bitrate_kbps: int) -> int:
@@ -104,7 +104,7 @@ def request_key_frame(element: Any, encoder: Encoder, sink_pad: Any) -> None:
         sink_pad: sink pad of the listener. The event travels upstream from there through muxer and parser,
             which then repeat their tables and headers.
     """
-    if encoder.spelling.key_frame_by is KeyFrameBy.SIGNAL:
+    if encoder.properties.key_frame_by is KeyFrameBy.SIGNAL:
         if GObject.signal_lookup(KeyFrameBy.SIGNAL.value, element):
             element.emit(KeyFrameBy.SIGNAL.value)
         return

@@ -38,12 +38,6 @@ class Prober(Protocol):
         """Returns the result for one encoder; runs its trial when there is none."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Failure:
-    reason: str
-    at: float
-
-
 class Selection:
     """Chooses encoders and remembers those that failed in a pipeline.
 
@@ -65,11 +59,12 @@ class Selection:
         self._forgive_after_s = forgive_after_s
         self._prober = prober
         self._clock = clock
-        self._failures: dict[str, _Failure] = {}
+        self._failures: dict[str, tuple[str, float]] = {}
+        """Reason and time of each failure, by encoder name."""
 
     def pass_over(self, name: str, reason: str) -> None:
         """Excludes an encoder that failed in a pipeline, for `forgive_after_s`."""
-        self._failures[name] = _Failure(reason, self._clock())
+        self._failures[name] = (reason, self._clock())
 
     async def probe(self) -> bool:
         """Runs trials in order until an encoder is proven that has not failed; False when there is none."""
@@ -88,7 +83,7 @@ class Selection:
             UserError: no encoder is proven.
         """
         now = self._clock()
-        recent = {n: f for n, f in self._failures.items() if now - f.at < self._forgive_after_s}
+        recent = {n: (why, at) for n, (why, at) in self._failures.items() if now - at < self._forgive_after_s}
         proven = self._proven()
         if not proven:
             raise UserError(
@@ -106,7 +101,7 @@ class Selection:
 
     def _why_not(self, encoder: Encoder) -> str:
         if encoder.name in self._failures:
-            return self._failures[encoder.name].reason
+            return self._failures[encoder.name][0]
         verdict = self._prober.verdicts.get(encoder.name)
         return verdict.reason if verdict else f"{encoder.name} was not tried"
 

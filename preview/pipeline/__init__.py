@@ -1,1 +1,1 @@
-"""From a plan to a running pipeline. Together with encoders/, the only part that touches GStreamer."""
+"""One pipeline, from its plan to its teardown. Together with encoders/, the only part that uses GStreamer."""

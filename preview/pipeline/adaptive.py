@@ -112,13 +112,11 @@ class BitrateController:
         """Returns the signs of congestion, comma-separated; empty for none."""
         self._lowest_rtt_ms = min(link.rtt_ms, (self._lowest_rtt_ms or link.rtt_ms) * _BASELINE_DRIFT)
         long_rtt_ms = max(self._lowest_rtt_ms * _RTT_GROWTH, self._lowest_rtt_ms + _RTT_SLACK_MS)
+        resent = link.retransmitted_percent
         signs = [
             (link.rtt_ms > long_rtt_ms, f"RTT {link.rtt_ms:.0f} ms"),
             (link.loss_percent > _LOSS_PERCENT, f"{link.loss_percent:.0f} % loss"),
-            (
-                link.retransmitted_percent > _RETRANSMITTED_PERCENT,
-                f"{link.retransmitted_percent:.0f} % sent again",
-            ),
+            (resent > _RETRANSMITTED_PERCENT, f"{resent:.0f} % sent again"),
             (link.dropped_percent > _DROPPED_PERCENT, f"{link.dropped_percent:.1f} % too late to send"),
         ]
         return ", ".join(text for bad, text in signs if bad)
@@ -128,11 +126,10 @@ class BitrateController:
         after = max(self._floor_kbps, round(before * factor))
         self._too_much_kbps = before
         self._last_decrease_at = now
-        if after == before:
-            if after < self._target_kbps:
-                self._decision = Decision(after, f"{signs}: at the floor of {after} kbit/s")
-            return
-        self._decision = Decision(after, f"{signs}: {before} -> {after} kbit/s")
+        if after != before:
+            self._decision = Decision(after, f"{signs}: {before} -> {after} kbit/s")
+        elif after < self._target_kbps:
+            self._decision = Decision(after, f"{signs}: at the floor of {after} kbit/s")
 
     def _may_increase(self, now: float) -> bool:
         return (
@@ -147,9 +144,8 @@ class BitrateController:
         step = max(1, round(self._target_kbps * _INCREASE_SHARE / careful))
         after = min(self._target_kbps, before + step)
         self._last_increase_at = now
-        self._decision = Decision(
-            after, "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
-        )
+        reason = "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
+        self._decision = Decision(after, reason)
 
 
 def _factor(link: LinkReport) -> float:

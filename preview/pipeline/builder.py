@@ -17,8 +17,7 @@ from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
 from preview.pipeline import square_pixels
-from preview.pipeline.plan import ListenerPlan, Plan
-from preview.values import Target
+from preview.pipeline.plan import Plan
 
 _TABLES_EVERY: Final = 4500
 """In ticks of 90 kHz: 50 ms. At 10 frames per second and more, tables are at most 100 ms apart."""
@@ -84,7 +83,7 @@ def build(plan: Plan) -> Parts:
     adjustable = Adjustable(find("rate_caps"), find("size"), encoder)
     properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, plan.highest_kbps)
     apply_target(adjustable, plan)
-    _listen(sink, plan.listener)
+    _listen(sink, plan)
     return Parts(
         pipeline=pipeline,
         source=source,
@@ -102,11 +101,15 @@ def apply_target(elements: Adjustable, plan: Plan) -> None:
 
     Bit rate and GOP length first: new caps reinitialise the encoder, with the properties it has then.
     """
-    properties.set_rates(elements.encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames)
-    size = properties.size_caps(plan.encoder, plan.target)
-    rate = Gst.Caps.from_string(_rate_caps(plan.target, exact=plan.source.any_rate))
+    target = plan.target
+    properties.set_rates(elements.encoder, plan.encoder, target.bitrate_kbps, plan.gop_frames)
+    size = properties.size_caps(plan.encoder, target)
+    rate = f"[ 0/1, {target.fps}/1 ]"
+    if plan.source.any_rate:
+        rate = f"{target.fps}/1,width={target.width_px},height={target.height_px}"
+    rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate={rate}")
     # Setting equal caps again would reinitialise the encoder for nothing.
-    for capsfilter, caps in ((elements.size_caps, size), (elements.rate_caps, rate)):
+    for capsfilter, caps in ((elements.size_caps, size), (elements.rate_caps, rate_caps)):
         if not capsfilter.get_property("caps").is_equal(caps):
             capsfilter.set_property("caps", caps)
 
@@ -157,11 +160,12 @@ def _parsed(description: str, border: str, pad: str, remedy: str) -> Any:
     return made
 
 
-def _listen(sink: Any, listener: ListenerPlan) -> None:
+def _listen(sink: Any, plan: Plan) -> None:
+    srt = plan.srt
     # The URI first: setting it resets other properties.
-    host = f"[{listener.bind}]" if ":" in listener.bind else listener.bind
-    sink.set_property("uri", f"srt://{host}:{listener.port}?mode=listener")
-    sink.set_property("latency", listener.latency_ms)
+    host = f"[{srt.bind}]" if ":" in srt.bind else srt.bind
+    sink.set_property("uri", f"srt://{host}:{srt.port}?mode=listener")
+    sink.set_property("latency", srt.latency_ms)
     for name, value in (
         ("wait-for-connection", False),
         ("sync", False),
@@ -170,12 +174,6 @@ def _listen(sink: Any, listener: ListenerPlan) -> None:
         ("enable-last-sample", False),
     ):
         sink.set_property(name, value)
-    if listener.encrypted:
-        Gst.util_set_object_arg(sink, "pbkeylen", str(listener.key_length_bytes))
-        sink.set_property("passphrase", listener.passphrase)
-
-
-def _rate_caps(target: Target, *, exact: bool) -> str:
-    rates = f"{target.fps}/1" if exact else f"[ 0/1, {target.fps}/1 ]"
-    size = f",width={target.width_px},height={target.height_px}" if exact else ""
-    return f"video/x-raw(ANY),framerate={rates}{size}"
+    if plan.encrypted:
+        Gst.util_set_object_arg(sink, "pbkeylen", str(srt.key_length_bytes))
+        sink.set_property("passphrase", plan.passphrase)

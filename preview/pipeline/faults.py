@@ -64,10 +64,10 @@ def _text(blame: Blame, error: Any, debug: str, plan: Plan) -> str:
         case Blame.ENCODER:
             return f"encoder {plan.encoder.name} failed: {reason}"
         case Blame.LISTENER:
-            port = plan.listener.port
+            port = plan.srt.port
             if error.matches(Gst.ResourceError.quark(), Gst.ResourceError.OPEN_WRITE) or "bind" in debug:
                 return (
-                    f"UDP port {port} on {plan.listener.bind} can't be used: another program has it, or the"
+                    f"UDP port {port} on {plan.srt.bind} can't be used: another program has it, or the"
                     f" address is not this machine's. 'ss -lunp sport = :{port}' names the program; or choose"
                     " another srt.port."
                 )

@@ -2,35 +2,11 @@
 
 from dataclasses import dataclass, field, replace
 
-from preview.config import PreviewSettings
+from preview.config import PreviewSettings, SrtSettings
 from preview.encoders.catalogue import Encoder
 from preview.pipeline import sources
 from preview.pipeline.sources import SourcePlan
 from preview.values import DesiredState, EncoderChoice, Profile, Target
-
-
-@dataclass(frozen=True, slots=True)
-class ListenerPlan:
-    """SRT listener.
-
-    Args:
-        bind: local address.
-        port: UDP port.
-        latency_ms: SRTO_LATENCY.
-        key_length_bytes: SRTO_PBKEYLEN; applies with a passphrase only.
-        passphrase: SRTO_PASSPHRASE, empty for none. Excluded from repr.
-    """
-
-    bind: str
-    port: int
-    latency_ms: int
-    key_length_bytes: int = 16
-    passphrase: str = field(default="", repr=False)
-
-    @property
-    def encrypted(self) -> bool:
-        """Whether a viewer needs the passphrase."""
-        return bool(self.passphrase)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +20,8 @@ class Plan:
         profile: profile in effect.
         target: stream parameters of the profile.
         highest_kbps: highest bit rate of all profiles.
-        listener: its last element.
+        srt: its last element, the listener.
+        passphrase: SRTO_PASSPHRASE, empty for none. Excluded from repr.
         key_frame_interval_s: longest distance between key frames.
         adaptive: whether the bit rate follows the viewers' links.
     """
@@ -55,9 +32,15 @@ class Plan:
     profile: Profile
     target: Target
     highest_kbps: int
-    listener: ListenerPlan
+    srt: SrtSettings
+    passphrase: str = field(repr=False)
     key_frame_interval_s: float
-    adaptive: bool = False
+    adaptive: bool
+
+    @property
+    def encrypted(self) -> bool:
+        """Whether a viewer needs the passphrase."""
+        return bool(self.passphrase)
 
     @property
     def gop_frames(self) -> int:
@@ -77,7 +60,7 @@ def make_plan(
     Raises:
         UserError: the source can't be used.
     """
-    srt, targets = settings.srt, settings.profiles.targets
+    targets = settings.profiles.targets
     return Plan(
         source=sources.plan(settings.source, max(target.fps for target in targets.values())),
         encoder=encoder,
@@ -85,7 +68,8 @@ def make_plan(
         profile=desired.profile,
         target=targets[desired.profile],
         highest_kbps=max(target.bitrate_kbps for target in targets.values()),
-        listener=ListenerPlan(srt.bind, srt.port, srt.latency_ms, srt.key_length_bytes, desired.passphrase),
+        srt=settings.srt,
+        passphrase=desired.passphrase,
         key_frame_interval_s=settings.encoders.key_frame_interval_s,
         adaptive=settings.adaptive.enabled,
     )

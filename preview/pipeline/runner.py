@@ -9,7 +9,7 @@ of its own with a deadline.
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -66,9 +66,8 @@ class Runner:
         self._file_loop = FileLoop(parts, loop, self._source_ended) if plan.source.loops else None
         self._bus = parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
-        self._watch_task: asyncio.Task[None] | None = None
-        self._key_frame_task: asyncio.Task[None] | None = None
-        self._bitrate_task: asyncio.Task[None] | None = None
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        """The newest task of each kind."""
         self._driver_lock = asyncio.Lock()
         self._ended: asyncio.Future[None] = loop.create_future()
         """Done when the pipeline has failed or is being stopped; no event is reported from then on."""
@@ -78,7 +77,7 @@ class Runner:
         """Parameters of the stream being served."""
         plan, bitrate = self.plan, self._bitrate
         return StreamState(
-            plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, plan.listener.encrypted
+            plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, plan.encrypted
         )
 
     async def start(self) -> None:
@@ -94,7 +93,7 @@ class Runner:
         if outcome == Gst.StateChangeReturn.FAILURE:
             self._fail(faults.unexplained(self.plan))  # Counts only if no element posted an error.
             return
-        self._watch_task = asyncio.create_task(self._watch(), name="watch the pipeline")
+        self._spawn("watch", self._watch())
 
     async def switch(self, profile: Profile, target: Target) -> None:
         """Switches to another profile; viewers stay connected."""
@@ -123,8 +122,9 @@ class Runner:
         """
         self._end()  # Errors from here on are caused by the teardown.
         self._loop.remove_reader(self._bus_fd)
-        for task in filter(None, (self._watch_task, self._key_frame_task, self._bitrate_task)):
+        for task in self._tasks.values():
             task.cancel()
+        for task in self._tasks.values():
             with suppress(asyncio.CancelledError):
                 await task
         deadline_s = self._timeouts.stop_s
@@ -193,13 +193,7 @@ class Runner:
 
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
-        timeouts = self._timeouts
-        watchdogs = Watchdogs(
-            time.monotonic(),
-            first_frame_s=timeouts.start_s,
-            source_s=timeouts.source_silence_s,
-            encoder_s=timeouts.encoder_silence_s,
-        )
+        watchdogs = Watchdogs(time.monotonic(), self._timeouts)
         reading = statistics.read(self._framing, self._parts.sink)
         while True:
             await asyncio.sleep(_CHECK_INTERVAL_S)
@@ -223,22 +217,20 @@ class Runner:
 
     def _request_key_frame(self) -> None:
         """Requests a key frame for a new viewer; one that is already requested serves both."""
-        if self._ended.done() or _is_pending(self._key_frame_task):
+        if self._ended.done() or self._is_pending("key frame"):
             return
         sink_pad = self._parts.sink.get_static_pad("sink")
         call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, sink_pad)
-        self._key_frame_task = asyncio.create_task(
-            self._call_driver(call, "it was asked for a key frame"), name="key frame"
-        )
+        self._spawn("key frame", self._call_driver(call, "it was asked for a key frame"))
 
     def _adapt_bitrate(self, link: LinkReport | None) -> None:
-        if _is_pending(self._bitrate_task):
+        if self._is_pending("bit rate"):
             return  # The encoder has yet to apply the previous one.
         decision = self._controller.decide(link, time.monotonic())
         if decision.bitrate_kbps == self._bitrate.bitrate_kbps:
             self._bitrate = decision
         else:
-            self._bitrate_task = asyncio.create_task(self._set_bitrate(decision), name="bit rate")
+            self._spawn("bit rate", self._set_bitrate(decision))
 
     async def _set_bitrate(self, decision: Decision) -> None:
         _log.info("bit rate: %s", decision.reason)
@@ -251,6 +243,12 @@ class Runner:
         await self._call_driver(apply, "its bit rate was changed")
         if plan is self.plan:
             self._bitrate = decision
+
+    def _spawn(self, name: str, work: Coroutine[Any, Any, None]) -> None:
+        self._tasks[name] = asyncio.create_task(work, name=name)
+
+    def _is_pending(self, name: str) -> bool:
+        return name in self._tasks and not self._tasks[name].done()
 
     async def _call_driver(self, call: Callable[[], None], when: str) -> None:
         """Makes a call that may block in the encoder's driver: one at a time, none after the end."""
@@ -267,10 +265,6 @@ class Runner:
                 self._fail(faults.encoder_hung(self.plan, when))
             finally:
                 calling.cancel()
-
-
-def _is_pending(task: "asyncio.Task[None] | None") -> bool:
-    return task is not None and not task.done()
 
 
 def _stop_element(element: Any) -> None:

@@ -7,6 +7,8 @@ error.
 from dataclasses import dataclass
 from enum import Enum
 
+from preview.config import TimeoutSettings
+
 
 class Silent(Enum):
     """Part that stopped delivering."""
@@ -31,15 +33,14 @@ class Watchdogs:
 
     Args:
         now: monotonic seconds at the start.
-        first_frame_s: deadline of the source's first frame.
-        source_s: longest pause of the source afterwards.
-        encoder_s: longest pause of the encoder while it gets frames, also before its first one.
+        timeouts: `start_s` until the source's first frame, `source_silence_s` between later ones, and
+            `encoder_silence_s` without a frame of the encoder while it gets frames, also before its first.
     """
 
-    def __init__(self, now: float, *, first_frame_s: float, source_s: float, encoder_s: float) -> None:
-        self._first_frame_s = first_frame_s
-        self._source_s = source_s
-        self._encoder_s = encoder_s
+    def __init__(self, now: float, timeouts: TimeoutSettings) -> None:
+        self._first_frame_s = timeouts.start_s
+        self._source_s = timeouts.source_silence_s
+        self._encoder_s = timeouts.encoder_silence_s
         self._captured = _Counter(0, now)
         self._encoded = _Counter(0, now)
 

@@ -1,1 +1,1 @@
-"""What the gateway speaks to: requests to domain calls, domain values to messages."""
+"""gRPC interface for the gateway: PreviewService, and the mapping between messages and domain values."""

@@ -548,8 +548,12 @@ ADDITIONS = [
     ),
     Case(
         robot_gateway_pb2.WatchSystemStatusResponse,
-        sub(1, text(1, "lab")) + uint(2, 1 << 41),
-        {"status": system_status_pb2.SystemStatus(gateway_name="lab"), "monotonic_ns": 1 << 41},
+        sub(1, text(1, "lab")) + uint(2, 1 << 41) + sub(16, uint(6, 3)),
+        {
+            "status": system_status_pb2.SystemStatus(gateway_name="lab"),
+            "monotonic_ns": 1 << 41,
+            "detections": overlay_pb2.DetectionOverlayStatus(detection_count=3),
+        },
     ),
     Case(
         robot_gateway_pb2.SubscribeEventsRequest,
@@ -588,7 +592,11 @@ ADDITIONS = [
         text(1, "Ping") + uint(2, 1 << 40) + uint(3, 3) + uint(4, 2),
         {"method": "Ping", "served": 1 << 40, "refused": 3, "failed": 2},
     ),
-    Case(robot_gateway_pb2.WatchSystemStatusRequest, uint(1, 200), {"min_interval_ms": 200}),
+    Case(
+        robot_gateway_pb2.WatchSystemStatusRequest,
+        uint(1, 200) + uint(16, 1),
+        {"min_interval_ms": 200, "include_detections": True},
+    ),
     Case(event_pb2.EventPosition, text(1, "run") + uint(2, 5), {"run_id": "run", "sequence": 5}),
     Case(
         robot_gateway_pb2.SubscribeEventsResponse,

@@ -58,9 +58,7 @@ class PipelineDouble:
     @property
     def stream(self) -> StreamState:
         plan = self.plan
-        return StreamState(
-            plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, plan.listener.encrypted
-        )
+        return StreamState(plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, plan.encrypted)
 
     async def start(self) -> None:
         self._serving = asyncio.create_task(self._serve())

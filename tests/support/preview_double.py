@@ -107,7 +107,7 @@ class PreviewDouble(PreviewServiceServicer):
                 async with asyncio.timeout(SIGN_OF_LIFE_S):
                     await self._changed.wait()
             except TimeoutError:
-                pass  # time for a sign of life
+                pass  # time for a heartbeat
 
     async def ListEncoders(self, request: Any, context: Any) -> Any:  # noqa: N802  # grpc's name
         return pb.ListEncodersResponse()

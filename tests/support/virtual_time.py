@@ -37,11 +37,14 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
 
 def in_virtual_time(test: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
-    """Makes a test of a coroutine function that runs on a VirtualTimeLoop."""
+    """Makes a test of a coroutine function that runs on a VirtualTimeLoop; no callback may raise."""
 
     @functools.wraps(test)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        errors: list[dict[str, Any]] = []
         with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:
+            runner.get_loop().set_exception_handler(lambda _loop, context: errors.append(context))
             runner.run(test(*args, **kwargs))
+        assert not errors
 
     return run

@@ -59,7 +59,7 @@ def overlay_snapshot(snapshot: Snapshot, recipient: Recipient) -> overlay_pb2.Ov
     """Returns status, detections and events of one instant."""
     return overlay_pb2.OverlaySnapshot(
         status=system_status(snapshot, recipient),
-        detections=_detections(snapshot[DETECTIONS]),
+        detections=detections_message(snapshot[DETECTIONS]),
         events=[_event(event, snapshot.at_s) for event in snapshot.events],
     )
 
@@ -119,7 +119,8 @@ def _mission(sample: Sample[Mode]) -> system_status_pb2.MissionStatus:
     )
 
 
-def _detections(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatus:
+def detections_message(sample: Sample[Detections]) -> overlay_pb2.DetectionOverlayStatus:
+    """Returns the detections; an empty message, which reads "not available", before the first."""
     value = sample.value
     if value is None:
         return overlay_pb2.DetectionOverlayStatus()

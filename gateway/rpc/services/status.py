@@ -40,4 +40,8 @@ class StatusService:
         self, request: WatchSystemStatusRequest, call: CallContext
     ) -> AsyncIterator[bytes]:
         """Yields WatchSystemStatusResponses, serialised, until the caller leaves."""
-        return self._stream.responses(request.min_interval_ms, self._recipients.of(call))
+        return self._stream.responses(
+            request.min_interval_ms,
+            self._recipients.of(call),
+            with_detections=request.include_detections,
+        )

@@ -169,7 +169,7 @@ def test_disabling_ends_disabled(robot: Face, double: GatewayDouble) -> None:
     assert (change.preview.state, change.preview.profile) == (PreviewState.DISABLED, PreviewProfile.LOW_BW)
 
 
-def test_a_robot_that_takes_no_wishes_is_not_asked_for_more(robot: Face, double: GatewayDouble) -> None:
+def test_a_refused_request_is_not_followed_up(robot: Face, double: GatewayDouble) -> None:
     double.accept = False
     change = robot.enable_preview()
     assert not change.accepted
@@ -246,7 +246,7 @@ def test_every_other_failure_is_final_and_has_a_remedy(
     assert robot.status().gateway_name == "lab-1", "the client goes on"
 
 
-def test_a_refusal_is_told_in_the_robots_words(robot: Face, double: GatewayDouble) -> None:
+def test_a_refusal_has_the_robots_message(robot: Face, double: GatewayDouble) -> None:
     double.failures.append((grpc.StatusCode.RESOURCE_EXHAUSTED, "64 clients are enough"))
     with pytest.raises(Refused, match="refused: 64 clients are enough") as seen:
         robot.status()
@@ -267,7 +267,7 @@ def test_no_call_waits_for_ever(face: type[Face], port: int, double: GatewayDoub
         assert robot.retries == 0, "whether it happened is not known: that is for the caller to judge"
 
 
-def test_a_gateway_that_falls_silent_after_the_wish_ends_the_wait(face: type[Face]) -> None:
+def test_a_gateway_that_falls_silent_after_the_request_ends_the_wait(face: type[Face]) -> None:
     class FallsSilent(GatewayDouble):
         def SetPreviewMode(self, request: Any, context: Any) -> Any:  # noqa: N802 - the contract's name
             answer = super().SetPreviewMode(request, context)
@@ -421,13 +421,13 @@ def test_many_clients_leave_no_thread_and_no_socket(face: type[Face], port: int)
     closed: list[Face] = []
 
     def use_some(count: int) -> None:
-        nobody = at(free_tcp_port())
+        absent = at(free_tcp_port())
         for _ in range(count):
             with face(at(port)) as robot:
                 robot.status()
             # Kept, so that closing is what frees them, not the end of the last reference.
             closed.append(robot)
-            with face(nobody, HURRIED) as robot, pytest.raises(Unreachable):
+            with face(absent, HURRIED) as robot, pytest.raises(Unreachable):
                 robot.status()
 
     # gRPC's own threads and sockets, once per process.

@@ -19,7 +19,7 @@ from tests.support.robotctl_docs import documented, holds, leaves
 
 @pytest.fixture
 def ground(tmp_path: Path) -> Iterator[Path]:
-    """A preview service that does as it is told."""
+    """A preview service that follows its requests."""
     with double_process(tmp_path / "preview.sock"):
         yield tmp_path
 
@@ -40,26 +40,27 @@ def events(target: str, *words: str) -> list[dict[str, Any]]:
 
 
 def first_with(lines: Iterator[dict[str, Any]], part: str, kind: str | None = None) -> dict[str, Any]:
-    """The next line that tells this; the test's own time limit ends a wait for one that never comes."""
+    """The next line with this; the test's own time limit ends a wait for one that never comes."""
     return next(line for line in lines if line[part] and kind in (None, line[part].get("kind")))
 
 
-def test_since_goes_on_exactly_where_it_is_told(ground: Path) -> None:
+def test_since_resumes_exactly_after_its_position(ground: Path) -> None:
     with gateway_program(ground, sources=[]) as gateway:
         target = f"127.0.0.1:{gateway.port}"
         switch(gateway, True)
         switch(gateway, False)
-        told = events(target)
-        for document in told:
+        printed = events(target)
+        for document in printed:
             holds(documented("events --json"), document, complete=False)
             assert [part for part, value in document.items() if value is not None] == ["event"]
-        run_id, first = position(told[0])
-        assert [position(each) for each in told] == [(run_id, first + count) for count in range(len(told))]
-        assert {each["event"]["kind"] for each in told} >= {"control", "preview"}
+        run_id, first = position(printed[0])
+        count = len(printed)
+        assert [position(each) for each in printed] == [(run_id, first + more) for more in range(count)]
+        assert {each["event"]["kind"] for each in printed} >= {"control", "preview"}
         # More may have happened meanwhile.
         later = events(target, "--since", f"{run_id}:{first + 1}")
-        assert later[: len(told) - 2] == told[2:]
-        last = position(told[-1])[1]
+        assert later[: len(printed) - 2] == printed[2:]
+        last = position(printed[-1])[1]
         assert all(position(each)[1] > last for each in events(target, "--since", f"{run_id}:{last}"))
 
 

@@ -62,7 +62,7 @@ def test_a_robot_is_chosen_by_address_and_by_name(words: tuple[str, ...]) -> Non
 
 
 @pytest.mark.parametrize("extra", [{}, {"NO_COLOR": "1"}, {"NO_COLOR": "1", "FORCE_COLOR": "1"}], ids=str)
-def test_there_is_no_colour_where_nobody_wants_it(extra: dict[str, str]) -> None:
+def test_there_is_no_colour_where_it_is_switched_off(extra: dict[str, str]) -> None:
     with serving(GatewayDouble()) as port:
         for words in (("status",), ("overlay",), ("info",), ("doctor",), ("preview", "on"), ("robots",)):
             shown = robotctl("--target", f"127.0.0.1:{port}", *words, **extra).stdout

@@ -53,7 +53,7 @@ def test_json_has_exactly_the_documented_keys(
     target: str, known: str, section: str, arguments: tuple[str, ...]
 ) -> None:
     done = robotctl("--target", target, "--json", *arguments)
-    # A look that brought an answer has no error; the next test has one.
+    # An update with a status has no error; the next test has one.
     said = {key: type_ for key, type_ in documented(section).items() if not key.startswith("error.")}
     holds(said, json.loads(done.stdout), complete=known == "everything")
 
@@ -75,7 +75,7 @@ def test_json_of_a_lost_robot_has_exactly_the_documented_keys(
             assert watching.stdout
             watching.stdout.readline()
             double.failures.extend([(code, "gone")] * 100)
-            lost: Any = next(look for look in map(json.loads, watching.stdout) if look["error"])
+            lost: Any = next(update for update in map(json.loads, watching.stdout) if update["error"])
         finally:
             watching.terminate()
     said = documented("watch --json")

@@ -76,7 +76,7 @@ def test_the_list_for_people(person: Person) -> None:
     assert second.split() == ["two", person.targets["two"]]
 
 
-def test_nobody_known_yet_says_what_to_type(tmp_path: Path) -> None:
+def test_an_empty_list_says_what_to_type(tmp_path: Path) -> None:
     listed = robotctl("robots", XDG_CONFIG_HOME=str(tmp_path))
     assert listed.returncode == 0
     assert "Type: robotctl robots add NAME HOST:PORT" in listed.stdout

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.gst
 
 
 @pytest.mark.parametrize("passphrase", ["", "correct horse battery"])
-def test_a_listener_answers_and_takes_nobody_for_a_viewer(passphrase: str) -> None:
+def test_a_listener_answers_and_counts_no_viewer(passphrase: str) -> None:
     port = free_udp_port()
     with SrtSender(port, passphrase=passphrase) as sender:
         for _ in range(20):

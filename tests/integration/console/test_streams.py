@@ -38,7 +38,7 @@ def next_status(stream: Any) -> WatchedStatus:
     return next(item for item in stream if isinstance(item, WatchedStatus))
 
 
-def test_a_link_that_breaks_is_told_and_made_again(gateway: GatewayProgram) -> None:
+def test_a_broken_link_is_reported_and_restored(gateway: GatewayProgram) -> None:
     with Relay(gateway.port) as relay, GatewayClient(f"127.0.0.1:{relay.port}", QUICK) as client:
         stream = client.watch_status()
         next_status(stream)
@@ -54,7 +54,7 @@ def test_who_reads_slowly_gets_the_newest(gateway: GatewayProgram) -> None:
     with GatewayClient(f"127.0.0.1:{gateway.port}") as client:
         stream = client.watch_status()
         next_status(stream)
-        # The gateway tells its status once a second at least: five come, and only the last is kept.
+        # The gateway sends its status once a second at least: five come, and only the last is kept.
         waiting = threading.Event()
         waiting.wait(5.5)
         late, newer = next_status(stream), next_status(stream)
@@ -63,7 +63,7 @@ def test_who_reads_slowly_gets_the_newest(gateway: GatewayProgram) -> None:
         assert (time.monotonic_ns() - late.monotonic_ns) / 1e9 < 3, "not the first of those that came"
 
 
-def test_nobody_there_is_known_soon() -> None:
+def test_an_absent_robot_is_known_soon() -> None:
     with Relay(1) as relay:  # a port that was taken and is now free again
         port = relay.port
     began_s = time.monotonic()
@@ -132,18 +132,18 @@ async def test_closing_the_asyncio_client_ends_its_streams(gateway: GatewayProgr
             await reading
 
 
-async def test_the_robots_clock_is_known_within_what_is_told(gateway: GatewayProgram) -> None:
+async def test_the_robots_clock_is_known_within_its_bound(gateway: GatewayProgram) -> None:
     async with AsyncGatewayClient(f"127.0.0.1:{gateway.port}") as client:
         offsets = [await client.ping() for _ in range(5)]
     best = min(offsets, key=lambda offset: offset.error_s)
-    # Both run on one machine: the truth is zero.
+    # Both run on one machine: the actual offset is zero.
     assert abs(best.seconds) <= best.error_s + 1e-6
 
 
-def test_an_older_gateway_is_asked(tmp_path: Path) -> None:
+def test_an_older_gateway_is_polled(tmp_path: Path) -> None:
     double = GatewayDouble()
     with serving(double) as port, GatewayClient(f"127.0.0.1:{port}") as client:
         stream = client.watch_status(0.05)
-        told = [next_status(stream) for _ in range(3)]
-    assert [each.monotonic_ns for each in told] == [None] * 3
+        polled = [next_status(stream) for _ in range(3)]
+    assert [each.monotonic_ns for each in polled] == [None] * 3
     assert double.calls.count("GetSystemStatus") >= 3

@@ -113,7 +113,7 @@ def test_no_color_is_respected_on_a_terminal(double: GatewayDouble) -> None:
         assert codes <= {"", "0", "1", "2"}
 
 
-def test_a_robot_that_goes_is_told_with_the_age_of_what_is_shown(double: GatewayDouble) -> None:
+def test_an_outage_is_shown_with_the_age_of_the_values(double: GatewayDouble) -> None:
     with (
         serving(double) as port,
         robotctl_on_terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
@@ -125,7 +125,7 @@ def test_a_robot_that_goes_is_told_with_the_age_of_what_is_shown(double: Gateway
         wait_until(lambda: not any("NO ANSWER" in line for line in screen.lines()), "the robot is back", 30)
 
 
-def test_a_pipe_gets_one_line_per_look(double: GatewayDouble) -> None:
+def test_a_pipe_gets_one_line_per_update(double: GatewayDouble) -> None:
     with serving(double) as port:
         watching = Lines("watch", "--count", "3", "--interval", "0.1", "--target", f"127.0.0.1:{port}")
         assert watching.process.wait(ENDS_WITHIN_S) == 0
@@ -176,13 +176,13 @@ def test_a_gateway_that_restarts_is_followed(double: GatewayDouble) -> None:
         assert watching.close() == ""
 
 
-def test_looks_keep_their_beat(double: GatewayDouble) -> None:
-    """Twenty looks at 0.1 s take two seconds, not two and twenty answers; slower only on a busy machine."""
+def test_updates_keep_their_interval(double: GatewayDouble) -> None:
+    """Twenty updates at 0.1 s take two seconds, not two and twenty answers; slower only on a busy machine."""
     with (
         serving(double) as port,
         lines("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as watching,
     ):
         watching.wait_for("health ok")
         began_s, first = time.monotonic(), len(double.calls)
-        wait_until(lambda: len(double.calls) >= first + 20, "twenty more looks", 60)
-        assert time.monotonic() - began_s > 1.5, "it never asks faster than it was told"
+        wait_until(lambda: len(double.calls) >= first + 20, "twenty more updates", 60)
+        assert time.monotonic() - began_s > 1.5, "it never polls faster than the interval"

@@ -41,7 +41,7 @@ def screen(target: str) -> Iterator[Terminal]:
 
 
 def left_in_order(screen: Terminal, code: int = 0) -> None:
-    """It ended, and whoever types next finds the terminal as it was."""
+    """It ended, and the terminal is in its old mode."""
     assert screen.process.wait(ENDS_WITHIN_S) == code
     assert screen.manners() == screen.manners_before
     drawn = screen.read()
@@ -98,26 +98,26 @@ def test_a_refusal_is_shown_in_place(screen: Terminal, double: GatewayDouble) ->
 
 
 class OnlyLook(GatewayDouble):
-    """Lets nobody switch."""
+    """Refuses every preview request."""
 
     def SetPreviewMode(self, request: Any, context: Any) -> Any:  # noqa: N802  # the contract's name
-        context.abort(grpc.StatusCode.PERMISSION_DENIED, "viewers only look")
+        context.abort(grpc.StatusCode.PERMISSION_DENIED, "viewers only watch")
 
 
-def test_a_wish_that_is_not_even_heard_is_shown_in_place() -> None:
+def test_a_failed_request_is_shown_in_place() -> None:
     with (
         serving(OnlyLook()) as port,
         robotctl_on_terminal("watch", "--interval", "0.1", "--target", f"127.0.0.1:{port}") as screen,
     ):
         screen.wait_to_see("q quit")
         screen.press("p")
-        screen.wait_to_see("viewers only look")
+        screen.wait_to_see("viewers only watch")
         screen.press("q")
         left_in_order(screen)
 
 
 class Slow(GatewayDouble):
-    """Takes its time over a wish."""
+    """Answers a preview request late."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -176,7 +176,7 @@ def test_a_terminal_that_is_pulled_away_ends_it(screen: Terminal) -> None:
 
 
 def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: GatewayDouble) -> None:
-    """A real shell, without an editor of its own, which would change the terminal's manners as well."""
+    """A real shell, without an editor of its own, which would change the terminal's mode as well."""
     shell = ["bash", "--norc", "--noprofile", "--noediting", "-i"]
     with terminal_with(shell, extra={"PS1": "$ "}) as screen:
         screen.wait_for("$ ")
@@ -192,10 +192,10 @@ def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: G
             assert screen.drawn.rindex(SHOW_CURSOR) > screen.drawn.rindex(HIDE_CURSOR)
             screen.press("echo a shell again\n")
             place = screen.wait_for("a shell again\r\n", after=place)
-            looks = len(double.calls)
+            calls = len(double.calls)
             screen.press("fg\n")
             screen.wait_for("high-quality", after=place)
-            wait_until(lambda before=looks: len(double.calls) > before, "it looks again")
+            wait_until(lambda before=calls: len(double.calls) > before, "it polls again")
         wait_until(screen.key_by_key, "keys are read one by one")
         screen.press("p")
         wait_until(lambda: double.wishes, "keys do something again")

@@ -41,12 +41,12 @@ def test_the_judges_have_nothing_to_say(
     assert share_beyond(stream.table_times_ms["PAT"], 100) <= RARELY
     assert share_beyond(stream.table_times_ms["PMT"], 100) <= RARELY
     assert share_beyond(stream.clock_times_ms, 40) <= RARELY
-    assert stream.frames[0].key, "a viewer that joins begins with a key frame"
-    keys = [frame for frame in stream.frames if frame.key]
+    assert stream.pictures[0].key, "a viewer that joins begins with a key frame"
+    keys = [frame for frame in stream.pictures if frame.key]
     assert len(keys) >= SECONDS - 1
     assert all(frame.headed for frame in keys)
-    assert all(frame.sized for frame in stream.frames)
+    assert all(frame.sized for frame in stream.pictures)
     file = tmp_path / "recording.ts"
     file.write_bytes(recording[: stream.whole_bytes])
     assert complaints(file) == ""
-    assert decoded_pictures(file) == len(stream.frames) - 1
+    assert decoded_pictures(file) == len(stream.pictures) - 1

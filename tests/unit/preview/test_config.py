@@ -68,7 +68,7 @@ def test_hardware_h265_comes_before_hardware_h264_before_software() -> None:
 
 def test_every_encoder_has_a_bit_rate_and_a_gop_length() -> None:
     for encoder in CATALOGUE.values():
-        spelling = encoder.spelling
-        controlled = set(spelling.controls.values())
-        assert spelling.bitrate or "bitrate" in controlled, encoder.name
-        assert spelling.gop or "gop" in controlled, encoder.name
+        properties = encoder.properties
+        controlled = set(properties.controls.values())
+        assert properties.bitrate or "bitrate" in controlled, encoder.name
+        assert properties.gop or "gop" in controlled, encoder.name

@@ -86,8 +86,8 @@ def test_delays_begin_again(calming: str) -> None:
     assert lifecycle.retry_delay_s == 1
 
 
-def test_a_first_picture_alone_does_not_shorten_the_delay() -> None:
-    """An encoder that fails after every first picture must not be tried every second for ever."""
+def test_a_first_frame_alone_does_not_shorten_the_delay() -> None:
+    """An encoder that fails after every first frame must not be tried every second forever."""
     lifecycle = in_state(State.FAULTED)
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)

@@ -30,7 +30,7 @@ def test_a_card_that_is_not_there_names_those_that_are(tmp_path: Path) -> None:
         sources.find_card("rkisp", tmp_path / "nothing")
 
 
-def test_the_test_picture_makes_any_rate_and_the_others_do_not(tmp_path: Path) -> None:
+def test_the_test_pattern_makes_any_rate_and_the_others_do_not(tmp_path: Path) -> None:
     film = tmp_path / "film.mkv"
     film.write_bytes(b"x")
     assert sources.plan(TestSource(), 60).any_rate

@@ -107,16 +107,20 @@ class Preview:
         made = PreviewSettings(**values)  # type: ignore[arg-type]
         self.supervisor = Supervisor(made, self.selection, self.marker, self.pipelines)
         self.stop = asyncio.Event()
-        self.running: asyncio.Task[None] | None = None
 
     @asynccontextmanager
-    async def serving(self) -> AsyncIterator["Preview"]:
-        """Runs the supervisor, watched by a gateway; then stops it."""
-        self.running = asyncio.create_task(self.supervisor.run(self.stop))
+    async def serving(self, *, dies_of: str = "") -> AsyncIterator["Preview"]:
+        """Runs the supervisor, watched by a gateway; then stops it, or waits until a hang ends it."""
+        running = asyncio.create_task(self.supervisor.run(self.stop))
         with self.supervisor.watched():
             yield self
+            assert not running.done()
+            if dies_of:
+                with pytest.raises(HungError, match=dies_of):
+                    await running
+                return
         self.stop.set()
-        await self.running
+        await running
 
     async def until(self, holds: Callable[[ActualState], bool]) -> ActualState:
         """Waits for a condition of the actual state, at most some virtual minutes."""
@@ -135,13 +139,6 @@ class Preview:
             return bool(actual.state is State.RUNNING and actual.encoder and actual.encoder.name == encoder)
 
         return await self.until(holds)
-
-    async def dies(self) -> str:
-        """Returns what ended the process."""
-        assert self.running
-        with pytest.raises(HungError) as hung:
-            await self.running
-        return str(hung.value)
 
 
 def now() -> float:
@@ -300,18 +297,18 @@ async def test_a_fault_of_the_teardown_is_ignored(tmp_path: Path) -> None:
 @in_virtual_time
 async def test_an_encoder_that_hangs_is_left_behind(tmp_path: Path) -> None:
     preview = Preview(tmp_path, Script(fault=SILENT, encoder_hangs=True))
-    await_stop = preview.serving()
-    await await_stop.__aenter__()
-    preview.supervisor.apply(ON)
-    await preview.reaches(State.FAULTED)
-    faulted_at = now()
-    await preview.runs_with("va-h265")
-    assert now() - faulted_at == pytest.approx(ENCODER_STOP_S + FIRST_FRAME_S, abs=0.05)
-    # Left behind, it keeps the process alive until the preview is disabled; then the process ends.
-    await asyncio.sleep(10 * STOP_DEADLINE_S)
-    assert preview.supervisor.actual().state is State.RUNNING
-    preview.supervisor.apply(OFF)
-    assert await preview.dies() == "encoder mpp-h265 hung when it was stopped"
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        await preview.runs_with("va-h265")
+        assert now() - faulted_at == pytest.approx(ENCODER_STOP_S + FIRST_FRAME_S, abs=0.05)
+        # The process goes on, also with another session, until the preview is disabled.
+        await asyncio.sleep(10 * STOP_DEADLINE_S)
+        preview.supervisor.apply(DesiredState(5, True, Profile.BALANCED, "another session"))
+        await preview.runs_with("va-h265")
+        assert len(preview.pipelines.built) == 3
+        preview.supervisor.apply(OFF)
     assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
 
 
@@ -328,19 +325,16 @@ async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Pat
         assert now() == pytest.approx(2 + FIRST_FRAME_S, abs=0.1), (
             "disabled when the slow encoder has stopped"
         )
-        assert preview.running
-        assert not preview.running.done()
 
 
 @row("encoder hangs when the preview is disabled")
 @in_virtual_time
 async def test_an_encoder_that_hangs_at_the_end(tmp_path: Path) -> None:
     preview = Preview(tmp_path, Script(encoder_hangs=True))
-    await preview.serving().__aenter__()
-    preview.supervisor.apply(ON)
-    await preview.reaches(State.RUNNING)
-    preview.supervisor.apply(OFF)
-    assert await preview.dies() == "encoder mpp-h265 hung when it was stopped"
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        preview.supervisor.apply(OFF)
     assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
 
 
@@ -349,12 +343,11 @@ async def test_an_encoder_that_hangs_at_the_end(tmp_path: Path) -> None:
 @in_virtual_time
 async def test_a_listener_that_hangs(tmp_path: Path, fault: Fault | None) -> None:
     preview = Preview(tmp_path, Script(fault=fault, fault_after_s=1, listener_hangs=True))
-    await preview.serving().__aenter__()
-    preview.supervisor.apply(ON)
-    await preview.reaches(State.RUNNING)
-    if fault is None:
-        preview.supervisor.apply(OFF)
-    assert await preview.dies() == "the SRT listener hung when it was stopped"
+    async with preview.serving(dies_of="the SRT listener hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.RUNNING)
+        if fault is None:
+            preview.supervisor.apply(OFF)
     assert preview.marker.reason == "", "no encoder is blamed"
 
 
@@ -411,6 +404,11 @@ async def test_unwatched_it_stops_and_the_same_revision_enables_it_again(tmp_pat
     assert (state.applied_revision, state.profile) == (0, Profile.BALANCED)
     preview.supervisor.apply(ON)
     assert (await preview.reaches(State.RUNNING)).last_error == ""
+    with preview.supervisor.watched():
+        await asyncio.sleep(100)
+        left_at = now()
+    await preview.reaches(State.DISABLED)
+    assert now() - left_at == pytest.approx(20, abs=1)
     preview.stop.set()
     await running
 
@@ -487,16 +485,16 @@ async def test_another_profile_keeps_the_pipeline(tmp_path: Path) -> None:
 
 @in_virtual_time
 async def test_another_passphrase_rebuilds_the_pipeline(tmp_path: Path) -> None:
-    preview = Preview(tmp_path)
+    preview = Preview(tmp_path, Script(build_error="no camera"))
     async with preview.serving():
         preview.supervisor.apply(DesiredState(1, True, Profile.BALANCED, "correct horse"))
-        await preview.reaches(State.RUNNING)
+        assert (await preview.reaches(State.RUNNING)).last_error == "no camera"
         changed = DesiredState(2, True, Profile.BALANCED, "battery staple")
         assert preview.supervisor.apply(changed).state is State.STOPPING
-        await preview.reaches(State.RUNNING)
+        assert (await preview.reaches(State.RUNNING)).last_error == "", "a new session"
         old, new = preview.pipelines.built
         assert old.stopped
-        assert new.plan.listener.passphrase == "battery staple"
+        assert new.plan.passphrase == "battery staple"
 
 
 @pytest.mark.parametrize("order", [("mpp-h265", "va-h265"), ("mpp-h265",)])
@@ -509,9 +507,23 @@ async def test_a_new_request_retries_at_once(tmp_path: Path, order: tuple[str, .
         await preview.until(lambda actual: actual.counters.faults == 5)
         faulted_at = now()
         await asyncio.sleep(1)
-        preview.supervisor.apply(AGAIN)
+        assert preview.supervisor.apply(AGAIN).state is State.STARTING
         await preview.reaches(State.RUNNING)
         assert now() - faulted_at == pytest.approx(1 + FIRST_FRAME_S, abs=0.1)
+        await asyncio.sleep(100)  # The retry that was scheduled is cancelled.
+
+
+@in_virtual_time
+async def test_a_new_request_during_the_teardown_retries_right_after_it(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE, stop_s=0.2))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        faulted_at = now()
+        assert preview.supervisor.apply(AGAIN).state is State.FAULTED
+        state = await preview.reaches(State.RUNNING)
+        assert now() - faulted_at == pytest.approx(0.2 + FIRST_FRAME_S, abs=0.1)
+        assert (state.applied_revision, state.counters.restarts) == (3, 1)
 
 
 @in_virtual_time
@@ -525,6 +537,22 @@ async def test_disabled_while_faulted(tmp_path: Path) -> None:
         assert state.last_error == SOURCE.text
         await asyncio.sleep(100)
         assert len(preview.pipelines.built) == 1
+
+
+@in_virtual_time
+async def test_a_request_for_a_retry_does_not_outlive_a_disable(tmp_path: Path) -> None:
+    preview = Preview(tmp_path, Script(fault=SOURCE), Script(fault=SOURCE))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        preview.supervisor.apply(AGAIN)
+        preview.supervisor.apply(DesiredState(4, False))
+        await preview.reaches(State.DISABLED)
+        preview.supervisor.apply(DesiredState(5, True))
+        await preview.until(lambda actual: actual.counters.faults == 2)
+        faulted_at = now()
+        await preview.reaches(State.STARTING)
+        assert now() - faulted_at == pytest.approx(1, abs=0.1)
 
 
 @in_virtual_time

@@ -1,10 +1,11 @@
 """Silence, with made-up clocks."""
 
+from preview.config import TimeoutSettings
 from preview.pipeline.watchdogs import Silent, Watchdogs
 
 
 def dogs() -> Watchdogs:
-    return Watchdogs(0.0, first_frame_s=5.0, source_s=1.5, encoder_s=1.0)
+    return Watchdogs(0.0, TimeoutSettings(start_s=5.0, source_silence_s=1.5, encoder_silence_s=1.0))
 
 
 def test_a_lively_pipeline_is_left_alone() -> None:

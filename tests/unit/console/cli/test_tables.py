@@ -116,7 +116,7 @@ def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
     assert (odometry.mark, odometry.text, odometry.age) == ("cleared", "odometry stopped coming", "500 ms")
 
 
-def test_a_source_has_a_line_only_when_nothing_else_tells_of_it() -> None:
+def test_a_source_has_a_line_only_when_nothing_else_reports_it() -> None:
     message = healthy_status()
     message.sources.add(name="odometry", state=SOURCE_STATE_RECEIVING, available=True)
     message.sources.add(name="battery", state=SOURCE_STATE_WAITING, detail="no battery")
@@ -136,7 +136,7 @@ def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:
     text = printed(status_view(decoded(message), "robot:50051"))
     assert "srt://10.0.0.7:7100" in text
     assert "2480 kbit/s of 2500, 30.0 fps, 1 viewer" in text
-    assert "round trip" not in text, "nobody measured one"
+    assert "round trip" not in text, "none was measured"
     assert "preview running 30.0 fps 2480 kbit/s 1 viewer" in status_line(decoded(message))
 
 

@@ -1,4 +1,4 @@
-"""The offset to the robot's clock: the truth is always within the error that is told."""
+"""The offset to the robot's clock: the actual one is always within the bound."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -63,7 +63,7 @@ CALLS = st.lists(
 
 
 @given(CALLS, st.floats(-1e5, 1e5), st.floats(-100e-6, 100e-6), st.floats(0, 60))
-def test_the_true_offset_is_never_further_off_than_told(
+def test_the_true_offset_is_never_further_off_than_the_bound(
     calls: list[tuple[float, float, float]], offset_s: float, drift: float, later_s: float
 ) -> None:
     """Whatever the link does to requests and answers, and though the robot's clock runs otherwise."""
@@ -79,6 +79,6 @@ def test_the_true_offset_is_never_further_off_than_told(
         now_s += there_s + back_s
         clock.note(sent_s, reading, now_s)
     now_s += later_s
-    told = clock.offset(now_s)
-    assert told is not None
-    assert abs(told.seconds - (robot_s(now_s) - now_s)) <= told.error_s + 1e-6
+    estimate = clock.offset(now_s)
+    assert estimate is not None
+    assert abs(estimate.seconds - (robot_s(now_s) - now_s)) <= estimate.error_s + 1e-6

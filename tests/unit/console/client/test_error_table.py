@@ -99,7 +99,7 @@ def test_a_robot_that_answers_no_ends_a_program_with_1(code: grpc.StatusCode) ->
         ("ipv4:127.0.0.1:1: tcp handshaker shutdown", "no answer"),
         ("errors resolving x: Domain name not found", "the name does not resolve"),
         ("connection attempt timed out before receiving SETTINGS frame", "does not answer as a gateway"),
-        ("words nobody has seen yet", "words nobody has seen yet"),
+        ("an unknown message", "an unknown message"),
     ],
 )
 def test_grpcs_reasons_in_plain_words(details: str, plain: str) -> None:

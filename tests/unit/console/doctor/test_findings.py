@@ -1,4 +1,4 @@
-"""What the doctor makes of what it hears; the robot is a real server whose answers the test writes."""
+"""The doctor's findings; the robot is a real server whose answers the test writes."""
 
 import socket
 import threading
@@ -92,17 +92,17 @@ def test_a_source_that_is_visible_and_silent_is_named_once(double: GatewayDouble
     assert "reliability" in findings["source.battery"].remedy
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_one_trouble_is_one_finding(double: GatewayDouble, *, told: bool) -> None:
+@pytest.mark.parametrize("faulted", [True, False])
+def test_one_condition_is_one_finding(double: GatewayDouble, *, faulted: bool) -> None:
     double.status.health.ready = False
     double.status.health.summary = "odometry stale"
-    if told:
+    if faulted:
         double.status.faults.add(id="odometry.stale", active=True, severity=FAULT_SEVERITY_ERROR)
     wrong = [check for check, each in examined(double).items() if each.verdict is Verdict.WRONG]
-    assert wrong == ["fault.odometry.stale" if told else "health"]
+    assert wrong == ["fault.odometry.stale" if faulted else "health"]
 
 
-def test_a_fault_that_is_over_is_not_told(double: GatewayDouble) -> None:
+def test_a_cleared_fault_is_not_reported(double: GatewayDouble) -> None:
     double.status.faults.add(id="odometry.stale", message="stopped coming", cleared_age_ms=10)
     assert "fault.odometry.stale" not in examined(double)
 

@@ -1,4 +1,4 @@
-"""The file of known robots: read strictly, changed line by line, and secrets nobody else may read."""
+"""The file of known robots, read strictly and edited with its comments kept; and the secrets beside it."""
 
 import stat
 import threading
@@ -162,7 +162,7 @@ def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
     assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read).robot == Robot(target="typed:1")
 
 
-def test_a_name_nobody_has() -> None:
+def test_an_unknown_name() -> None:
     with pytest.raises(UserError, match=r"no robot is called 'three' in /b \(known: one, two\)") as seen:
         choose(None, "three", {}, lambda: KNOWN)
     assert seen.value.exit_code is ExitCode.USAGE
@@ -256,9 +256,7 @@ def test_many_at_once_lose_nothing(path: Path) -> None:
     assert sorted(read_robots_file(path).robots) == sorted(names)
 
 
-def test_who_can_not_write_is_told_so_and_nothing_is_left(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_write_is_reported_and_leaves_nothing(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     put_robot("lab1", Robot(target="a"), path=path)
     before = path.read_text()
 

@@ -10,6 +10,7 @@ from google.protobuf.internal import containers as _containers
 from omniseer.gateway.v1 import event_pb2 as _event_pb2
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
+from omniseer.gateway.v1 import overlay_pb2 as _overlay_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 from omniseer.gateway.v1 import system_status_pb2 as _system_status_pb2
 import builtins as _builtins
@@ -191,18 +192,24 @@ class WatchSystemStatusRequest(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     MIN_INTERVAL_MS_FIELD_NUMBER: _builtins.int
+    INCLUDE_DETECTIONS_FIELD_NUMBER: _builtins.int
     min_interval_ms: _builtins.int
     """The least time between two answers, in ms. At most a minute. The gateway itself looks 20 times
     a second: the interval is rounded up to a multiple of 50 ms, and 0 is the same as 50.
+    """
+    include_detections: _builtins.bool
+    """Whether responses carry the detections. New detections then count as a change of the status. A
+    gateway older than this field ignores it: its responses leave `detections` unset.
     """
     def __init__(
         self,
         *,
         min_interval_ms: _builtins.int = ...,
+        include_detections: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["min_interval_ms", b"min_interval_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["include_detections", b"include_detections", "min_interval_ms", b"min_interval_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -216,6 +223,7 @@ class WatchSystemStatusResponse(_message.Message):
 
     STATUS_FIELD_NUMBER: _builtins.int
     MONOTONIC_NS_FIELD_NUMBER: _builtins.int
+    DETECTIONS_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
     """The instant, on the monotonic clock that Ping tells, in ns. An answer that was held up on the
     way shows by it.
@@ -224,15 +232,20 @@ class WatchSystemStatusResponse(_message.Message):
     def status(self) -> _system_status_pb2.SystemStatus:
         """As GetSystemStatus answers."""
 
+    @_builtins.property
+    def detections(self) -> _overlay_pb2.DetectionOverlayStatus:
+        """As in OverlaySnapshot, of the same instant as the status. Set exactly if it was requested."""
+
     def __init__(
         self,
         *,
         status: _system_status_pb2.SystemStatus | None = ...,
         monotonic_ns: _builtins.int = ...,
+        detections: _overlay_pb2.DetectionOverlayStatus | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["status", b"status"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["detections", b"detections", "status", b"status"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["monotonic_ns", b"monotonic_ns", "status", b"status"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["detections", b"detections", "monotonic_ns", b"monotonic_ns", "status", b"status"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -1,0 +1,95 @@
+"""The watched status: what wakes a watcher, with detections and without."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from gateway.rpc.recipient import Recipient
+from gateway.rpc.status_stream import StatusStream
+from gateway.status.board import Board
+from gateway.status.preview import Counters, PreviewState, PreviewView
+from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.sources import DETECTIONS, ODOMETRY
+from gateway.status.values import Detection, Detections, Odometry, Received
+from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
+
+CALLER = Recipient("10.0.0.1", sees_passphrase=False)
+PREVIEW = PreviewView(PreviewState.DISABLED, None, "", True, None, None, None, None, Counters())
+CUP = Detection(41, "cup", 0.9, "7", 10, 20, 30, 40)
+QUIET_S = 0.3
+"""Several ticks, and less than the heartbeat."""
+
+
+class World:
+    """A board that the test writes on."""
+
+    def __init__(self) -> None:
+        self.board = Board()
+        # Far from stale: nothing changes unless a test changes it.
+        self._rules = Rules(
+            {DETECTIONS: SourceRule(60_000, False), ODOMETRY: SourceRule(60_000, False)}, 60_000
+        )
+
+    def snapshot(self) -> Snapshot:
+        return take(
+            identity=Identity("lab", "1", insecure=False),
+            rules=self._rules,
+            board=self.board,
+            preview=PREVIEW,
+            events=(),
+            now_s=time.monotonic(),
+        )
+
+    def see(self, *items: Detection) -> None:
+        self.board[DETECTIONS] = Received(Detections(1280, 720, len(items), items), time.monotonic())
+
+
+@pytest.fixture
+async def stream() -> AsyncIterator[tuple[World, StatusStream]]:
+    world = World()
+    world.see(CUP)
+    stream = StatusStream(world, time.monotonic)
+    ticking = asyncio.create_task(stream.run())
+    yield world, stream
+    ticking.cancel()
+
+
+async def read(responses: AsyncIterator[bytes], within_s: float = 5.0) -> WatchSystemStatusResponse:
+    async with asyncio.timeout(within_s):
+        return WatchSystemStatusResponse.FromString(await anext(responses))
+
+
+async def test_detections_come_on_request_from_the_same_instant(stream: tuple[World, StatusStream]) -> None:
+    _, watch = stream
+    plain = await read(watch.responses(0, CALLER))
+    assert not plain.HasField("detections")
+    full = await read(watch.responses(0, CALLER, with_detections=True))
+    assert [each.class_name for each in full.detections.detections] == ["cup"]
+    assert full.detections.available
+    assert full.status == plain.status
+
+
+async def test_new_detections_wake_those_who_requested_them_and_no_others(
+    stream: tuple[World, StatusStream],
+) -> None:
+    world, watch = stream
+    plain, full = watch.responses(0, CALLER), watch.responses(0, CALLER, with_detections=True)
+    await read(plain)
+    await read(full)
+    waiting: asyncio.Task[Any] = asyncio.create_task(read(plain))
+    world.see(CUP, CUP)
+    assert (await read(full, QUIET_S)).detections.detection_count == 2
+    assert not waiting.done(), "a status without detections has not changed"
+    world.board[ODOMETRY] = Received(Odometry(0.1, 0.0, 0.0), time.monotonic())
+    assert (await waiting).status.health.measured_vx_mps == pytest.approx(0.1)
+    assert (await read(full)).status.health.measured_vx_mps == pytest.approx(0.1)
+
+
+async def test_before_the_first_detections_the_field_says_that_there_are_none() -> None:
+    watch = StatusStream(World(), time.monotonic)
+    response = await read(watch.responses(0, CALLER, with_detections=True))
+    assert response.HasField("detections")
+    assert not response.detections.available
