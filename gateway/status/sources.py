@@ -90,7 +90,7 @@ DETECTIONS: Final = SourceSpec(
     Detections,
     stale_after_ms=500,
     add_truncated=Detections.with_truncated,
-    # The status carries no detections: the overlay, which does, is polled.
+    # Sent only to watchers that request them: status_stream.py compares them for those.
     in_change_key=False,
 )
 BATTERY: Final = SourceSpec("battery", Battery, stale_after_ms=5000)
