@@ -6,6 +6,7 @@ docs/adding-a-source.md lists the steps that remain for a new kind: a reader and
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import cached_property
 from typing import Any, Final, Generic, TypeVar
 
 from gateway.status.values import (
@@ -36,7 +37,7 @@ class Origin(Enum):
     """The platform sampler, from the operating system."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SourceSpec(Generic[ValueT]):
     """Describes one source. Compared by identity: a spec is the key of its values in dictionaries.
 
@@ -70,12 +71,13 @@ class SourceSpec(Generic[ValueT]):
     quiet: bool = False
     in_change_key: bool = True
 
-    @property
+    # Cached: every status reads the names of all sources.
+    @cached_property
     def name(self) -> str:
         """Unique, stable name for programs: "odometry", "mux_input.keyboard"."""
         return f"{self.kind}.{self.label.value}" if self.label else self.kind
 
-    @property
+    @cached_property
     def display_name(self) -> str:
         """The name for people: "odometry", "commands of keyboard"."""
         return f"commands of {self.label.value}" if self.label else self.kind.replace("_", " ")
@@ -88,7 +90,7 @@ DETECTIONS: Final = SourceSpec(
     Detections,
     stale_after_ms=500,
     add_truncated=Detections.with_truncated,
-    # The status carries no detections: the overlay, which does, is polled.
+    # Sent only to watchers that request them: status_stream.py compares them for those.
     in_change_key=False,
 )
 BATTERY: Final = SourceSpec("battery", Battery, stale_after_ms=5000)

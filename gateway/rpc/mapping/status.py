@@ -147,10 +147,13 @@ def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
 
 
 def _source(source: SourceView) -> source_pb2.SourceStatus:
+    # The most frequent message of a status: without the dictionary of freshness_fields, which costs 0.4 us.
     return source_pb2.SourceStatus(
-        name=source.name,
+        name=source.spec.name,
         state=SOURCE_STATES[source.state],
-        **freshness_fields(source.freshness),
+        available=source.freshness.available,
+        stale=source.freshness.stale,
+        age_ms=source.freshness.age_ms,
         required=source.required,
         detail=source.detail,
     )

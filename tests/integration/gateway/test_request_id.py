@@ -29,10 +29,10 @@ def test_what_an_operator_asks_is_found_in_both_logs(tmp_path: Path) -> None:
         gateway.stub.SetPreviewMode(SetPreviewModeRequest(enabled=False), timeout=10)
         lines = [json.loads(line) for line in preview.log.read_text().splitlines()]
         ours = (gateway_dir / "gateway.log").read_text()
-    wishes = [line for line in lines if line["message"].startswith("wish ")]
-    assert [line["message"].partition(": ")[2] for line in wishes] == ["on, balanced", "off"]
+    desired = [line for line in lines if line["message"].startswith("desired state ")]
+    assert [line["message"].partition(": ")[2] for line in desired] == ["on, balanced", "off"]
     assert re.search(r"revision \d+ requested: on, BALANCED \[request shift-7\]", ours)
-    assert wishes[0]["request_id"] == "shift-7"
+    assert desired[0]["request_id"] == "shift-7"
     made_here = re.search(r"revision \d+ requested: off \[request ([0-9a-f]{16})\]", ours)
     assert made_here, ours
-    assert wishes[1]["request_id"] == made_here[1]
+    assert desired[1]["request_id"] == made_here[1]
