@@ -14,8 +14,8 @@ from unittest.mock import patch
 
 from bench.processes import CpuShare, cpu_share, resident_mib
 from bench.rows import Row
-from common.free import free_domain, free_tcp_port, free_udp_port
 from console.client import GatewayClient, Unreachable
+from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.ros import simulated_robot
 
 _log = logging.getLogger(__name__)

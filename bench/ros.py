@@ -15,7 +15,7 @@ from bench import ros_gateway
 from bench.processes import CpuShare, cpu_share, program, resident_mib
 from bench.ros_latency import latencies_ms
 from bench.rows import Row
-from common.free import free_domain
+from tests.support.free import free_domain
 
 FAST_HZ, SLOW_HZ = 200, 50
 ROUNDS = 3

@@ -17,9 +17,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from common.free import free_tcp_port
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.free import free_tcp_port
 
 COUNT = 400
 TOPIC = "/odometry/filtered"

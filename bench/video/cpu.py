@@ -16,9 +16,9 @@ from bench.video import product, reference
 from bench.video.camera import Camera, camera
 from bench.video.progress import tell
 from bench.video.viewing import Viewer, watch
-from common.free import free_udp_port
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.properties import vbv_ms
+from tests.support.free import free_udp_port
 
 ROUNDS = 7
 TRIES = 12

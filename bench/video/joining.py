@@ -16,7 +16,7 @@ from bench.video import product, reference
 from bench.video.camera import camera
 from bench.video.progress import tell
 from bench.video.viewing import Connect, first_frame_ms, watch
-from common.free import free_udp_port
+from tests.support.free import free_udp_port
 
 ROUNDS = 3
 JOINS = 8

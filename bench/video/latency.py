@@ -10,7 +10,7 @@ from bench.video import product, reference
 from bench.video.camera import camera
 from bench.video.progress import tell
 from bench.video.viewing import Connect, watch
-from common.free import free_udp_port
+from tests.support.free import free_udp_port
 
 ROUNDS = 3
 SETTLE_S = 1.0

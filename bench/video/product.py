@@ -11,10 +11,10 @@ from pathlib import Path
 
 from bench.video import foreign
 from bench.video.camera import Camera
-from common.free import free_tcp_port, free_udp_port
 from console.client import GatewayClient, PreviewProfile, PreviewState, Unreachable
 from console.receiver.address import StreamAddress
 from console.receiver.receiver import Receiver
+from tests.support.free import free_tcp_port, free_udp_port
 
 _UP_WITHIN_S = 20.0
 _PROGRAMS = Path(sys.executable).parent

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from typing import Final
 
 from common.errors import UserError
-from common.free import udp_port_is_free
 from console.client import GatewayClient, PreviewProfile, PreviewState, PreviewStatus, SystemStatus
 from console.client.results import Freshness
 from console.receiver.address import StreamAddress
@@ -15,6 +14,7 @@ from demo_program.ground import Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
 from simrobot.control import ask
+from tests.support.free import udp_port_is_free
 
 FRAMES: Final = 60
 _SPEEDS_MPS: Final = (0.8, 0.3)

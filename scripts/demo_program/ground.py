@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import UserError
-from common.free import free_domain, free_port, port_is_free
 from demo_program.sources import Source
+from tests.support.free import free_domain, free_port, port_is_free
 
 DEFAULT_GRPC_PORT: Final = 50051
 DEFAULT_SRT_PORT: Final = 7100

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from common.free import free_udp_port
+from tests.support.free import free_udp_port
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]

@@ -11,9 +11,9 @@ from typing import Any
 
 import grpc
 
-from common.free import free_tcp_port
 from omniseer.gateway.v1.robot_gateway_pb2 import GetOverlaySnapshotRequest, GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.free import free_tcp_port
 
 _ROOT = Path(__file__).parents[2]
 _UP_WITHIN_S = 20.0

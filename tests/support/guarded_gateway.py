@@ -9,7 +9,6 @@ from typing import Any
 
 import grpc
 
-from common.free import free_tcp_port
 from gateway.access.ca import KeyPair
 from gateway.access.credential import Credential, Kind
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
@@ -18,6 +17,7 @@ from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
 from gateway.app import serve
 from gateway.config import GatewaySettings
+from tests.support.free import free_tcp_port
 
 HOSTS = ("localhost", "127.0.0.1")
 UP_WITHIN_S = 10.0

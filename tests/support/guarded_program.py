@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from common.free import free_tcp_port
 from console.client import Credentials, GatewayClient, PreviewState, Unreachable
 from console.robots import read_credentials, read_robots_file
 from console.robots.login import parse_login
@@ -17,6 +16,7 @@ from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
+from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import HOSTS
 from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.running_preview import RunningPreview

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
-from common.free import free_udp_port
 from preview.config import GstSource, PreviewSettings, ProfileSettings, ProfilesSettings, SrtSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.supervisor import Pipeline
 from preview.values import DesiredState, EncoderChoice, Profile, Target
+from tests.support.free import free_udp_port
 
 LIVE = "videotestsrc is-live=true"
 FASTER = Target(320, 240, 60, 900, 200)

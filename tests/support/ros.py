@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from common.free import free_domain
 from simrobot.control import ask
+from tests.support.free import free_domain
 
 _ROOT = Path(__file__).parents[2]
 

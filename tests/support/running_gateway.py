@@ -9,7 +9,6 @@ from typing import Any
 
 import grpc
 
-from common.free import free_tcp_port
 from gateway.app import serve
 from gateway.config import GatewaySettings
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -18,6 +17,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     SetPreviewModeRequest,
 )
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.free import free_tcp_port
 
 UP_WITHIN_S = 10.0
 

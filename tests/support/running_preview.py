@@ -13,9 +13,9 @@ from typing import Any, Self
 import grpc
 import yaml
 
-from common.free import free_udp_port
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
+from tests.support.free import free_udp_port
 from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from common.free import free_tcp_port
 from console.client import GatewayClient, PreviewProfile, PreviewState
+from tests.support.free import free_tcp_port
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 

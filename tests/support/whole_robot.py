@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from common.free import free_tcp_port
+from tests.support.free import free_tcp_port
 from tests.support.ros import SimulatedRobot, simulated_robot
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until

@@ -62,7 +62,7 @@ def test_a_socket_that_cannot_be_made_is_one_line(tmp_path: Path, images: str) -
         )  # fmt: skip
         assert done.returncode == 1
         last = done.stderr.strip().splitlines()[-1]
-        assert "socket /etc/robot-gateway/preview.sock can't be made" in last
+        assert "socket /etc/robot-gateway/preview.sock can't be created" in last
         assert "Traceback" not in done.stderr
 
 

@@ -13,9 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from common.errors import UserError
-from common.free import free_tcp_port
 from console.client import Credentials, GatewayClient, NotAllowed
 from gateway.cli import app
+from tests.support.free import free_tcp_port
 from tests.support.robotctl import only_line, robotctl
 from tests.support.waiting import wait_until
 

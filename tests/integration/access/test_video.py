@@ -7,7 +7,6 @@ from typing import Any
 import grpc
 import pytest
 
-from common.free import free_tcp_port
 from gateway.access.role import Role
 from gateway.platform.hosts import find_hosts
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -19,6 +18,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from omniseer.gateway.v1.states_pb2 import PREVIEW_RUNNING
 from tests.support.eventually import eventually
+from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import HOSTS, guarded_gateway, new_robot
 from tests.support.preview_double import PreviewDouble, serve_double
 from tests.support.running_gateway import Operator, running_gateway

@@ -18,7 +18,6 @@ import psutil
 import pytest
 
 from common.errors import ExitCode
-from common.free import free_tcp_port
 from console.client import (
     Backoff,
     Cancelled,
@@ -38,6 +37,7 @@ from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import Relay, black_hole
 from tests.support.clients import FACES, Blocking, Face
+from tests.support.free import free_tcp_port
 from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving
 from tests.support.waiting import wait_until
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from common.free import free_tcp_port
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest
+from tests.support.free import free_tcp_port
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.preview_double import double_process
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, robotctl

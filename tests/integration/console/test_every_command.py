@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from typer.main import get_command
 
-from common.free import free_tcp_port
 from console.cli.app import app
+from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import only_line, robotctl
 from tests.support.robotctl_docs import DOCS

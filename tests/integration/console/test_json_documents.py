@@ -8,8 +8,8 @@ from typing import Any
 import grpc
 import pytest
 
-from common.free import free_tcp_port
 from tests.support.filled import fill
+from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl
 from tests.support.robotctl_docs import documented, holds

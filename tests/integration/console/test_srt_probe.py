@@ -2,8 +2,8 @@
 
 import pytest
 
-from common.free import free_udp_port
 from console.doctor.srt_probe import answers_as_srt
+from tests.support.free import free_udp_port
 from tests.support.streams import SrtSender
 
 pytestmark = pytest.mark.gst

@@ -11,10 +11,10 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.errors import UserError
-from common.free import free_tcp_port
 from gateway.metrics.endpoint import serving_metrics
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusRequest
 from tests.support.eventually import eventually
+from tests.support.free import free_tcp_port
 from tests.support.running_gateway import running_gateway
 
 LONG_S = 10

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from common.free import free_tcp_port
+from tests.support.free import free_tcp_port
 from tests.support.waiting import wait_until
 
 MAIN = "from gateway.cli import main; main()"

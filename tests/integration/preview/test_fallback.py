@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from common.free import udp_port_is_free
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.free import udp_port_is_free
 from tests.support.lossy_relay import LossyRelay
 from tests.support.running_preview import RunningPreview
 from tests.support.watcher import Watcher

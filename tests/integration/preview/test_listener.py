@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from common.free import udp_port_is_free
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
 from console.receiver.receiver import Receiver
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.free import udp_port_is_free
 from tests.support.running_preview import RunningPreview
 from tests.support.visitors import visit
 from tests.support.waiting import wait_until

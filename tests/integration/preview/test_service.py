@@ -5,8 +5,8 @@ from pathlib import Path
 import grpc
 import pytest
 
-from common.free import udp_port_is_free
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.free import udp_port_is_free
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until

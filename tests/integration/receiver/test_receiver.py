@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from common.free import free_udp_port
 from console.receiver.address import StreamAddress
 from console.receiver.errors import (
     NoFrameError,
@@ -15,6 +14,7 @@ from console.receiver.errors import (
     UndecodableError,
 )
 from console.receiver.receiver import Receiver
+from tests.support.free import free_udp_port
 from tests.support.streams import SrtSender, encode
 from tests.support.waiting import wait_until
 

@@ -9,11 +9,11 @@ import pytest
 from sensor_msgs.msg import BatteryState
 
 from common.errors import UserError
-from common.free import free_domain
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board
 from gateway.status.sources import BATTERY, ODOMETRY
+from tests.support.free import free_domain
 from tests.support.ros import simulated_robot
 from tests.support.talker import talking
 from tests.support.waiting import wait_until
@@ -34,7 +34,7 @@ def test_reading_ros_touches_nothing_of_the_process(ros_domain: int) -> None:
 import os, signal, tempfile
 os.environ["ROS_LOG_DIR"] = logs = tempfile.mkdtemp()
 import rclpy
-from common.free import free_domain
+from tests.support.free import free_domain
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status.board import Board

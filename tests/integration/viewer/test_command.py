@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from common.free import free_tcp_port
+from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.judges import decoded_pictures
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl_process

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from common.free import free_udp_port
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.frame import PixelFormat
@@ -15,6 +14,7 @@ from console.receiver.recording import Recording
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from tests.integration.viewer.conftest import following
+from tests.support.free import free_udp_port
 from tests.support.judges import decoded_pictures
 from tests.support.streams import SrtSender, encode
 from tests.support.video_ground import VideoGround, video_ground

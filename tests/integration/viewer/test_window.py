@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from bench.viewer import extra_latency_ms, on_screen
-from common.free import free_tcp_port
 from console.receiver.recording import Recording
 from console.viewer.geometry import Box
 from console.viewer.playback import PlaybackState
 from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from common.free import free_domain, free_tcp_port, free_udp_port, port_is_free, udp_port_is_free
+from tests.support.free import free_domain, free_tcp_port, free_udp_port, port_is_free, udp_port_is_free
 
 ROOT = Path(__file__).parents[3]
 EPHEMERAL = Path("/proc/sys/net/ipv4/ip_local_port_range")
@@ -13,7 +13,7 @@ EPHEMERAL = Path("/proc/sys/net/ipv4/ip_local_port_range")
 
 def test_ports_of_two_programs_differ() -> None:
     mine = {free_tcp_port() for _ in range(50)}
-    program = "from common.free import free_tcp_port; print(*(free_tcp_port() for _ in range(50)))"
+    program = "from tests.support.free import free_tcp_port; print(*(free_tcp_port() for _ in range(50)))"
     others = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
     )
