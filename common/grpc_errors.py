@@ -44,13 +44,13 @@ class ErrorInterceptor(Interceptor[Call]):
     gets INTERNAL without any detail of it.
     """
 
-    async def on_end(self, call: Call, error: BaseException | None) -> None:
-        """Aborts the call, which raises grpc.aio.AbortError; one that succeeded or was aborted is left."""
-        if error is None or isinstance(error, grpc.aio.AbortError) or not isinstance(error, Exception):
+    async def on_error(self, call: Call, error: BaseException) -> None:
+        """Aborts the call, which raises grpc.aio.AbortError, unless that, or the caller, ended it."""
+        if isinstance(error, grpc.aio.AbortError) or not isinstance(error, Exception):
             return
         code = status_code(error, call)
         if code is grpc.StatusCode.INTERNAL:
-            _log.error("%s failed", call.path, exc_info=error)
+            _log.error("%s failed", call.method.path, exc_info=error)
             await call.rpc.abort(code, _DEFECT, metadata_of_defect(_DEFECT))
         assert isinstance(error, DomainError)
         await call.rpc.abort(code, str(error), metadata_of(error, code))

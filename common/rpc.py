@@ -3,12 +3,12 @@
 common.bind binds what `new_server` returns to a TCP port or a Unix socket.
 """
 
-from typing import Any, Final
+from typing import Final
 
 import grpc
 
 from common.grpc_errors import ErrorInterceptor
-from common.interceptors import Call, Chain
+from common.interceptors import Chain
 
 STOP_GRACE_S: Final = 0.5
 """How long a server lets running calls finish when it stops."""
@@ -39,14 +39,14 @@ are
 reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 
 
-def new_server(chain: Chain[Any] | None = None) -> grpc.aio.Server:
+def new_server(chain: Chain | None = None) -> grpc.aio.Server:
     """Returns a server that is neither bound nor started.
 
     Args:
         chain: what every call passes; by default an ErrorInterceptor alone.
     """
     return grpc.aio.server(
-        interceptors=(chain or Chain([ErrorInterceptor()], Call),),
+        interceptors=(chain or Chain([ErrorInterceptor()]),),
         options=_SERVER_OPTIONS,
         maximum_concurrent_rpcs=_MAX_CONCURRENT_CALLS,
     )

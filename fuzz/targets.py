@@ -27,7 +27,7 @@ from gateway.links.preview.wire import from_wire
 from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT, method_at
+from gateway.rpc.methods import CONTRACT, Method
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import desired_state
@@ -35,7 +35,7 @@ from preview.rpc.mapping import desired_state
 Target = Callable[[bytes], None]
 
 _VALIDATION: Final = Validation(GatewaySettings().limits.request_bytes)
-_METHODS: Final = [method_at(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
+_METHODS: Final = [Method(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
 
 
 def operators_request(data: bytes) -> None:

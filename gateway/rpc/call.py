@@ -11,7 +11,7 @@ from common import request_id
 from common.interceptors import Call, RpcContext
 from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
-from gateway.rpc.methods import method_at
+from gateway.rpc.methods import Method
 
 _LOCAL_SOCKET: Final = "local socket"
 _REMEMBERED_CONNECTIONS: Final = 256
@@ -58,14 +58,14 @@ class CallContext(Call):
         responded: whether a message has left for the caller.
     """
 
-    __slots__ = ("method", "peer", "principal", "request", "responded")
+    __slots__ = ("peer", "principal", "request", "responded")
 
+    method: Method
     principal: Principal | None
     request: Message | None
 
-    def __init__(self, path: str, rpc: RpcContext, *, streaming: bool) -> None:
-        super().__init__(path, rpc, streaming=streaming)
-        self.method = method_at(path)
+    def __init__(self, method: Method, rpc: RpcContext) -> None:
+        super().__init__(method, rpc)
         self.peer = peer_of(rpc.peer())
         self.principal = None
         self.request = None

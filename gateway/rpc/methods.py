@@ -1,14 +1,14 @@
 """What the schema says of each method: its messages, and the role that a caller needs."""
 
-from dataclasses import dataclass
 from enum import Enum
-from functools import cache
 from typing import Final, TypeAlias
 
 from google.protobuf import descriptor_pool
+from google.protobuf.descriptor import MethodDescriptor
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 
+from common import interceptors
 from gateway.access.role import Role
 from omniseer.gateway.v1.access_pb2 import ROLE_ADMIN, ROLE_OPERATOR, ROLE_VIEWER, required_role
 from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
@@ -39,20 +39,33 @@ STANDARD: Final[dict[str, Needed]] = {
 """By the service's full name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Method:
-    """One method of one service.
+class Method(interceptors.Method):
+    """One method, as the schema describes it.
 
     Attributes:
-        name: without its service, "Ping" for example. needed: what a caller needs. of_contract: whether the
-        method belongs to the operator's contract, so that it is counted and validated. request_type: of the
-        contract's methods; None for others.
+        name: without its service, "Ping" for example.
+        needed: what a caller needs.
+        of_contract: whether it belongs to the operators' contract, so that it is counted and validated.
+        request_type: of the contract's methods; None for others.
+        has_parameters: whether the request has fields, and so possibly rules.
     """
 
-    name: str
-    needed: Needed
-    of_contract: bool = False
-    request_type: type[Message] | None = None
+    request_type: type[Message] | None
+
+    def __init__(self, path: str, *, streaming: bool = False) -> None:
+        super().__init__(path, streaming=streaming)
+        service, _, self.name = path.removeprefix("/").partition("/")
+        self.needed: Needed = STANDARD.get(service, Open.NOBODY)
+        self.of_contract = False
+        self.request_type = None
+        self.has_parameters = False
+        found = _described(service, self.name)
+        if found is not None:
+            self.needed = ROLES.get(found.GetOptions().Extensions[required_role], Open.NOBODY)
+            self.of_contract = found.containing_service.file.package == DESCRIPTOR.package
+        if found is not None and self.of_contract:
+            self.request_type = GetMessageClass(found.input_type)
+            self.has_parameters = bool(found.input_type.fields)
 
     @property
     def changes_robot(self) -> bool:
@@ -60,19 +73,11 @@ class Method:
         return self.of_contract and self.needed is not Role.VIEWER
 
 
-@cache
-def method_at(path: str) -> Method:
-    """Returns the method at a path on the wire, "/omniseer.gateway.v1.RobotGateway/Ping" for example.
-
-    Bounded: only paths that have a handler are asked for.
-    """
-    service, _, name = path.removeprefix("/").partition("/")
+def _described(service: str, name: str) -> MethodDescriptor | None:
+    """Returns what the schema says; None for the standard services and for unknown methods."""
     if service in STANDARD:
-        return Method(name, STANDARD[service])
+        return None
     try:
-        found = descriptor_pool.Default().FindMethodByName(f"{service}.{name}")
+        return descriptor_pool.Default().FindMethodByName(f"{service}.{name}")
     except KeyError:
-        return Method(name, Open.NOBODY)
-    needed = ROLES.get(found.GetOptions().Extensions[required_role], Open.NOBODY)
-    of_contract = found.containing_service.file.package == DESCRIPTOR.package
-    return Method(name, needed, of_contract, GetMessageClass(found.input_type) if of_contract else None)
+        return None

@@ -24,7 +24,7 @@ from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT
+from gateway.rpc.methods import CONTRACT, Method
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
@@ -68,7 +68,7 @@ class Interceptors:
     validation: Validation
     presence: Presence
 
-    def chain(self) -> Chain[CallContext]:
+    def chain(self) -> Chain:
         """Returns them in their order, outermost first."""
         return Chain(
             [
@@ -80,6 +80,7 @@ class Interceptors:
                 self.validation,
                 self.presence,  # sees admitted calls alone
             ],
+            Method,
             CallContext,
         )
 

@@ -10,7 +10,7 @@ from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION
 
 from gateway.access.role import Role
 from gateway.rpc import methods
-from gateway.rpc.methods import ROLES, STANDARD, Open, method_at
+from gateway.rpc.methods import ROLES, STANDARD, Method, Open
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_UNSPECIFIED
 from omniseer.gateway.v1.access_pb2 import Role as WireRole
@@ -21,7 +21,7 @@ PAGE = (Path(__file__).parents[2] / "docs/security.md").read_text(encoding="utf-
 
 def undeclared(service: str, names: list[str]) -> list[str]:
     """Methods that nobody may call, because their schema says nothing."""
-    return [name for name in names if method_at(f"/{service}/{name}").needed is Open.NOBODY]
+    return [name for name in names if Method(f"/{service}/{name}").needed is Open.NOBODY]
 
 
 def test_every_method_declares_a_role() -> None:
@@ -59,7 +59,6 @@ def test_the_page_says_the_same() -> None:
     table = PAGE.split("| method | role |")[1].split("\n\n")[0]
     said = dict(re.findall(r"^\| `([^`]+)` \| (\w+) \|$", table, re.MULTILINE))
     ours = {
-        method.name: method_at(f"/{SERVICE.full_name}/{method.name}").needed.value
-        for method in SERVICE.methods
+        method.name: Method(f"/{SERVICE.full_name}/{method.name}").needed.value for method in SERVICE.methods
     }
     assert said == ours | {service: needed.value for service, needed in STANDARD.items()}

@@ -8,7 +8,7 @@ import grpc
 
 from common.interceptors import Chain, Interceptor
 from gateway.rpc.call import CallContext
-from gateway.rpc.methods import CONTRACT
+from gateway.rpc.methods import CONTRACT, Method
 
 PEER = "ipv4:10.0.0.5:41234"
 
@@ -42,7 +42,7 @@ def call_of(
     method: str = "Ping", peer: str = PEER, token: str | None = None, *, streaming: bool = False
 ) -> CallContext:
     rpc: Any = RpcDouble(peer, token)
-    return CallContext(f"/{CONTRACT.full_name}/{method}", rpc, streaming=streaming)
+    return CallContext(Method(f"/{CONTRACT.full_name}/{method}", streaming=streaming), rpc)
 
 
 async def serve(
@@ -55,7 +55,7 @@ async def serve(
     token: str | None = None,
 ) -> Any:
     """What a caller gets: the response, or those of a stream; raises what the call ended with."""
-    chain = Chain(interceptors, CallContext)
+    chain = Chain(interceptors, Method, CallContext)
     handlers: Any = chain.service(CONTRACT, {method: behavior})
     details: Any = SimpleNamespace(method=f"/{CONTRACT.full_name}/{method}")
     handler: Any = handlers.service(details)

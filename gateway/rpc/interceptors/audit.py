@@ -10,6 +10,7 @@ from common.errors import DomainError, NotAllowedError, NotAuthenticatedError, T
 from common.interceptors import Interceptor
 from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
+from gateway.rpc.methods import Method
 from gateway.rpc.ports import AuditTrail, EventSink
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
@@ -34,16 +35,17 @@ class Audit(Interceptor[CallContext]):
         self._refusals = refusals
         self._answers: dict[CallContext, str] = {}
 
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method is a control action."""
+        return method.changes_robot
+
     def on_response(self, call: CallContext, response: Any) -> None:
         """Keeps what the caller is answered until the call ends."""
-        if call.method.changes_robot:
-            self._answers[call] = getattr(response, "message", "")
+        self._answers[call] = getattr(response, "message", "")
 
-    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Records the action, unless it was refused too often, or for its rate."""
         answer = self._answers.pop(call, "")
-        if not call.method.changes_robot:
-            return
         if isinstance(error, NotAuthenticatedError | NotAllowedError):
             left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
             if left_out is None:

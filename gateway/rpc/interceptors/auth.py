@@ -63,6 +63,10 @@ class Auth(Interceptor[CallContext]):
         """By their credentials, of which there are as many as the robot has."""
         self._streams: dict[CallContext, asyncio.Task[object]] = {}
 
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method needs a credential."""
+        return method.needed is not Open.EVERYBODY
+
     async def on_call(self, call: CallContext) -> None:
         """Sets the call's principal.
 
@@ -71,17 +75,15 @@ class Auth(Interceptor[CallContext]):
             NotAllowedError: the method needs another role.
             TooMuchError: too many wrong credentials came from there.
         """
-        if call.method.needed is Open.EVERYBODY:
-            return
         call.principal = principal = await self._authenticate(call)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
-        if call.streaming:
+        if call.method.streaming:
             task = asyncio.current_task()
             assert task is not None, "gRPC serves each call in a task of its own"
             self._streams[call] = task
 
-    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
         self._streams.pop(call, None)
 

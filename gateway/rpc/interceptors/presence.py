@@ -7,6 +7,7 @@ from typing import Final
 
 from common.interceptors import Interceptor
 from gateway.rpc.call import CallContext
+from gateway.rpc.methods import Method
 from gateway.rpc.ports import EventSink
 from gateway.status.event import ClientJoined, ClientLeft, Event
 from gateway.status.fault import Severity
@@ -38,16 +39,17 @@ class Presence(Interceptor[CallContext]):
         self._clock = clock
         self._clients: dict[str, _Client] = {}
 
-    async def on_call(self, call: CallContext) -> None:
-        """Counts an open stream of the contract."""
-        if call.streaming and call.method.of_contract:
-            client = self._clients.setdefault(call.peer.address, _Client(self._clock()))
-            client.streams += 1
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method is a stream of the contract."""
+        return method.streaming and method.of_contract
 
-    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_call(self, call: CallContext) -> None:
+        """Counts an open stream."""
+        client = self._clients.setdefault(call.peer.address, _Client(self._clock()))
+        client.streams += 1
+
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Reports a client that had joined and closes its last stream."""
-        if not (call.streaming and call.method.of_contract):
-            return
         address = call.peer.address
         client = self._clients[address]
         client.streams -= 1

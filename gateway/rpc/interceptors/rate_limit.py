@@ -13,7 +13,7 @@ import asyncio
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -57,33 +57,34 @@ class RateLimit(Interceptor[CallContext]):
         self._admission = admission
         self._delayed = 0
 
-    async def on_call(self, call: CallContext) -> None:
+    def on_call(self, call: CallContext) -> Awaitable[None] | None:
         """Takes a token, and a stream if the call is one.
 
         Raises:
-            TooMuchError: after a delay.
+            TooMuchError: there is none left; mostly from the awaitable, after a delay.
         """
         try:
             self._admission.take_token(call.peer)
-            if call.streaming:
+            if call.method.streaming:
                 self._admission.open_stream(call.peer)
-        except TooMuchError:
-            await self._delay()
-            raise
+        except TooMuchError as error:
+            if self._delayed >= _MAX_DELAYED:
+                raise
+            return self._refuse_later(error)
+        return None
 
-    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Gives the stream back."""
-        if call.streaming:
+        if call.method.streaming:
             self._admission.close_stream(call.peer)
 
-    async def _delay(self) -> None:
-        if self._delayed >= _MAX_DELAYED:
-            return
+    async def _refuse_later(self, error: TooMuchError) -> None:
         self._delayed += 1
         try:
             await asyncio.sleep(self._admission.refusal_delay_s())
         finally:
             self._delayed -= 1
+        raise error
 
 
 class Admission:

@@ -18,6 +18,7 @@ RECENT_S: Final = 10.0
 """A connection that called, or was sent something, this recently counts as a client."""
 _MAX_CONNECTIONS: Final = 1024
 """Beyond it, the connection that was quiet longest is forgotten."""
+_OK: Final = grpc.StatusCode.OK.name
 _BOUNDS_S: Final = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
 """Upper bounds of the duration histogram's buckets."""
 
@@ -90,9 +91,9 @@ class Stats(Interceptor[CallContext]):
             count += 1
         return count
 
-    async def on_call(self, call: CallContext) -> None:
+    def on_call(self, call: CallContext) -> None:
         """Counts an open stream."""
-        if call.streaming:
+        if call.method.streaming:
             self._of(call).open += 1
 
     def on_request(self, call: CallContext, request: Any) -> Any:
@@ -106,19 +107,22 @@ class Stats(Interceptor[CallContext]):
         if not call.responded:
             call.responded = True
             self._of(call).served += 1
-        if call.streaming and call.method.of_contract:
+        if call.method.streaming and call.method.of_contract:
             self._note_active(call.peer.connection)
 
-    async def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Counts how the call ended, and how long it took."""
         stats = self._of(call)
-        if isinstance(error, DomainError):
-            stats.refused += 1
-        elif isinstance(error, Exception) and not isinstance(error, grpc.aio.AbortError):
-            stats.failed += 1
-        if call.streaming:
+        if call.method.streaming:
             stats.open -= 1
-        stats.ended[status_code(error, call).name] += 1
+        if error is None:
+            stats.ended[_OK] += 1
+        else:
+            stats.ended[status_code(error, call).name] += 1
+            if isinstance(error, DomainError):
+                stats.refused += 1
+            elif isinstance(error, Exception) and not isinstance(error, grpc.aio.AbortError):
+                stats.failed += 1
         stats.durations.add(time.perf_counter() - call.began_s)
 
     def _of(self, call: CallContext) -> MethodStats:

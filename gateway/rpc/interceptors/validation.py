@@ -9,6 +9,7 @@ from common.errors import FieldViolation, InvalidRequestError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.rpc.call import CallContext
+from gateway.rpc.methods import Method
 
 _VALIDATOR: Final = Validator()
 """Compiles the rules of each message once."""
@@ -24,6 +25,10 @@ class Validation(Interceptor[CallContext]):
     def __init__(self, max_request_bytes: int) -> None:
         self._max_request_bytes = max_request_bytes
 
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method is the contract's."""
+        return method.of_contract
+
     def on_request(self, call: CallContext, request: Any) -> Any:
         """Returns the message.
 
@@ -32,8 +37,7 @@ class Validation(Interceptor[CallContext]):
             InvalidRequestError: it can't be parsed, or breaks rules; each broken rule is named.
         """
         message_type = call.method.request_type
-        if message_type is None:
-            return request
+        assert message_type is not None, "the contract's methods have one"
         if len(request) > self._max_request_bytes:
             raise TooMuchError(
                 f"a request of {len(request)} bytes is too long; the limit is {self._max_request_bytes}",
@@ -45,8 +49,7 @@ class Validation(Interceptor[CallContext]):
             name = message_type.DESCRIPTOR.full_name
             raise InvalidRequestError(f"the request can't be parsed as {name}") from error
         call.request = message
-        # A message without fields can't break a rule.
-        if message_type.DESCRIPTOR.fields:
+        if call.method.has_parameters:
             validate(message)
         return message
 

@@ -44,7 +44,7 @@ class Authenticated(Interceptor[CallContext]):
     def __init__(self, principal: Principal | None, error: Exception | None = None) -> None:
         self._principal, self._error = principal, error
 
-    async def on_call(self, call: CallContext) -> None:
+    def on_call(self, call: CallContext) -> None:
         call.principal = self._principal
         if self._error:
             raise self._error

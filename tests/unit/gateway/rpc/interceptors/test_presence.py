@@ -23,37 +23,32 @@ class World:
         return [each.detail for each in self.events]
 
 
-async def test_a_client_that_stays_is_reported_once() -> None:
+def test_a_client_that_stays_is_reported_once() -> None:
     world = World()
     streams = [call_of("WatchSystemStatus", streaming=True) for _ in range(2)]
     for each in streams:
-        await world.presence.on_call(each)
+        world.presence.on_call(each)
     assert world.reported() == []
     world.now_s += JOINED_AFTER_S
     assert world.reported() == [ClientJoined(ADDRESS)]
     assert world.reported() == [ClientJoined(ADDRESS)]
-    await world.presence.on_end(streams[0], None)
+    world.presence.on_end(streams[0], None)
     assert world.reported() == [ClientJoined(ADDRESS)], "one of its two streams is open"
-    await world.presence.on_end(streams[1], None)
+    world.presence.on_end(streams[1], None)
     assert world.reported() == [ClientJoined(ADDRESS), ClientLeft(ADDRESS)]
 
 
-async def test_a_client_that_only_looks_is_not_reported() -> None:
+def test_a_client_that_only_looks_is_not_reported() -> None:
     world = World()
     for _ in range(5):
         stream = call_of("WatchSystemStatus", streaming=True)
-        await world.presence.on_call(stream)
+        world.presence.on_call(stream)
         world.now_s += JOINED_AFTER_S / 2
         assert world.reported() == []
-        await world.presence.on_end(stream, None)
+        world.presence.on_end(stream, None)
     assert world.reported() == []
 
 
-async def test_polling_is_no_presence() -> None:
-    world = World()
-    call = call_of("GetSystemStatus")
-    await world.presence.on_call(call)
-    world.now_s += JOINED_AFTER_S
-    assert world.reported() == []
-    await world.presence.on_end(call, None)
-    assert world.reported() == []
+def test_polling_is_no_presence() -> None:
+    assert not World().presence.applies_to(call_of("GetSystemStatus").method)
+    assert World().presence.applies_to(call_of("WatchSystemStatus", streaming=True).method)

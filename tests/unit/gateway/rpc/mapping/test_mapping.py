@@ -14,7 +14,7 @@ from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.methods import method_at
+from gateway.rpc.methods import Method
 from gateway.rpc.recipient import Recipient
 from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board
@@ -112,7 +112,7 @@ def test_every_method_of_the_contract_has_a_handler() -> None:
 
 def test_a_viewer_can_change_nothing() -> None:
     methods = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods_by_name
-    changing = {name for name in methods if method_at(f"/{SERVICE}/{name}").changes_robot}
+    changing = {name for name in methods if Method(f"/{SERVICE}/{name}").changes_robot}
     assert changing == {"SetPreviewMode"}
 
 
