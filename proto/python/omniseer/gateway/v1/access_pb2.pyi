@@ -25,29 +25,29 @@ class _Role:
 class _RoleEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Role.ValueType], _builtins.type):
     DESCRIPTOR: _descriptor.EnumDescriptor
     ROLE_UNSPECIFIED: _Role.ValueType  # 0
-    """Nobody. A method that requires it is served to no one."""
+    """No role: a method that requires it is served to no caller."""
     ROLE_VIEWER: _Role.ValueType  # 1
-    """Looks at everything, the video included, and changes nothing."""
+    """Reads everything, the video included, and changes nothing."""
     ROLE_OPERATOR: _Role.ValueType  # 2
-    """Switches what an operator switches."""
+    """Controls what an operator controls."""
     ROLE_ADMIN: _Role.ValueType  # 3
-    """Sees and manages who else is there."""
+    """Manages other callers."""
 
 class Role(_Role, metaclass=_RoleEnumTypeWrapper):
-    """What somebody may do. Each role may do what the ones before it may."""
+    """What a caller may do. Each role may do what the ones before it may."""
 
 ROLE_UNSPECIFIED: Role.ValueType  # 0
-"""Nobody. A method that requires it is served to no one."""
+"""No role: a method that requires it is served to no caller."""
 ROLE_VIEWER: Role.ValueType  # 1
-"""Looks at everything, the video included, and changes nothing."""
+"""Reads everything, the video included, and changes nothing."""
 ROLE_OPERATOR: Role.ValueType  # 2
-"""Switches what an operator switches."""
+"""Controls what an operator controls."""
 ROLE_ADMIN: Role.ValueType  # 3
-"""Sees and manages who else is there."""
+"""Manages other callers."""
 Global___Role: _TypeAlias = Role  # noqa: Y015
 
 REQUIRED_ROLE_FIELD_NUMBER: _builtins.int
 required_role: _extension_dict._ExtensionFieldDescriptor[_descriptor_pb2.MethodOptions, Global___Role.ValueType]
-"""The least role that a caller of the method needs, where the gateway asks who calls. Every
+"""The least role that a caller of the method needs, where callers are authenticated. Every
 method declares one.
 """

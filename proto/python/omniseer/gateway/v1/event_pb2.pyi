@@ -29,23 +29,23 @@ class _ControlResultEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Control
     CONTROL_RESULT_UNSPECIFIED: _ControlResult.ValueType  # 0
     """Not known."""
     CONTROL_RESULT_ACCEPTED: _ControlResult.ValueType  # 1
-    """The robot took note."""
+    """It was accepted."""
     CONTROL_RESULT_REFUSED: _ControlResult.ValueType  # 2
-    """The gateway refused."""
+    """The gateway refused it."""
     CONTROL_RESULT_FAILED: _ControlResult.ValueType  # 3
-    """The gateway met an error of its own."""
+    """It failed by a defect of the gateway."""
 
 class ControlResult(_ControlResult, metaclass=_ControlResultEnumTypeWrapper):
-    """What became of a control action."""
+    """How a control action ended."""
 
 CONTROL_RESULT_UNSPECIFIED: ControlResult.ValueType  # 0
 """Not known."""
 CONTROL_RESULT_ACCEPTED: ControlResult.ValueType  # 1
-"""The robot took note."""
+"""It was accepted."""
 CONTROL_RESULT_REFUSED: ControlResult.ValueType  # 2
-"""The gateway refused."""
+"""The gateway refused it."""
 CONTROL_RESULT_FAILED: ControlResult.ValueType  # 3
-"""The gateway met an error of its own."""
+"""It failed by a defect of the gateway."""
 Global___ControlResult: _TypeAlias = ControlResult  # noqa: Y015
 
 class _EventGapReason:
@@ -59,7 +59,7 @@ class _EventGapReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_EventG
     EVENT_GAP_REASON_NO_LONGER_KEPT: _EventGapReason.ValueType  # 1
     """More events came than the gateway keeps, before they could be sent."""
     EVENT_GAP_REASON_NEW_RUN: _EventGapReason.ValueType  # 2
-    """The gateway program was started anew. What the earlier run had not sent yet is lost."""
+    """The gateway program was restarted. What the earlier run had not sent yet is lost."""
 
 class EventGapReason(_EventGapReason, metaclass=_EventGapReasonEnumTypeWrapper):
     """Why events are missing."""
@@ -69,7 +69,7 @@ EVENT_GAP_REASON_UNSPECIFIED: EventGapReason.ValueType  # 0
 EVENT_GAP_REASON_NO_LONGER_KEPT: EventGapReason.ValueType  # 1
 """More events came than the gateway keeps, before they could be sent."""
 EVENT_GAP_REASON_NEW_RUN: EventGapReason.ValueType  # 2
-"""The gateway program was started anew. What the earlier run had not sent yet is lost."""
+"""The gateway program was restarted. What the earlier run had not sent yet is lost."""
 Global___EventGapReason: _TypeAlias = EventGapReason  # noqa: Y015
 
 @_typing.final
@@ -81,7 +81,7 @@ class EventPosition(_message.Message):
     RUN_ID_FIELD_NUMBER: _builtins.int
     SEQUENCE_FIELD_NUMBER: _builtins.int
     run_id: _builtins.str
-    """Which run of the gateway program numbered the events: another one after each start of it.
+    """The run of the gateway program that numbered the events; it changes with each start.
     (GatewayFacts.boot_id is something else: it changes when the robot's computer starts.)
     """
     sequence: _builtins.int
@@ -128,26 +128,26 @@ class Event(_message.Message):
     sequence: _builtins.int
     """Counts up by one from 1 since the gateway program started."""
     monotonic_ns: _builtins.int
-    """When it happened, on the monotonic clock that Ping tells, in ns."""
+    """When it happened, on the monotonic clock of Ping, in ns."""
     wall_clock_unix_ms: _builtins.int
     """What the robot's calendar clock showed then, in ms since 1970-01-01 UTC. For people."""
     severity: _fault_pb2.FaultSeverity.ValueType
     """How much it matters."""
     component: _builtins.str
-    """The part of the robot that it happened to, as operators call it."""
+    """The affected part of the robot, by the operators' name for it."""
     message: _builtins.str
     """What happened, for a person to read."""
     @_builtins.property
     def fault_raised(self) -> Global___FaultRaised:
-        """A fault began, or grew worse."""
+        """A fault began, or became more severe."""
 
     @_builtins.property
     def fault_cleared(self) -> Global___FaultCleared:
-        """A fault is over."""
+        """A fault ended."""
 
     @_builtins.property
     def preview_state_changed(self) -> Global___PreviewStateChanged:
-        """The preview came to another state."""
+        """The preview settled in another state."""
 
     @_builtins.property
     def encoder_fallback(self) -> Global___EncoderFallback:
@@ -155,19 +155,19 @@ class Event(_message.Message):
 
     @_builtins.property
     def client_joined(self) -> Global___ClientJoined:
-        """Somebody watches the robot."""
+        """A client joined."""
 
     @_builtins.property
     def client_left(self) -> Global___ClientLeft:
-        """Somebody doesn't any more."""
+        """A client left."""
 
     @_builtins.property
     def control_action(self) -> Global___ControlAction:
-        """Somebody asked for something that changes the robot."""
+        """A call that changes the robot."""
 
     @_builtins.property
     def robot_mode_changed(self) -> Global___RobotModeChanged:
-        """The robot is about something else."""
+        """The robot reports another mode."""
 
     def __init__(
         self,
@@ -200,7 +200,7 @@ Global___Event: _TypeAlias = Event  # noqa: Y015
 
 @_typing.final
 class FaultRaised(_message.Message):
-    """A fault began, or grew worse."""
+    """A fault began, or became more severe."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -224,7 +224,7 @@ Global___FaultRaised: _TypeAlias = FaultRaised  # noqa: Y015
 
 @_typing.final
 class FaultCleared(_message.Message):
-    """A fault is over: it stayed away for as long as the gateway is configured to wait."""
+    """A fault ended: its condition stayed away for as long as the gateway is configured to wait."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -248,7 +248,7 @@ Global___FaultCleared: _TypeAlias = FaultCleared  # noqa: Y015
 
 @_typing.final
 class PreviewStateChanged(_message.Message):
-    """The preview came to rest in another state, or another profile is in force. States on the way
+    """The preview settled in another state, or with another profile. Transitional states
     (starting, stopping) and the retries of a faulted preview are no events.
     """
 
@@ -310,7 +310,7 @@ Global___EncoderFallback: _TypeAlias = EncoderFallback  # noqa: Y015
 
 @_typing.final
 class ClientJoined(_message.Message):
-    """A client that has had a stream open for two seconds. Clients that only ask are not told of."""
+    """A client has had a stream open for two seconds. Clients that only poll are not reported."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -332,7 +332,7 @@ Global___ClientJoined: _TypeAlias = ClientJoined  # noqa: Y015
 
 @_typing.final
 class ClientLeft(_message.Message):
-    """A client that was told of has no stream open any more."""
+    """A client that had joined closed its last stream."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -354,7 +354,7 @@ Global___ClientLeft: _TypeAlias = ClientLeft  # noqa: Y015
 
 @_typing.final
 class ControlAction(_message.Message):
-    """Somebody asked for something that changes the robot."""
+    """A call that changes the robot, or tried to."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -365,15 +365,15 @@ class ControlAction(_message.Message):
     RESULT_FIELD_NUMBER: _builtins.int
     ANSWER_FIELD_NUMBER: _builtins.int
     who: _builtins.str
-    """Who, where the gateway asks who calls; else empty."""
+    """The caller's name; empty where callers are not authenticated."""
     address: _builtins.str
     """Where the call came from, as in ClientJoined."""
     method: _builtins.str
     """The method of this contract."""
     request: _builtins.str
-    """What was asked for, for a person to read."""
+    """The parameters, for a person to read."""
     result: Global___ControlResult.ValueType
-    """What became of it."""
+    """How it ended."""
     answer: _builtins.str
     """The answer, for a person to read."""
     def __init__(
@@ -396,13 +396,13 @@ Global___ControlAction: _TypeAlias = ControlAction  # noqa: Y015
 
 @_typing.final
 class RobotModeChanged(_message.Message):
-    """The robot is about something else."""
+    """The robot reports another mode."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     MODE_FIELD_NUMBER: _builtins.int
     mode: _builtins.str
-    """The mode in the robot's own words. Empty when there is none any more."""
+    """The mode in the robot's own words. Empty when it no longer reports one."""
     def __init__(
         self,
         *,
@@ -418,7 +418,7 @@ Global___RobotModeChanged: _TypeAlias = RobotModeChanged  # noqa: Y015
 
 @_typing.final
 class EventGap(_message.Message):
-    """Here events are missing. What follows is whole again."""
+    """Events are missing here. What follows is complete again."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -428,7 +428,7 @@ class EventGap(_message.Message):
     reason: Global___EventGapReason.ValueType
     """Why."""
     missed_count: _builtins.int
-    """How many events of the present run are missing. How many of an earlier run are, nobody knows."""
+    """How many events of the present run are missing. How many of an earlier run are is unknown."""
     @_builtins.property
     def position(self) -> Global___EventPosition:
         """The place after the gap: the events that follow are the ones after it."""

@@ -30,7 +30,7 @@ class _FaultSeverityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_FaultSe
     FAULT_SEVERITY_WARNING: _FaultSeverity.ValueType  # 2
     """Something is lost or will be; the robot can still take work."""
     FAULT_SEVERITY_ERROR: _FaultSeverity.ValueType  # 3
-    """The robot can't do a part of its work until this is mended."""
+    """The robot can't do a part of its work until this is repaired."""
 
 class FaultSeverity(_FaultSeverity, metaclass=_FaultSeverityEnumTypeWrapper):
     """How much a fault matters."""
@@ -42,14 +42,14 @@ FAULT_SEVERITY_INFO: FaultSeverity.ValueType  # 1
 FAULT_SEVERITY_WARNING: FaultSeverity.ValueType  # 2
 """Something is lost or will be; the robot can still take work."""
 FAULT_SEVERITY_ERROR: FaultSeverity.ValueType  # 3
-"""The robot can't do a part of its work until this is mended."""
+"""The robot can't do a part of its work until this is repaired."""
 Global___FaultSeverity: _TypeAlias = FaultSeverity  # noqa: Y015
 
 @_typing.final
 class Fault(_message.Message):
-    """Something that is wrong with the robot, or was a moment ago. Found by the gateway itself, about
-    five times a second, whether or not anybody asks. Its ages are in ms on the gateway's monotonic
-    clock.
+    """Something that is wrong with the robot, or was until a moment ago. The gateway evaluates its rules
+    about five times a second, whether or not a client is connected. Ages are in ms on the gateway's
+    monotonic clock.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -64,25 +64,25 @@ class Fault(_message.Message):
     CLEARED_AGE_MS_FIELD_NUMBER: _builtins.int
     TIMES_RAISED_FIELD_NUMBER: _builtins.int
     id: _builtins.str
-    """The same for the same trouble whenever it comes: "odometry.stale", "preview.faulted",
+    """The same for the same condition whenever it occurs: "odometry.stale", "preview.faulted",
     "platform.temperature", "diagnostics.COMPONENT". Small letters, digits, dots and underscores.
     """
     severity: Global___FaultSeverity.ValueType
-    """How much it matters. The worst so far is not kept: a fault may grow better or worse."""
+    """How much it matters. The worst so far is not kept: the severity of a fault may rise and fall."""
     component: _builtins.str
-    """The part of the robot that has it, as operators call it."""
+    """The affected part of the robot, by the operators' name for it."""
     message: _builtins.str
     """What is wrong, for a person to read."""
     remedy: _builtins.str
     """What to look at or to do, for a person to read."""
     active: _builtins.bool
-    """Whether it is there now. Faults that are over stay listed for a while (60 s by default)."""
+    """Whether it is there now. Cleared faults stay listed for a while (60 s by default)."""
     age_ms: _builtins.int
     """How long ago it began."""
     cleared_age_ms: _builtins.int
-    """How long ago it was over. Unset while it is active."""
+    """How long ago it was cleared. Unset while it is active."""
     times_raised: _builtins.int
-    """How often it came since the gateway started, this time included."""
+    """How often it was raised since the gateway started, this time included."""
     def __init__(
         self,
         *,

@@ -30,26 +30,23 @@ class GatewayFacts(_message.Message):
     REQUESTS_REFUSED_FIELD_NUMBER: _builtins.int
     RUN_ID_FIELD_NUMBER: _builtins.int
     revision: _builtins.str
-    """The git revision the gateway was built from (40 hexadecimal digits). Empty when the build does
-    not tell.
+    """The git revision the gateway was built from (40 hexadecimal digits). Empty when the build is
+    of unknown origin.
     """
     boot_id: _builtins.str
-    """Another one after each start of the robot's computer. Empty when its operating system tells
-    none.
-    """
+    """The kernel's boot ID: it changes with each start of the robot's computer. Empty if unavailable."""
     uptime_ms: _builtins.int
     """How long the gateway has been running, in ms."""
     client_count: _builtins.int
-    """Connections that asked for something during the last 10 s."""
+    """Connections that called, or were sent something, during the last 10 s."""
     requests_served: _builtins.int
     """Calls answered since the gateway started."""
     requests_refused: _builtins.int
-    """Calls answered with a refusal since then: the request made no sense, came at the wrong time, too
-    often, or from somebody who may not. Calls turned away because too many were under way are not
-    counted.
+    """Calls that were refused since then: an invalid request, too many of them, or a caller without the
+    right credential or role. Calls beyond the server's limit of concurrent calls are not counted.
     """
     run_id: _builtins.str
-    """Another one after each start of the gateway program; numbers the events (see EventPosition)."""
+    """Changes with each start of the gateway program; numbers the events (see EventPosition)."""
     def __init__(
         self,
         *,
@@ -86,7 +83,7 @@ class MethodCounts(_message.Message):
     refused: _builtins.int
     """Calls that were refused, as requests_refused of GatewayFacts."""
     failed: _builtins.int
-    """Calls that ended with an error of the gateway's own."""
+    """Calls that failed by a defect of the gateway."""
     def __init__(
         self,
         *,

@@ -21,7 +21,7 @@ DESCRIPTOR: _descriptor.FileDescriptor
 
 @_typing.final
 class OverlaySnapshot(_message.Message):
-    """What an operator's screen draws over the picture, in one answer."""
+    """What an operator's screen draws over the video, in one response."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -34,7 +34,7 @@ class OverlaySnapshot(_message.Message):
 
     @_builtins.property
     def detections(self) -> Global___DetectionOverlayStatus:
-        """What the robot sees."""
+        """Objects that the robot detects."""
 
     @_builtins.property
     def events(self) -> _containers.RepeatedCompositeFieldContainer[Global___OperatorEvent]:

@@ -85,15 +85,15 @@ class ComputeStatus(_message.Message):
     cpu_percent: _builtins.float
     """Load of all cores together, in percent (0-100)."""
     cpu_temperature_available: _builtins.bool
-    """Whether the computer tells its temperature."""
+    """Whether the computer reports its temperature."""
     cpu_temperature_c: _builtins.float
     """Hottest CPU sensor, in degrees Celsius. Meaningless when not available."""
     thermal_throttled_available: _builtins.bool
-    """Whether the computer tells if it is slowed down by heat."""
+    """Whether the computer reports thermal throttling."""
     thermal_throttled: _builtins.bool
-    """Whether the clock is held down because of heat. Meaningless when not available."""
+    """Whether the clock is reduced because of heat. Meaningless when not available."""
     ram_used_bytes: _builtins.int
-    """Memory in use (total minus what can be had without swapping), in bytes."""
+    """Memory in use (total minus what is available without swapping), in bytes."""
     ram_total_bytes: _builtins.int
     """Memory installed, in bytes."""
     ram_used_percent: _builtins.float
@@ -153,11 +153,11 @@ class NetworkStatus(_message.Message):
     interface_name: _builtins.str
     """The interface's name, "wlan0" for example. Empty when there is none."""
     wifi_signal_available: _builtins.bool
-    """Whether the interface is wireless and tells its signal."""
+    """Whether the interface is wireless and reports its signal."""
     wifi_signal_dbm: _builtins.int
     """Received signal strength in dBm (about -30 very strong, -80 weak). Meaningless when not available."""
     link_quality_available: _builtins.bool
-    """Whether the driver tells a link quality."""
+    """Whether the driver reports a link quality."""
     link_quality_percent: _builtins.int
     """Link quality in percent (0-100) of the driver's own scale. Meaningless when not available."""
     def __init__(
@@ -239,15 +239,15 @@ class BatteryStatus(_message.Message):
     present: _builtins.bool
     """Whether the battery is in its place."""
     voltage_available: _builtins.bool
-    """Whether the battery tells its voltage."""
+    """Whether the battery reports its voltage."""
     voltage: _builtins.float
     """Terminal voltage in volts. Meaningless when not available."""
     percentage_available: _builtins.bool
-    """Whether the battery tells its charge."""
+    """Whether the battery reports its charge."""
     percentage: _builtins.float
     """State of charge in percent (0-100). Meaningless when not available."""
     charging_available: _builtins.bool
-    """Whether the battery tells if it is being charged."""
+    """Whether the battery reports if it is being charged."""
     charging: _builtins.bool
     """Whether it is being charged. Meaningless when not available."""
     def __init__(

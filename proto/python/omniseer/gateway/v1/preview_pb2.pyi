@@ -62,7 +62,7 @@ class _VideoCodecEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_VideoCodec
     """H.265 / HEVC."""
 
 class VideoCodec(_VideoCodec, metaclass=_VideoCodecEnumTypeWrapper):
-    """How the preview's pictures are compressed."""
+    """Compression of the preview's frames."""
 
 VIDEO_CODEC_UNSPECIFIED: VideoCodec.ValueType  # 0
 """Not known: no pipeline has been built yet."""
@@ -81,15 +81,15 @@ class _StreamTransportEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Strea
     STREAM_TRANSPORT_UNSPECIFIED: _StreamTransport.ValueType  # 0
     """Not known."""
     STREAM_TRANSPORT_SRT: _StreamTransport.ValueType  # 1
-    """SRT in live mode; the robot listens, viewers call."""
+    """SRT in live mode; the robot is the listener, viewers are callers."""
 
 class StreamTransport(_StreamTransport, metaclass=_StreamTransportEnumTypeWrapper):
-    """How the stream reaches the viewer."""
+    """Transport of the stream."""
 
 STREAM_TRANSPORT_UNSPECIFIED: StreamTransport.ValueType  # 0
 """Not known."""
 STREAM_TRANSPORT_SRT: StreamTransport.ValueType  # 1
-"""SRT in live mode; the robot listens, viewers call."""
+"""SRT in live mode; the robot is the listener, viewers are callers."""
 Global___StreamTransport: _TypeAlias = StreamTransport  # noqa: Y015
 
 class _StreamContainer:
@@ -101,15 +101,15 @@ class _StreamContainerEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Strea
     STREAM_CONTAINER_UNSPECIFIED: _StreamContainer.ValueType  # 0
     """Not known."""
     STREAM_CONTAINER_MPEG_TS: _StreamContainer.ValueType  # 1
-    """MPEG transport stream, one program, one video stream, one PES packet per picture."""
+    """MPEG transport stream, one program, one video stream, one PES packet per frame."""
 
 class StreamContainer(_StreamContainer, metaclass=_StreamContainerEnumTypeWrapper):
-    """What the compressed pictures are packed in."""
+    """Container of the compressed frames."""
 
 STREAM_CONTAINER_UNSPECIFIED: StreamContainer.ValueType  # 0
 """Not known."""
 STREAM_CONTAINER_MPEG_TS: StreamContainer.ValueType  # 1
-"""MPEG transport stream, one program, one video stream, one PES packet per picture."""
+"""MPEG transport stream, one program, one video stream, one PES packet per frame."""
 Global___StreamContainer: _TypeAlias = StreamContainer  # noqa: Y015
 
 @_typing.final
@@ -130,7 +130,7 @@ class PreviewStatus(_message.Message):
     SERVICE_REACHABLE_FIELD_NUMBER: _builtins.int
     BITRATE_REASON_FIELD_NUMBER: _builtins.int
     state: _states_pb2.PreviewState.ValueType
-    """Where the preview is in its life."""
+    """State of the preview."""
     profile: Global___PreviewProfile.ValueType
     """The profile in force, or, while disabled, the one the next enable will use.
     UNSPECIFIED when none was ever chosen.
@@ -140,7 +140,7 @@ class PreviewStatus(_message.Message):
     Empty when the preview works or was never faulted since it was last enabled.
     """
     target_bitrate_kbps: _builtins.int
-    """The bit rate the encoder is told to keep, in kbit/s (1000 bit/s). 0 while no pipeline exists."""
+    """The encoder's target bit rate, in kbit/s (1000 bit/s). 0 while no pipeline exists."""
     service_reachable: _builtins.bool
     """Whether the preview service (the program that makes the video) answers the gateway."""
     bitrate_reason: _builtins.str
@@ -149,7 +149,7 @@ class PreviewStatus(_message.Message):
     """
     @_builtins.property
     def endpoint(self) -> Global___StreamEndpoint:
-        """Where a viewer connects. Unset until the preview service has told what it serves."""
+        """Where a viewer connects. Unset until the preview service has reported it."""
 
     @_builtins.property
     def encoder(self) -> Global___EncoderStatus:
@@ -157,7 +157,7 @@ class PreviewStatus(_message.Message):
 
     @_builtins.property
     def video(self) -> Global___VideoFormat:
-        """The pictures that the profile in force resolves to. Unset while no pipeline exists."""
+        """The frames that the profile in force resolves to. Unset while no pipeline exists."""
 
     @_builtins.property
     def measured(self) -> Global___StreamMeasurement:
@@ -165,7 +165,7 @@ class PreviewStatus(_message.Message):
 
     @_builtins.property
     def counters(self) -> Global___PreviewCounters:
-        """How often things happened since the gateway started, whatever became of the preview service."""
+        """Counts since the gateway started; restarts of the preview service do not reset them."""
 
     def __init__(
         self,
@@ -208,8 +208,8 @@ class StreamEndpoint(_message.Message):
     transport: Global___StreamTransport.ValueType
     """How the stream is carried."""
     host: _builtins.str
-    """The address to connect to, as seen from the client that asked: the robot's address on the
-    network the request came in by, unless the robot's configuration names one.
+    """The address to connect to, as this client reaches the robot: the robot's address on the
+    network of the request, unless the robot's configuration names one.
     """
     port: _builtins.int
     """The UDP port the robot listens on while the preview is running."""
@@ -219,15 +219,15 @@ class StreamEndpoint(_message.Message):
     """
     latency_ms: _builtins.int
     """The robot's SRT latency in ms: how long a receiver may wait for a lost packet. The larger one
-    of both sides counts, so a viewer should ask for this value.
+    of both sides counts, so a viewer should use this value.
     """
     codec: Global___VideoCodec.ValueType
-    """How the pictures are compressed. May change when the robot falls back to another encoder."""
+    """Compression of the frames. May change when the robot falls back to another encoder."""
     container: Global___StreamContainer.ValueType
-    """What the compressed pictures are packed in."""
+    """Container of the compressed frames."""
     passphrase: _builtins.str
     """The SRT passphrase of this session (10 to 79 characters). Empty when the stream is not
-    encrypted, and for clients that may not have it.
+    encrypted, and for clients without the right to it.
     """
     encrypted: _builtins.bool
     """Whether the stream is encrypted (AES). When true and passphrase is empty, this client has no
@@ -256,7 +256,7 @@ Global___StreamEndpoint: _TypeAlias = StreamEndpoint  # noqa: Y015
 
 @_typing.final
 class EncoderStatus(_message.Message):
-    """Which encoder makes the stream, and whether it is the one that was wanted."""
+    """The encoder of the stream, and whether it is the preferred one."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -274,9 +274,9 @@ class EncoderStatus(_message.Message):
     first choice runs.
     """
     fallback_reason: _builtins.str
-    """Why the wanted one does not run, for a person to read. Empty when it does."""
+    """Why the preferred one does not run, for a person to read. Empty when it does."""
     codec: Global___VideoCodec.ValueType
-    """How the pictures are compressed."""
+    """Compression of the frames."""
     def __init__(
         self,
         *,
@@ -296,7 +296,7 @@ Global___EncoderStatus: _TypeAlias = EncoderStatus  # noqa: Y015
 
 @_typing.final
 class VideoFormat(_message.Message):
-    """Size and rate of the pictures."""
+    """Size and rate of the frames."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -304,11 +304,11 @@ class VideoFormat(_message.Message):
     HEIGHT_PX_FIELD_NUMBER: _builtins.int
     FPS_FIELD_NUMBER: _builtins.int
     width_px: _builtins.int
-    """Picture width in pixels."""
+    """Frame width in pixels."""
     height_px: _builtins.int
-    """Picture height in pixels."""
+    """Frame height in pixels."""
     fps: _builtins.float
-    """Pictures per second that the profile asks for."""
+    """Frames per second of the profile."""
     def __init__(
         self,
         *,
@@ -342,18 +342,18 @@ class StreamMeasurement(_message.Message):
     available: _builtins.bool
     """Whether a figure has been taken in this run."""
     stale: _builtins.bool
-    """Whether the figures are too old to rely on (no news from the preview service for 2 s)."""
+    """Whether the figures are too old to rely on (no report of the preview service for 2 s)."""
     age_ms: _builtins.int
     """How long ago the gateway received these figures, in ms, on its own monotonic clock."""
     fps: _builtins.float
-    """Encoded pictures per second over the last measuring window (500 ms or more)."""
+    """Encoded frames per second over the last measuring window (500 ms or more)."""
     bitrate_kbps: _builtins.float
     """Bit rate of the transport stream over the same window, in kbit/s, for one viewer."""
     viewer_count: _builtins.int
     """Connected viewers."""
     last_frame_age_ms: _builtins.int
-    """Age of the newest encoded picture in ms when the figures were taken, plus age_ms.
-    Unset before the first picture.
+    """Age of the newest encoded frame in ms when the figures were taken, plus age_ms.
+    Unset before the first frame.
     """
     worst_rtt_ms: _builtins.float
     """The longest round-trip time of any viewer, in ms. Unset without viewers."""
@@ -395,7 +395,7 @@ Global___StreamMeasurement: _TypeAlias = StreamMeasurement  # noqa: Y015
 
 @_typing.final
 class PreviewCounters(_message.Message):
-    """Event counts since the gateway started. They only grow."""
+    """Counts since the gateway started. They only grow."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -410,7 +410,7 @@ class PreviewCounters(_message.Message):
     faults: _builtins.int
     """Times the preview became FAULTED."""
     fallbacks: _builtins.int
-    """Times an encoder was passed over for the next one while the preview was wanted."""
+    """Times an encoder was passed over for the next one while the preview was enabled."""
     def __init__(
         self,
         *,

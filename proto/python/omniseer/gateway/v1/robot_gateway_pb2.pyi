@@ -26,7 +26,7 @@ DESCRIPTOR: _descriptor.FileDescriptor
 
 @_typing.final
 class GetSystemStatusRequest(_message.Message):
-    """Asks for the whole status."""
+    """Requests the whole status."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -43,7 +43,7 @@ Global___GetSystemStatusRequest: _TypeAlias = GetSystemStatusRequest  # noqa: Y0
 
 @_typing.final
 class GetOverlaySnapshotRequest(_message.Message):
-    """Asks for status, detections and events."""
+    """Requests status, detections and events."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -60,7 +60,7 @@ Global___GetOverlaySnapshotRequest: _TypeAlias = GetOverlaySnapshotRequest  # no
 
 @_typing.final
 class GetGatewayInfoRequest(_message.Message):
-    """Asks for what is known of the gateway program."""
+    """Requests facts about the gateway program."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -77,7 +77,7 @@ Global___GetGatewayInfoRequest: _TypeAlias = GetGatewayInfoRequest  # noqa: Y015
 
 @_typing.final
 class GetGatewayInfoResponse(_message.Message):
-    """What is known of the gateway program."""
+    """Facts about the gateway program."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -92,12 +92,12 @@ class GetGatewayInfoResponse(_message.Message):
     gateway_version: _builtins.str
     """The gateway's software version (MAJOR.MINOR.PATCH)."""
     wall_clock_unix_ms: _builtins.int
-    """What the robot's own calendar clock shows, in ms since 1970-01-01 UTC, when this answer was
+    """What the robot's own calendar clock shows, in ms since 1970-01-01 UTC, when this response was
     made. No age in this contract depends on it.
     """
     configuration_json: _builtins.str
     """The configuration in force as a JSON object, defaults included. Without secrets, and without
-    what is the robot's own affair: where its values come from, devices, paths.
+    what is internal to the robot: where its values come from, devices, paths.
     """
     @_builtins.property
     def gateway(self) -> _gateway_info_pb2.GatewayFacts:
@@ -134,7 +134,7 @@ class SetPreviewModeRequest(_message.Message):
     ENABLED_FIELD_NUMBER: _builtins.int
     PROFILE_FIELD_NUMBER: _builtins.int
     enabled: _builtins.bool
-    """True to have the preview, false to have none."""
+    """The desired state: true for a preview, false for none."""
     profile: _preview_pb2.PreviewProfile.ValueType
     """What to deliver. Ignored when enabled is false. UNSPECIFIED keeps the current profile, or
     takes BALANCED when none was ever chosen.
@@ -155,7 +155,7 @@ Global___SetPreviewModeRequest: _TypeAlias = SetPreviewModeRequest  # noqa: Y015
 
 @_typing.final
 class SetPreviewModeResponse(_message.Message):
-    """What became of the request."""
+    """The outcome of the request."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -163,7 +163,7 @@ class SetPreviewModeResponse(_message.Message):
     MESSAGE_FIELD_NUMBER: _builtins.int
     PREVIEW_FIELD_NUMBER: _builtins.int
     accepted: _builtins.bool
-    """Whether the robot took note of the wish. True even when the preview can't start now."""
+    """Whether the robot accepted the desired state. True even when the preview can't start now."""
     message: _builtins.str
     """What happened and what to do next, for a person to read."""
     @_builtins.property
@@ -187,15 +187,15 @@ Global___SetPreviewModeResponse: _TypeAlias = SetPreviewModeResponse  # noqa: Y0
 
 @_typing.final
 class WatchSystemStatusRequest(_message.Message):
-    """Asks to be told of the status."""
+    """Subscribes to the status."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     MIN_INTERVAL_MS_FIELD_NUMBER: _builtins.int
     INCLUDE_DETECTIONS_FIELD_NUMBER: _builtins.int
     min_interval_ms: _builtins.int
-    """The least time between two answers, in ms. At most a minute. The gateway itself looks 20 times
-    a second: the interval is rounded up to a multiple of 50 ms, and 0 is the same as 50.
+    """The least time between two responses, in ms. At most a minute. The gateway looks for changes 20
+    times a second: the interval is rounded up to a multiple of 50 ms, and 0 is the same as 50.
     """
     include_detections: _builtins.bool
     """Whether responses carry the detections. New detections then count as a change of the status. A
@@ -225,12 +225,12 @@ class WatchSystemStatusResponse(_message.Message):
     MONOTONIC_NS_FIELD_NUMBER: _builtins.int
     DETECTIONS_FIELD_NUMBER: _builtins.int
     monotonic_ns: _builtins.int
-    """The instant, on the monotonic clock that Ping tells, in ns. An answer that was held up on the
-    way shows by it.
+    """The instant, on the monotonic clock of Ping, in ns. It shows how long a response was delayed on
+    its way.
     """
     @_builtins.property
     def status(self) -> _system_status_pb2.SystemStatus:
-        """As GetSystemStatus answers."""
+        """As in the response of GetSystemStatus."""
 
     @_builtins.property
     def detections(self) -> _overlay_pb2.DetectionOverlayStatus:
@@ -253,17 +253,17 @@ Global___WatchSystemStatusResponse: _TypeAlias = WatchSystemStatusResponse  # no
 
 @_typing.final
 class SubscribeEventsRequest(_message.Message):
-    """Asks to be told of events."""
+    """Subscribes to events."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     AFTER_FIELD_NUMBER: _builtins.int
     MIN_SEVERITY_FIELD_NUMBER: _builtins.int
     min_severity: _fault_pb2.FaultSeverity.ValueType
-    """Events that matter less are left out. UNSPECIFIED: none is."""
+    """Events of lower severity are left out. UNSPECIFIED: none is."""
     @_builtins.property
     def after(self) -> _event_pb2.EventPosition:
-        """Where to go on: the position of the last event, gap or caught_up that was received. Unset:
+        """Where to resume: the position of the last event, gap or caught_up that was received. Unset:
         from the oldest event that the gateway keeps, without a gap.
         """
 
@@ -283,7 +283,7 @@ Global___SubscribeEventsRequest: _TypeAlias = SubscribeEventsRequest  # noqa: Y0
 
 @_typing.final
 class SubscribeEventsResponse(_message.Message):
-    """The next thing to know."""
+    """The next item of the stream."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -292,7 +292,7 @@ class SubscribeEventsResponse(_message.Message):
     CAUGHT_UP_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def event(self) -> _event_pb2.Event:
-        """It happened."""
+        """An event."""
 
     @_builtins.property
     def gap(self) -> _event_pb2.EventGap:
@@ -301,7 +301,7 @@ class SubscribeEventsResponse(_message.Message):
     @_builtins.property
     def caught_up(self) -> _event_pb2.EventPosition:
         """The client has everything up to here. Sent when all events that the gateway had kept are
-        told, and every 5 s in which nothing else is.
+        sent, and every 5 s in which nothing else is.
         """
 
     def __init__(
@@ -323,7 +323,7 @@ Global___SubscribeEventsResponse: _TypeAlias = SubscribeEventsResponse  # noqa: 
 
 @_typing.final
 class PingRequest(_message.Message):
-    """Asks for the time."""
+    """Requests the time."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -354,7 +354,7 @@ class PingResponse(_message.Message):
     wall_clock_unix_ns: _builtins.int
     """The calendar clock, in ns since 1970-01-01 UTC. May be set at any time."""
     boot_id: _builtins.str
-    """As in GatewayFacts: another one after each start of the robot's computer."""
+    """As in GatewayFacts: the kernel's boot ID."""
     def __init__(
         self,
         *,

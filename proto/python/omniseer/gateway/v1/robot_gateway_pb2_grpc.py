@@ -89,9 +89,9 @@ class RobotGatewayServicer:
     def SetPreviewMode(self, request, context):
         """Turns the live preview on or off, or changes its profile while it runs.
 
-        Returns when the robot has taken note, or when the new state is reached, whichever the
-        caller's deadline and the robot's own limit allow. A preview that can't start is not an RPC
-        error: accepted is true, message says what to do, preview.state is PREVIEW_FAULTED.
+        Returns when the new state is reached, or earlier when the caller's deadline or the robot's own
+        limit ends. A preview that can't start is not an RPC error: accepted is true, message says what
+        to do, preview.state is PREVIEW_FAULTED.
         INVALID_ARGUMENT: a profile outside the enum; nothing changes.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -99,35 +99,35 @@ class RobotGatewayServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetOverlaySnapshot(self, request, context):
-        """What an operator's screen draws over the picture, with the whole status, in one answer.
+        """What an operator's screen draws over the video, with the whole status, in one response.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetGatewayInfo(self, request, context):
-        """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble.
+        """Facts about the gateway program, for diagnosis: version, configuration, statistics.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def WatchSystemStatus(self, request, context):
-        """The whole status again and again: the first at once, then when something has changed, and once
-        a second (or at the asked interval, when that is longer) even when nothing has, so that ages
-        stay true. Ages that grow, the uptime and the counts of calls are no change.
+        """Streams the whole status: the first at once, then on every change, and once a second (or at the
+        requested interval, when that is longer) without one, so that ages stay current. Growing ages,
+        the uptime and the counts of calls are no change.
 
-        Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+        A slow reader gets the newest status next; those in between are skipped.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def SubscribeEvents(self, request, context):
-        """What happens, as it happens, each event once and in order.
+        """Streams events as they happen, each one once and in order.
 
-        A client that lost its connection asks again with the position of the last thing it received:
-        it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+        A client that lost its connection subscribes again with the position of the last item that it
+        received: it gets everything that the gateway still keeps, and a gap for the rest.
         INVALID_ARGUMENT: a position in this run that has not been reached.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -135,8 +135,8 @@ class RobotGatewayServicer:
         raise NotImplementedError('Method not implemented!')
 
     def Ping(self, request, context):
-        """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
-        and by the time they took, how far off it may be.
+        """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
+        their round-trip times a bound on its error.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

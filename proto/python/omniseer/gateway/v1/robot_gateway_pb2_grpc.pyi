@@ -42,32 +42,32 @@ class RobotGatewayStub:
     SetPreviewMode: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.SetPreviewModeRequest, _robot_gateway_pb2.SetPreviewModeResponse]
     """Turns the live preview on or off, or changes its profile while it runs.
 
-    Returns when the robot has taken note, or when the new state is reached, whichever the
-    caller's deadline and the robot's own limit allow. A preview that can't start is not an RPC
-    error: accepted is true, message says what to do, preview.state is PREVIEW_FAULTED.
+    Returns when the new state is reached, or earlier when the caller's deadline or the robot's own
+    limit ends. A preview that can't start is not an RPC error: accepted is true, message says what
+    to do, preview.state is PREVIEW_FAULTED.
     INVALID_ARGUMENT: a profile outside the enum; nothing changes.
     """
     GetOverlaySnapshot: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetOverlaySnapshotRequest, _overlay_pb2.OverlaySnapshot]
-    """What an operator's screen draws over the picture, with the whole status, in one answer."""
+    """What an operator's screen draws over the video, with the whole status, in one response."""
     GetGatewayInfo: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]
-    """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+    """Facts about the gateway program, for diagnosis: version, configuration, statistics."""
     WatchSystemStatus: _grpc.UnaryStreamMultiCallable[_robot_gateway_pb2.WatchSystemStatusRequest, _robot_gateway_pb2.WatchSystemStatusResponse]
-    """The whole status again and again: the first at once, then when something has changed, and once
-    a second (or at the asked interval, when that is longer) even when nothing has, so that ages
-    stay true. Ages that grow, the uptime and the counts of calls are no change.
+    """Streams the whole status: the first at once, then on every change, and once a second (or at the
+    requested interval, when that is longer) without one, so that ages stay current. Growing ages,
+    the uptime and the counts of calls are no change.
 
-    Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+    A slow reader gets the newest status next; those in between are skipped.
     """
     SubscribeEvents: _grpc.UnaryStreamMultiCallable[_robot_gateway_pb2.SubscribeEventsRequest, _robot_gateway_pb2.SubscribeEventsResponse]
-    """What happens, as it happens, each event once and in order.
+    """Streams events as they happen, each one once and in order.
 
-    A client that lost its connection asks again with the position of the last thing it received:
-    it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+    A client that lost its connection subscribes again with the position of the last item that it
+    received: it gets everything that the gateway still keeps, and a gap for the rest.
     INVALID_ARGUMENT: a position in this run that has not been reached.
     """
     Ping: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.PingRequest, _robot_gateway_pb2.PingResponse]
-    """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
-    and by the time they took, how far off it may be.
+    """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
+    their round-trip times a bound on its error.
     """
 
 @_typing.type_check_only
@@ -82,32 +82,32 @@ class RobotGatewayAsyncStub(RobotGatewayStub):
     SetPreviewMode: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.SetPreviewModeRequest, _robot_gateway_pb2.SetPreviewModeResponse]  # type: ignore[assignment]
     """Turns the live preview on or off, or changes its profile while it runs.
 
-    Returns when the robot has taken note, or when the new state is reached, whichever the
-    caller's deadline and the robot's own limit allow. A preview that can't start is not an RPC
-    error: accepted is true, message says what to do, preview.state is PREVIEW_FAULTED.
+    Returns when the new state is reached, or earlier when the caller's deadline or the robot's own
+    limit ends. A preview that can't start is not an RPC error: accepted is true, message says what
+    to do, preview.state is PREVIEW_FAULTED.
     INVALID_ARGUMENT: a profile outside the enum; nothing changes.
     """
     GetOverlaySnapshot: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetOverlaySnapshotRequest, _overlay_pb2.OverlaySnapshot]  # type: ignore[assignment]
-    """What an operator's screen draws over the picture, with the whole status, in one answer."""
+    """What an operator's screen draws over the video, with the whole status, in one response."""
     GetGatewayInfo: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.GetGatewayInfoRequest, _robot_gateway_pb2.GetGatewayInfoResponse]  # type: ignore[assignment]
-    """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+    """Facts about the gateway program, for diagnosis: version, configuration, statistics."""
     WatchSystemStatus: _aio.UnaryStreamMultiCallable[_robot_gateway_pb2.WatchSystemStatusRequest, _robot_gateway_pb2.WatchSystemStatusResponse]  # type: ignore[assignment]
-    """The whole status again and again: the first at once, then when something has changed, and once
-    a second (or at the asked interval, when that is longer) even when nothing has, so that ages
-    stay true. Ages that grow, the uptime and the counts of calls are no change.
+    """Streams the whole status: the first at once, then on every change, and once a second (or at the
+    requested interval, when that is longer) without one, so that ages stay current. Growing ages,
+    the uptime and the counts of calls are no change.
 
-    Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+    A slow reader gets the newest status next; those in between are skipped.
     """
     SubscribeEvents: _aio.UnaryStreamMultiCallable[_robot_gateway_pb2.SubscribeEventsRequest, _robot_gateway_pb2.SubscribeEventsResponse]  # type: ignore[assignment]
-    """What happens, as it happens, each event once and in order.
+    """Streams events as they happen, each one once and in order.
 
-    A client that lost its connection asks again with the position of the last thing it received:
-    it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+    A client that lost its connection subscribes again with the position of the last item that it
+    received: it gets everything that the gateway still keeps, and a gap for the rest.
     INVALID_ARGUMENT: a position in this run that has not been reached.
     """
     Ping: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.PingRequest, _robot_gateway_pb2.PingResponse]  # type: ignore[assignment]
-    """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
-    and by the time they took, how far off it may be.
+    """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
+    their round-trip times a bound on its error.
     """
 
 class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
@@ -131,9 +131,9 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_robot_gateway_pb2.SetPreviewModeResponse, _abc.Awaitable[_robot_gateway_pb2.SetPreviewModeResponse]]:
         """Turns the live preview on or off, or changes its profile while it runs.
 
-        Returns when the robot has taken note, or when the new state is reached, whichever the
-        caller's deadline and the robot's own limit allow. A preview that can't start is not an RPC
-        error: accepted is true, message says what to do, preview.state is PREVIEW_FAULTED.
+        Returns when the new state is reached, or earlier when the caller's deadline or the robot's own
+        limit ends. A preview that can't start is not an RPC error: accepted is true, message says what
+        to do, preview.state is PREVIEW_FAULTED.
         INVALID_ARGUMENT: a profile outside the enum; nothing changes.
         """
 
@@ -143,7 +143,7 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         request: _robot_gateway_pb2.GetOverlaySnapshotRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_overlay_pb2.OverlaySnapshot, _abc.Awaitable[_overlay_pb2.OverlaySnapshot]]:
-        """What an operator's screen draws over the picture, with the whole status, in one answer."""
+        """What an operator's screen draws over the video, with the whole status, in one response."""
 
     @_abc_1.abstractmethod
     def GetGatewayInfo(
@@ -151,7 +151,7 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         request: _robot_gateway_pb2.GetGatewayInfoRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_robot_gateway_pb2.GetGatewayInfoResponse, _abc.Awaitable[_robot_gateway_pb2.GetGatewayInfoResponse]]:
-        """The gateway program: what nobody needs ten times a second. For whoever looks for a trouble."""
+        """Facts about the gateway program, for diagnosis: version, configuration, statistics."""
 
     @_abc_1.abstractmethod
     def WatchSystemStatus(
@@ -159,11 +159,11 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         request: _robot_gateway_pb2.WatchSystemStatusRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_robot_gateway_pb2.WatchSystemStatusResponse], _abc.AsyncIterator[_robot_gateway_pb2.WatchSystemStatusResponse]]:
-        """The whole status again and again: the first at once, then when something has changed, and once
-        a second (or at the asked interval, when that is longer) even when nothing has, so that ages
-        stay true. Ages that grow, the uptime and the counts of calls are no change.
+        """Streams the whole status: the first at once, then on every change, and once a second (or at the
+        requested interval, when that is longer) without one, so that ages stay current. Growing ages,
+        the uptime and the counts of calls are no change.
 
-        Who reads slowly gets the newest status next; those that were made meanwhile are left out.
+        A slow reader gets the newest status next; those in between are skipped.
         """
 
     @_abc_1.abstractmethod
@@ -172,10 +172,10 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         request: _robot_gateway_pb2.SubscribeEventsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_robot_gateway_pb2.SubscribeEventsResponse], _abc.AsyncIterator[_robot_gateway_pb2.SubscribeEventsResponse]]:
-        """What happens, as it happens, each event once and in order.
+        """Streams events as they happen, each one once and in order.
 
-        A client that lost its connection asks again with the position of the last thing it received:
-        it misses nothing that the gateway still keeps, and is told of everything else by a gap.
+        A client that lost its connection subscribes again with the position of the last item that it
+        received: it gets everything that the gateway still keeps, and a gap for the rest.
         INVALID_ARGUMENT: a position in this run that has not been reached.
         """
 
@@ -185,8 +185,8 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         request: _robot_gateway_pb2.PingRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_robot_gateway_pb2.PingResponse, _abc.Awaitable[_robot_gateway_pb2.PingResponse]]:
-        """What the robot's clocks show. From a few calls a client learns the offset of its own clock,
-        and by the time they took, how far off it may be.
+        """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
+        their round-trip times a bound on its error.
         """
 
 def add_RobotGatewayServicer_to_server(servicer: RobotGatewayServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -26,43 +26,43 @@ class _SourceStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_SourceSta
     SOURCE_STATE_UNSPECIFIED: _SourceState.ValueType  # 0
     """Not known."""
     SOURCE_STATE_WAITING: _SourceState.ValueType  # 1
-    """Nothing has come since the gateway started, and nobody on the robot offers it."""
+    """Nothing was received since the gateway started, and no program on the robot offers it."""
     SOURCE_STATE_SILENT: _SourceState.ValueType  # 2
-    """Somebody on the robot offers it, but nothing has come."""
+    """A program on the robot offers it, but nothing was received."""
     SOURCE_STATE_RECEIVING: _SourceState.ValueType  # 3
-    """It comes."""
+    """Values arrive."""
     SOURCE_STATE_STALE: _SourceState.ValueType  # 4
-    """It came; the newest value is older than the limit."""
+    """Values arrived; the newest is older than the limit."""
     SOURCE_STATE_QOS_MISMATCH: _SourceState.ValueType  # 5
-    """It is offered with delivery guarantees that exclude what the gateway is configured to ask for:
-    nothing can come.
+    """It is offered with delivery guarantees that are incompatible with the gateway's configuration:
+    nothing can arrive.
     """
     SOURCE_STATE_WRONG_TYPE: _SourceState.ValueType  # 6
-    """It is offered in another form than the gateway is configured for: nothing can come."""
+    """It is offered in another form than the gateway is configured for: nothing can arrive."""
     SOURCE_STATE_TYPE_MISSING: _SourceState.ValueType  # 7
-    """The gateway lacks the message type it needs to read it: nothing can come."""
+    """The gateway lacks the message type that it needs to read it: nothing can arrive."""
 
 class SourceState(_SourceState, metaclass=_SourceStateEnumTypeWrapper):
-    """What is known of a source of values at one instant."""
+    """State of a source of values at one instant."""
 
 SOURCE_STATE_UNSPECIFIED: SourceState.ValueType  # 0
 """Not known."""
 SOURCE_STATE_WAITING: SourceState.ValueType  # 1
-"""Nothing has come since the gateway started, and nobody on the robot offers it."""
+"""Nothing was received since the gateway started, and no program on the robot offers it."""
 SOURCE_STATE_SILENT: SourceState.ValueType  # 2
-"""Somebody on the robot offers it, but nothing has come."""
+"""A program on the robot offers it, but nothing was received."""
 SOURCE_STATE_RECEIVING: SourceState.ValueType  # 3
-"""It comes."""
+"""Values arrive."""
 SOURCE_STATE_STALE: SourceState.ValueType  # 4
-"""It came; the newest value is older than the limit."""
+"""Values arrived; the newest is older than the limit."""
 SOURCE_STATE_QOS_MISMATCH: SourceState.ValueType  # 5
-"""It is offered with delivery guarantees that exclude what the gateway is configured to ask for:
-nothing can come.
+"""It is offered with delivery guarantees that are incompatible with the gateway's configuration:
+nothing can arrive.
 """
 SOURCE_STATE_WRONG_TYPE: SourceState.ValueType  # 6
-"""It is offered in another form than the gateway is configured for: nothing can come."""
+"""It is offered in another form than the gateway is configured for: nothing can arrive."""
 SOURCE_STATE_TYPE_MISSING: SourceState.ValueType  # 7
-"""The gateway lacks the message type it needs to read it: nothing can come."""
+"""The gateway lacks the message type that it needs to read it: nothing can arrive."""
 Global___SourceState: _TypeAlias = SourceState  # noqa: Y015
 
 @_typing.final
@@ -81,9 +81,9 @@ class SourceStatus(_message.Message):
     REQUIRED_FIELD_NUMBER: _builtins.int
     DETAIL_FIELD_NUMBER: _builtins.int
     name: _builtins.str
-    """What it tells, short and stable: "odometry", "battery"."""
+    """What it is, short and stable: "odometry", "battery"."""
     state: Global___SourceState.ValueType
-    """Whether it comes, and if not, why not."""
+    """Whether values arrive, and if not, why not."""
     available: _builtins.bool
     """Whether one value has been received."""
     stale: _builtins.bool

@@ -27,21 +27,21 @@ class _PreviewStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_PreviewS
     PREVIEW_DISABLED: _PreviewState.ValueType  # 1
     """No pipeline exists, no UDP port is bound, no CPU is used."""
     PREVIEW_RUNNING: _PreviewState.ValueType  # 2
-    """Encoded frames leave the robot. A viewer that connects now gets a picture."""
+    """Encoded frames leave the robot. A viewer that connects now gets video."""
     PREVIEW_STARTING: _PreviewState.ValueType  # 3
     """The encoder is chosen and the pipeline is being built; no encoded frame has left yet."""
     PREVIEW_STOPPING: _PreviewState.ValueType  # 4
     """The pipeline is being torn down; the port will be free when this ends."""
     PREVIEW_FAULTED: _PreviewState.ValueType  # 5
-    """Wanted, but not delivering. PreviewStatus.last_error says why and what to do; the robot
-    retries by itself with growing pauses (1 s to 30 s).
+    """Enabled, but not delivering. PreviewStatus.last_error says why and what to do; the robot
+    retries by itself with backoff (1 s to 30 s).
     """
 
 class PreviewState(_PreviewState, metaclass=_PreviewStateEnumTypeWrapper):
     """The enums of this file are in the field: their value names do not carry the prefix that
     today's style asks for, and they must stay as they are (buf.yaml lists the exception).
 
-    Where the live preview is in its life.
+    State of the live preview.
     """
 
 PREVIEW_STATE_UNSPECIFIED: PreviewState.ValueType  # 0
@@ -49,14 +49,14 @@ PREVIEW_STATE_UNSPECIFIED: PreviewState.ValueType  # 0
 PREVIEW_DISABLED: PreviewState.ValueType  # 1
 """No pipeline exists, no UDP port is bound, no CPU is used."""
 PREVIEW_RUNNING: PreviewState.ValueType  # 2
-"""Encoded frames leave the robot. A viewer that connects now gets a picture."""
+"""Encoded frames leave the robot. A viewer that connects now gets video."""
 PREVIEW_STARTING: PreviewState.ValueType  # 3
 """The encoder is chosen and the pipeline is being built; no encoded frame has left yet."""
 PREVIEW_STOPPING: PreviewState.ValueType  # 4
 """The pipeline is being torn down; the port will be free when this ends."""
 PREVIEW_FAULTED: PreviewState.ValueType  # 5
-"""Wanted, but not delivering. PreviewStatus.last_error says why and what to do; the robot
-retries by itself with growing pauses (1 s to 30 s).
+"""Enabled, but not delivering. PreviewStatus.last_error says why and what to do; the robot
+retries by itself with backoff (1 s to 30 s).
 """
 Global___PreviewState: _TypeAlias = PreviewState  # noqa: Y015
 

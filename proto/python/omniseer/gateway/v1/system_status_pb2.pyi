@@ -28,7 +28,7 @@ DESCRIPTOR: _descriptor.FileDescriptor
 class SystemStatus(_message.Message):
     """Everything the gateway knows about the robot, computed from the newest values received and the
     clock at the moment of the request. Ages are in ms on the gateway's monotonic clock, counted
-    from reception; they do not depend on the clock of whoever sent the value.
+    from reception; they do not depend on the sender's clock.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -51,8 +51,8 @@ class SystemStatus(_message.Message):
     gateway_version: _builtins.str
     """The gateway's software version (MAJOR.MINOR.PATCH)."""
     insecure: _builtins.bool
-    """Whether the gateway is configured to serve everybody who reaches its address, unencrypted and
-    without asking who they are. False on loopback.
+    """Whether the gateway is configured to serve anyone who reaches its address, without encryption or
+    without authentication. False on loopback.
     """
     @_builtins.property
     def preview(self) -> _preview_pb2.PreviewStatus:
@@ -80,14 +80,14 @@ class SystemStatus(_message.Message):
 
     @_builtins.property
     def faults(self) -> _containers.RepeatedCompositeFieldContainer[_fault_pb2.Fault]:
-        """What is wrong: active faults, the worst and then the oldest first (at most 32; when there are
-        more, one of them, "faults.capped", says how many are not listed), then those that are over,
+        """Active faults, the worst and then the oldest first (at most 32; when there are
+        more, one of them, "faults.capped", says how many are not listed), then cleared ones,
         the newest first (at most 8). Empty when all is well.
         """
 
     @_builtins.property
     def mission(self) -> Global___MissionStatus:
-        """What the robot is about."""
+        """The robot's mode."""
 
     @_builtins.property
     def sources(self) -> _containers.RepeatedCompositeFieldContainer[_source_pb2.SourceStatus]:
@@ -254,7 +254,7 @@ class TeleopStatus(_message.Message):
     state: _states_pb2.TeleopState.ValueType
     """Whether the robot takes commands."""
     enabled: _builtins.bool
-    """The same as a yes or no."""
+    """The same as a flag."""
     last_command_age_ms: _builtins.int
     """Age of the newest accepted command, in ms. 0 when there was none."""
     max_linear_mps: _builtins.float
@@ -298,7 +298,7 @@ Global___TeleopStatus: _TypeAlias = TeleopStatus  # noqa: Y015
 
 @_typing.final
 class MissionStatus(_message.Message):
-    """What the robot is about."""
+    """The robot's mode."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -307,13 +307,13 @@ class MissionStatus(_message.Message):
     AGE_MS_FIELD_NUMBER: _builtins.int
     MODE_FIELD_NUMBER: _builtins.int
     available: _builtins.bool
-    """Whether the robot has told it."""
+    """Whether the robot has reported it."""
     stale: _builtins.bool
-    """Whether it was told longer ago than the configured limit. A robot that tells its mode only when
-    it changes still has it.
+    """Whether the newest report is older than the configured limit. A robot that reports its mode on
+    change only is still in it.
     """
     age_ms: _builtins.int
-    """How long ago it was told last, in ms. 0 when it was not."""
+    """Age of the newest report, in ms. 0 when none was received."""
     mode: _builtins.str
     """The mode in the robot's own words, "exploring" for example. Empty when not available."""
     def __init__(
@@ -334,7 +334,7 @@ Global___MissionStatus: _TypeAlias = MissionStatus  # noqa: Y015
 
 @_typing.final
 class EffectiveCommand(_message.Message):
-    """The velocity command that the robot is following, whoever gave it."""
+    """The velocity command that the robot is following, from any source."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -358,7 +358,7 @@ class EffectiveCommand(_message.Message):
     wz_rad_s: _builtins.float
     """Turning rate in rad/s, counter-clockwise seen from above."""
     active_source: _builtins.str
-    """Who gave it: "keyboard", "autonomy", "navigation", or "unknown" when it can't be attributed."""
+    """Where it came from: "keyboard", "autonomy", "navigation", or "unknown" when it can't be attributed."""
     def __init__(
         self,
         *,
