@@ -120,7 +120,14 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         interceptors=interceptors,
         health=Health(SERVICE),
         loop_delay=loop_delay,
-        metrics=GatewayCollector(state, stats, loop_delay, status_stream, event_stream),
+        metrics=GatewayCollector(
+            state,
+            stats=stats,
+            loop_delay=loop_delay,
+            status_stream=status_stream,
+            event_stream=event_stream,
+            preview_link=link,
+        ),
     )
 
 

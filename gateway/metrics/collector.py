@@ -10,6 +10,7 @@ from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
+from gateway.links.link import LinkHealth
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.event_stream import EventStream
 from gateway.rpc.interceptors.stats import Stats
@@ -28,6 +29,14 @@ class SnapshotSource(Protocol):
         """Returns everything at this instant."""
 
 
+class PreviewLink(Protocol):
+    """The connection to the preview service."""
+
+    @property
+    def health(self) -> LinkHealth:
+        """Its condition at this instant."""
+
+
 class GatewayCollector(Collector):
     """Collects all metrics at one instant.
 
@@ -37,21 +46,25 @@ class GatewayCollector(Collector):
         loop_delay: how late the event loop was.
         status_stream: counts responses that slow readers skipped.
         event_stream: counts gaps of subscribers.
+        preview_link: counts failures to connect.
     """
 
     def __init__(
         self,
         state: SnapshotSource,
+        *,
         stats: Stats,
         loop_delay: LoopDelay,
         status_stream: StatusStream,
         event_stream: EventStream,
+        preview_link: PreviewLink,
     ) -> None:
         self._state = state
         self._stats = stats
         self._loop_delay = loop_delay
         self._status_stream = status_stream
         self._event_stream = event_stream
+        self._preview_link = preview_link
         self._registry = CollectorRegistry()
         self._registry.register(self)
 
@@ -72,6 +85,11 @@ class GatewayCollector(Collector):
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
+        yield Gauge(
+            f"{_PREFIX}_preview_link_failures",
+            "Failures in a row to connect to the preview service.",
+            value=self._preview_link.health.failures,
+        )
         yield from _stream(now)
 
     def _calls(self) -> Iterator[Metric]:
@@ -94,7 +112,7 @@ class GatewayCollector(Collector):
         delays = self._loop_delay.delays
         yield HistogramFamily(
             f"{_PREFIX}_event_loop_delay_seconds",
-            "How much later than asked for the event loop woke.",
+            "How much later than requested the event loop woke.",
             buckets=delays.cumulative(),
             sum_value=delays.sum_s,
         )
@@ -121,9 +139,8 @@ def _gateway(now: Snapshot) -> Iterator[Metric]:
     build.add_metric((now.identity.name, now.identity.version, runtime.revision), 1)
     yield build
     yield Gauge(f"{_PREFIX}_uptime_seconds", "Since the gateway started.", value=runtime.uptime_ms / 1000)
-    yield Gauge(
-        f"{_PREFIX}_clients", "Connections that asked for something lately.", value=runtime.client_count
-    )
+    clients = runtime.client_count
+    yield Gauge(f"{_PREFIX}_clients", "Connections that called, or got something, lately.", value=clients)
     yield Gauge(f"{_PREFIX}_robot_ready", "1 when the robot can take work.", value=float(now.health.ready))
 
 
@@ -131,7 +148,7 @@ def _sources(now: Snapshot) -> Iterator[Metric]:
     fresh = Gauge(f"{_PREFIX}_source_fresh", "1 while its newest value can be relied on.", labels=("source",))
     age = Gauge(
         f"{_PREFIX}_source_age_seconds",
-        "Age of its newest value; not told before the first.",
+        "Age of its newest value; absent before the first.",
         labels=("source",),
     )
     for source in now.sources:
@@ -178,7 +195,7 @@ def _stream(now: Snapshot) -> Iterator[Metric]:
         yield info
     if stream := now.preview.stream:
         target = stream.target_bitrate_kbps * 1000
-        yield Gauge(f"{_PREFIX}_preview_target_bits_per_second", "What the encoder is told.", value=target)
+        yield Gauge(f"{_PREFIX}_preview_target_bits_per_second", "The encoder's target.", value=target)
     measured = now.preview_measured.value
     if measured is None or now.preview_measured.freshness.stale:
         return

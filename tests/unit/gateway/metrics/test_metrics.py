@@ -13,6 +13,7 @@ from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.histogram import Histogram
+from gateway.links.link import LinkHealth
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.interceptors.stats import MethodStats, Stats
@@ -72,6 +73,7 @@ class World:
 
     skipped = 7
     gaps = 1
+    health = LinkHealth(reachable=False, failures=3, last_error="nothing answers")
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -83,7 +85,14 @@ class World:
 def families(calls: Stats, now: Snapshot | None = None) -> list[Metric]:
     """As Prometheus understands the text."""
     world: Any = World(now or snapshot())
-    collector = GatewayCollector(world, calls, LoopDelay(), world, world)
+    collector = GatewayCollector(
+        world,
+        stats=calls,
+        loop_delay=LoopDelay(),
+        status_stream=world,
+        event_stream=world,
+        preview_link=world,
+    )
     return list(text_string_to_metric_families(collector.text().decode()))
 
 
@@ -161,6 +170,7 @@ def test_the_running_preview() -> None:
     counted = [told[f"robot_gateway_preview_{n}_total", ""] for n in ("starts", "restarts", "faults")]
     assert counted == [4, 3, 2]
     assert told["robot_gateway_preview_fallbacks_total", ""] == 1
+    assert told["robot_gateway_preview_link_failures", ""] == 3
     assert told["robot_gateway_preview_encoder_info", "encoder=x264 hardware=false wanted=mpp-h265"] == 1
     assert told["robot_gateway_preview_viewers", ""] == 2
     assert told["robot_gateway_preview_bits_per_second", ""] == 2_400_000
