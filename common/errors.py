@@ -48,7 +48,7 @@ class FieldViolation:
 
 
 class DomainError(Exception):
-    """A request that can't be fulfilled. Knows no transport; common.rpc maps it to a gRPC status.
+    """A request that can't be fulfilled. Knows no transport; common.grpc_errors maps it to a gRPC status.
 
     Its text is shown to the caller and says what to do; the attributes are for programs.
     """

@@ -38,8 +38,10 @@ class Health(HealthServicer):
 
     def set_serving(self, service: str, *, serving: bool) -> None:
         """Sets the status of a service to SERVING or NOT_SERVING; watchers are sent each change."""
-        self._statuses[service] = HealthCheckResponse.SERVING if serving else HealthCheckResponse.NOT_SERVING
-        self._changes.notify_all()
+        status = HealthCheckResponse.SERVING if serving else HealthCheckResponse.NOT_SERVING
+        if self._statuses.get(service) != status:
+            self._statuses[service] = status
+            self._changes.notify_all()
 
     async def Check(  # noqa: N802  # the schema names it
         self, request: HealthCheckRequest, context: RpcContext

@@ -10,12 +10,13 @@ four kinds:
     (handler)
     on_response  last to first, for each message of the handler
     on_end       last to first, once, for those whose on_call returned
-    on_error     after on_end, the same ones, if the call failed; may raise another error in its place
+    on_error     after on_end, the same ones, if the call failed; what it raises is what the caller gets
 
 What a call does not need costs it nothing: a poll of the status takes 200 us on a desktop's core, and each
 coroutine or wrapper more would be paid some thousand times a second.
 """
 
+import logging
 import time
 from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeAlias, TypeVar
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 else:
     # grpc's classes are generic in its stubs only.
     Handler, RpcContext = grpc.RpcMethodHandler, grpc.aio.ServicerContext
+
+_log = logging.getLogger(__name__)
 
 Behavior: TypeAlias = Callable[[Any, Any], Any]
 """A method of a servicer: one request, or an iterator of them, and the call; one response, or an iterator."""
@@ -90,11 +93,13 @@ class Interceptor(Generic[CallT_contra]):
     def on_end(self, call: CallT_contra, error: BaseException | None) -> None:
         """Called when the call has ended: `error` is None, or what the handler or another hook raised.
 
-        A caller that leaves ends its call with `asyncio.CancelledError`, or a stream with `GeneratorExit`.
+        A caller that leaves ends its call with `asyncio.CancelledError`, or a stream with `GeneratorExit`;
+        where requests are a stream, only their iterator ends. What this hook raises is logged, and the others
+        are called all the same: each gives back what it took.
         """
 
     async def on_error(self, call: CallT_contra, error: BaseException) -> None:
-        """Called when the call has failed; may raise what the caller gets instead."""
+        """Called when the call has failed; may raise what the caller gets. Later ones are not called then."""
 
 
 class Chain(grpc.aio.ServerInterceptor):
@@ -239,7 +244,10 @@ class _Passage:
 
     def end(self, call: Call, entered: list[Interceptor[Any]], error: BaseException | None) -> None:
         for each in reversed(entered):
-            each.on_end(call, error)
+            try:
+                each.on_end(call, error)
+            except Exception:  # noqa: BLE001  # whatever it is: the outer ones give back what they took
+                _log.exception("%s: %s.on_end failed", call.method.path, type(each).__name__)
 
     async def fail(self, call: Call, entered: list[Interceptor[Any]], error: BaseException) -> None:
         self.end(call, entered, error)

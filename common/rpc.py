@@ -35,8 +35,7 @@ _SERVER_OPTIONS: Final = (
 )
 _MAX_CONCURRENT_CALLS: Final = 4096
 """Of all connections; more are refused with RESOURCE_EXHAUSTED. Beyond its own limit a connection's streams
-are
-reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
+are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 
 
 def new_server(chain: Chain | None = None) -> grpc.aio.Server:

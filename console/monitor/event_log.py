@@ -21,8 +21,7 @@ class EventLine:
 
     Args:
         at_s: when it happened, in seconds since 1970: by the robot's calendar clock, or by this computer's if
-        the
-            robot gives no time.
+            the robot gives no time.
         text: what happened.
         style: its severity.
         own: whether the monitor reports it, not the robot.

@@ -21,8 +21,8 @@ class Recipient:
     """Callers that get the same response.
 
     Attributes:
-        robot_host: the robot's address as they reach it. sees_passphrase: whether they get the stream's
-        passphrase: authenticated callers, and those on the robot.
+        robot_host: the robot's address as they reach it.
+        sees_passphrase: whether they get the stream's passphrase: authenticated callers, and local ones.
     """
 
     robot_host: str

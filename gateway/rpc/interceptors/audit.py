@@ -6,8 +6,9 @@ from typing import Any, Final
 from google.protobuf import text_format
 from google.protobuf.message import Message
 
-from common.errors import DomainError, NotAllowedError, NotAuthenticatedError, TooMuchError
+from common.errors import DomainError, TooMuchError
 from common.interceptors import Interceptor
+from common.reasons import Reason
 from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
 from gateway.rpc.methods import Method
@@ -44,24 +45,31 @@ class Audit(Interceptor[CallContext]):
         self._answers[call] = getattr(response, "message", "")
 
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
-        """Records the action, unless it was refused too often, or for its rate."""
+        """Records how the action ended.
+
+        Left out are refusals for a rate or a lockout, refusals beyond a caller's share, and calls that ended
+        before they were admitted: a caller that leaves while it is authenticated has done nothing.
+        """
         answer = self._answers.pop(call, "")
-        if isinstance(error, NotAuthenticatedError | NotAllowedError):
-            left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
-            if left_out is None:
-                return
-            more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
-            self._record(call, ControlResult.REFUSED, f"{error}{more}")
-        elif isinstance(error, TooMuchError):
-            return
+        if error is None:
+            self._record(call, ControlResult.ACCEPTED, answer)
         elif isinstance(error, DomainError):
-            self._record(call, ControlResult.REFUSED, str(error))
+            self._record_refusal(call, error)
+        elif call.request is None:
+            return
         elif isinstance(error, asyncio.CancelledError | GeneratorExit):
             self._record(call, ControlResult.ACCEPTED, "the caller left before the answer")
-        elif error is not None:
-            self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
         else:
-            self._record(call, ControlResult.ACCEPTED, answer)
+            self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
+
+    def _record_refusal(self, call: CallContext, error: DomainError) -> None:
+        if isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:
+            return
+        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
+        if left_out is None:
+            return
+        more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
+        self._record(call, ControlResult.REFUSED, f"{error}{more}")
 
     def _record(self, call: CallContext, result: ControlResult, answer: str) -> None:
         principal = call.principal

@@ -14,8 +14,7 @@ from gateway.status.fault import Severity
 
 JOINED_AFTER_S: Final = 2.0
 """How long a stream has been open before its client has joined: one look at the status, or a client that
-reconnects
-again and again, is no event."""
+reconnects again and again, is no event."""
 _COMPONENT: Final = "gateway"
 
 

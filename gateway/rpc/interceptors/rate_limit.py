@@ -35,8 +35,7 @@ _REDUCED_BURST_S: Final = 0.01
 """The reduced bucket holds what is refilled in this time."""
 _MAX_DELAYED: Final = 1024
 """Refusals that are delayed at once, the last of them for five seconds; any more leave at once, because
-each one
-that waits takes memory."""
+each one that waits takes memory."""
 _RETRY_AFTER_S: Final = 1.0
 """Suggested to a caller for whom there is no connection left."""
 
@@ -84,7 +83,11 @@ class RateLimit(Interceptor[CallContext]):
             await asyncio.sleep(self._admission.refusal_delay_s())
         finally:
             self._delayed -= 1
-        raise error
+        try:
+            raise error
+        finally:
+            # Its traceback has this frame: a reference from here would keep both until the next collection.
+            del error
 
 
 class Admission:

@@ -176,6 +176,29 @@ async def test_a_caller_that_is_locked_out_is_not_recorded() -> None:
     assert ground.records.trail == []
 
 
+class Leaving(Interceptor[CallContext]):
+    """In the place of Auth, while it reads the credentials: the caller leaves meanwhile."""
+
+    def on_call(self, call: CallContext) -> None:
+        raise asyncio.CancelledError
+
+
+async def test_a_caller_that_leaves_before_it_is_authenticated_has_done_nothing() -> None:
+    ground = Ground()
+    with pytest.raises(asyncio.CancelledError):
+        await serve([ground.audit, Leaving(), Validation(10_000)], "SetPreviewMode", None)
+    assert ground.records.trail == []
+    assert ground.records.events == []
+
+
+async def test_a_flood_of_refused_requests_fills_neither_log_nor_events() -> None:
+    ground = Ground()
+    for _ in range(BURST + 20):
+        with pytest.raises(InvalidRequestError):
+            await ground.call(SetPreviewModeResponse(), request=b"\xff")
+    assert len(ground.records.trail) == len(ground.records.events) == BURST
+
+
 async def test_looking_is_no_control_action() -> None:
     ground = Ground()
     await ground.call(SetPreviewModeResponse(), request=b"", method="Ping")

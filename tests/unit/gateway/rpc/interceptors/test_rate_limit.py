@@ -1,5 +1,8 @@
 """Every connection has its share, and none has the share of another."""
 
+import gc
+import weakref
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,7 +17,9 @@ from gateway.rpc.interceptors.rate_limit import (
     REFUSAL_DELAY_S,
     REFUSAL_SPACING_S,
     Admission,
+    RateLimit,
 )
+from tests.support.calls import call_of
 
 SMALL = LimitSettings(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
 
@@ -171,3 +176,22 @@ def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tupl
         for number, first_s in enumerate(instants):
             for later, last_s in enumerate(instants[number:], start=1):
                 assert later <= 5 + (last_s - first_s) * 10 + 1e-6
+
+
+async def test_a_delayed_refusal_leaves_no_garbage_behind() -> None:
+    """A circle of references would keep call and error until the next collection, in a flood of them."""
+    limit = RateLimit(Admission(LimitSettings(requests_per_s=0.1, burst=1)))
+    call = call_of()
+    assert limit.on_call(call) is None
+    waiting = limit.on_call(call)
+    assert waiting is not None
+    gc.disable()
+    try:
+        try:
+            await waiting
+        except TooMuchError as error:
+            gone = weakref.ref(error)
+        del waiting
+        assert gone() is None
+    finally:
+        gc.enable()

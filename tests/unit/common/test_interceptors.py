@@ -1,0 +1,146 @@
+"""The chain: every hook in its order, for all four kinds of method, whatever one of them does."""
+
+import logging
+from collections.abc import AsyncIterator
+from typing import Any
+
+import grpc
+import pytest
+
+from common.errors import InvalidRequestError
+from common.grpc_errors import ErrorInterceptor
+from common.interceptors import Call, Chain, Interceptor, Method
+from common.rpc import new_server
+
+KINDS = {
+    "Unary": (grpc.unary_unary_rpc_method_handler, "unary_unary"),
+    "Responses": (grpc.unary_stream_rpc_method_handler, "unary_stream"),
+    "Requests": (grpc.stream_unary_rpc_method_handler, "stream_unary"),
+    "Both": (grpc.stream_stream_rpc_method_handler, "stream_stream"),
+}
+
+
+class Recorder(Interceptor[Call]):
+    """Writes down what it is called for."""
+
+    def __init__(self, name: str, steps: list[str]) -> None:
+        self.name, self.steps = name, steps
+
+    def on_call(self, call: Call) -> None:
+        self.steps.append(f"{self.name} call")
+
+    def on_request(self, call: Call, request: Any) -> Any:
+        self.steps.append(f"{self.name} {request.decode()}")
+        return request + self.name.encode()
+
+    def on_response(self, call: Call, response: Any) -> None:
+        self.steps.append(f"{self.name} {response.decode()}")
+
+    def on_end(self, call: Call, error: BaseException | None) -> None:
+        self.steps.append(f"{self.name} end" + (f" {type(error).__name__}" if error else ""))
+
+
+async def once(_request: Any, _context: Any) -> bytes:
+    return b"response"
+
+
+async def often(_request: Any, _context: Any) -> AsyncIterator[bytes]:
+    yield b"response"
+
+
+async def once_for_many(requests: Any, _context: Any) -> bytes:
+    return b"+".join([each async for each in requests])
+
+
+async def often_for_many(requests: Any, _context: Any) -> AsyncIterator[bytes]:
+    async for each in requests:
+        yield each
+
+
+BEHAVIORS: dict[str, Any] = {
+    "Unary": once,
+    "Responses": often,
+    "Requests": once_for_many,
+    "Both": often_for_many,
+}
+
+
+async def called(chain: Chain, kind: str, *requests: bytes) -> list[bytes]:
+    """What a caller gets over a real connection."""
+    make, name = KINDS[kind]
+    server = new_server(chain)
+    handlers = {kind: make(BEHAVIORS[kind])}
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            call: Any = getattr(channel, name)(f"/test.Service/{kind}")
+            request: Any = iter(requests) if kind in {"Requests", "Both"} else requests[0]
+            if kind in {"Unary", "Requests"}:
+                return [await call(request)]
+            return [each async for each in call(request)]
+    finally:
+        await server.stop(None)
+
+
+async def test_hooks_run_in_order_and_may_replace_requests() -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), Recorder("a", steps), Recorder("b", steps)])
+    assert await called(chain, "Unary", b"q") == [b"response"]
+    assert steps == ["a call", "b call", "a q", "b qa", "b response", "a response", "b end", "a end"]
+
+
+@pytest.mark.parametrize("kind", ["Requests", "Both"])
+async def test_every_message_of_a_stream_passes(kind: str) -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), Recorder("a", steps)])
+    responses = await called(chain, kind, b"1", b"2")
+    assert b"+".join(responses) == b"1a+2a"
+    assert [each for each in steps if each in {"a 1", "a 2"}] == ["a 1", "a 2"]
+    assert steps[-1] == "a end"
+
+
+class Refusing(Interceptor[Call]):
+    def on_call(self, call: Call) -> None:
+        raise InvalidRequestError("not like this")
+
+
+async def test_a_refusal_ends_what_has_begun_and_nothing_else() -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), Recorder("a", steps), Refusing(), Recorder("b", steps)])
+    with pytest.raises(grpc.aio.AioRpcError) as seen:
+        await called(chain, "Unary", b"q")
+    assert seen.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert steps == ["a call", "a end InvalidRequestError"]
+
+
+class Failing(Interceptor[Call]):
+    def on_end(self, call: Call, error: BaseException | None) -> None:
+        raise ZeroDivisionError("secret")
+
+
+@pytest.mark.parametrize("kind", ["Unary", "Responses"])
+async def test_a_hook_that_fails_at_the_end_keeps_no_other_from_ending(
+    kind: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), Recorder("a", steps), Failing()])
+    with caplog.at_level(logging.ERROR):
+        assert await called(chain, kind, b"q") == [b"response"]
+    assert steps[-1] == "a end"
+    assert "Failing.on_end failed" in caplog.text
+
+
+class NotForThis(Recorder):
+    def applies_to(self, method: Method) -> bool:
+        return method.streaming
+
+
+async def test_an_interceptor_that_does_not_apply_is_not_called() -> None:
+    steps: list[str] = []
+    chain = Chain([ErrorInterceptor(), NotForThis("a", steps)])
+    await called(chain, "Unary", b"q")
+    assert steps == []
+    await called(chain, "Responses", b"q")
+    assert steps
