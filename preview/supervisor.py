@@ -292,6 +292,8 @@ class Supervisor:
             if await self._encoders.probe():
                 self._lifecycle.count_fallback()
                 self._retry_now = True
+            if self._lifecycle.state is not State.FAULTED:
+                return True  # A request came during the trials.
         if not self._desired.enabled:
             self._move(Event.DISABLE)
         elif self._retry_now:
@@ -339,6 +341,7 @@ class Supervisor:
         if hung:
             self._marker.set(hung[0], "it hung when it was stopped")
             raise HungError(f"encoder {hung[0]} hung when it was stopped")
+        self._marker.clear()
 
     # --- events: move the lifecycle, on the loop, at once ---
 

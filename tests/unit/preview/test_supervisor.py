@@ -325,6 +325,7 @@ async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Pat
         assert now() == pytest.approx(2 + FIRST_FRAME_S, abs=0.1), (
             "disabled when the slow encoder has stopped"
         )
+        assert preview.marker.encoder == "", "a later crash is not this encoder's"
 
 
 @row("encoder hangs when the preview is disabled")
@@ -468,6 +469,19 @@ async def test_disabled_during_the_trials_nothing_is_built(tmp_path: Path) -> No
         await preview.reaches(State.DISABLED)
         assert now() == pytest.approx(2)
         assert not preview.pipelines.built
+
+
+@pytest.mark.parametrize("request_", [AGAIN, OFF], ids=["on", "off"])
+@in_virtual_time
+async def test_a_request_during_the_trials_after_a_fault(tmp_path: Path, request_: DesiredState) -> None:
+    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=5), prober=Prober(trial_s=2))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        # The failed pipeline is torn down, and the trial of the next encoder runs.
+        await asyncio.sleep(1)
+        preview.supervisor.apply(request_)
+        await (preview.runs_with("va-h265") if request_.enabled else preview.reaches(State.DISABLED))
 
 
 @in_virtual_time
