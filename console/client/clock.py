@@ -62,7 +62,8 @@ class Clock:
         """Returns the best estimate at `now_s`; None before the first answer."""
         if not self._readings:
             return None
-        best = min(self._readings, key=lambda reading: reading.error_at(now_s))
+        # A copy: another thread may add a reading meanwhile.
+        best = min(tuple(self._readings), key=lambda reading: reading.error_at(now_s))
         return Offset(best.offset_s, best.error_at(now_s))
 
     def local_s(self, robot_monotonic_ns: int, now_s: float) -> float | None:

@@ -1,6 +1,7 @@
 """An asyncio loop in a thread of its own, which blocking code hands coroutines to."""
 
 import asyncio
+import os
 import threading
 from collections.abc import Coroutine
 from concurrent.futures import CancelledError, Future
@@ -15,23 +16,26 @@ class LoopThread:
     """Runs coroutines of any thread in one loop, until it is stopped."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        # Reentrant: the garbage collector may close an abandoned stream, and so submit, within `submit`.
+        self._lock = threading.RLock()
+        self._pid = os.getpid()
         self._running = True
-        self._loop: asyncio.AbstractEventLoop
-        started = threading.Event()
+        self._loop = asyncio.new_event_loop()
+        self._stopping = asyncio.Event()
         # A daemon: a program that forgets to close its client still ends.
-        self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._main(started)), name="gateway-client", daemon=True
-        )
+        self._thread = threading.Thread(target=self._serve, name="gateway-client", daemon=True)
         self._thread.start()
-        started.wait()
 
     def run(self, work: Coroutine[Any, Any, ResultT]) -> ResultT:
         """Returns what the coroutine returns. An exception in the waiting thread (Ctrl-C) cancels it.
 
         Raises:
-            Cancelled: The loop was stopped, before or meanwhile.
+            Cancelled: The loop was stopped, before or meanwhile; or this is its own thread, as in a garbage
+                collection there, which would wait for itself.
         """
+        if threading.current_thread() is self._thread:
+            work.close()
+            raise Cancelled("a blocking call in the client's own thread")
         future = self.submit(work)
         try:
             return future.result()
@@ -45,8 +49,11 @@ class LoopThread:
         """Starts the coroutine and does not wait for it.
 
         Raises:
-            Cancelled: The loop was stopped.
+            Cancelled: The loop was stopped, or belongs to the process that this one was forked from.
         """
+        if os.getpid() != self._pid:
+            work.close()
+            raise Cancelled("this client belongs to the parent process; make one after the fork")
         # Under the lock: what is submitted before `stop` is cancelled by it, and nothing comes after.
         with self._lock:
             if self._running:
@@ -56,6 +63,8 @@ class LoopThread:
 
     def stop(self) -> None:
         """Cancels the coroutines under way, ends the loop and joins its thread."""
+        if os.getpid() != self._pid:
+            return
         with self._lock:
             if self._running:
                 self._running = False
@@ -64,9 +73,10 @@ class LoopThread:
         if threading.current_thread() is not self._thread:
             self._thread.join()
 
-    async def _main(self, started: threading.Event) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._stopping = asyncio.Event()
-        started.set()
-        # asyncio.run cancels the remaining tasks and waits for them.
+    def _serve(self) -> None:
+        # The runner cancels the remaining tasks and waits for them.
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.run(self._wait_for_stop())
+
+    async def _wait_for_stop(self) -> None:
         await self._stopping.wait()

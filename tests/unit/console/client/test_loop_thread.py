@@ -1,11 +1,13 @@
-"""The loop that blocking code hands its coroutines to."""
+"""The loop thread of the blocking client, where others would wait for themselves."""
 
 import asyncio
-import threading
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
 
+from console.client import loop_thread
 from console.client.errors import Cancelled
 from console.client.loop_thread import LoopThread
 
@@ -17,51 +19,64 @@ def loop() -> Iterator[LoopThread]:
     loop.stop()
 
 
-async def thread_name() -> str:
-    return threading.current_thread().name
+async def seven() -> int:
+    return 7
 
 
-def test_a_coroutine_runs_in_the_loops_thread(loop: LoopThread) -> None:
-    assert loop.run(thread_name()) == "gateway-client"
+def test_a_result_comes_back(loop: LoopThread) -> None:
+    assert loop.run(seven()) == 7
 
 
-def test_its_exception_is_raised_where_it_was_handed_in(loop: LoopThread) -> None:
-    async def fail() -> None:
-        raise KeyError("reason")
+def test_in_its_own_thread_a_blocking_call_ends_at_once(loop: LoopThread) -> None:
+    async def block() -> None:
+        loop.run(seven())
 
-    with pytest.raises(KeyError, match="reason"):
-        loop.run(fail())
+    with pytest.raises(Cancelled, match="own thread"):
+        loop.run(block())
 
 
-def test_stopping_cancels_what_is_pending_and_refuses_what_comes_later(loop: LoopThread) -> None:
-    started = threading.Event()
-    outcome: list[Exception] = []
+def test_a_garbage_collection_within_submit_may_submit(
+    loop: LoopThread, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    really_submit = asyncio.run_coroutine_threadsafe
 
-    async def wait() -> None:
-        started.set()
-        await asyncio.Event().wait()
+    def collecting(*args: object) -> object:
+        monkeypatch.setattr(loop_thread.asyncio, "run_coroutine_threadsafe", really_submit)
+        loop.submit(seven()).result(5)
+        return really_submit(*args)  # type: ignore[arg-type]  # passed on
 
-    def call() -> None:
-        try:
-            loop.run(wait())
-        except Cancelled as error:
-            outcome.append(error)
+    monkeypatch.setattr(loop_thread.asyncio, "run_coroutine_threadsafe", collecting)
+    assert loop.run(seven()) == 7
 
-    caller = threading.Thread(target=call)
-    caller.start()
-    assert started.wait(10)
+
+def test_a_stopped_one_says_so(loop: LoopThread) -> None:
     loop.stop()
-    caller.join(10)
-    assert [type(error) for error in outcome] == [Cancelled]
-    with pytest.raises(Cancelled):
-        loop.run(thread_name())
+    with pytest.raises(Cancelled, match="closed"):
+        loop.run(seven())
+
+
+def test_after_a_fork_it_says_what_to_do() -> None:
+    program = """
+import os
+from console.client.errors import Cancelled
+from console.client.loop_thread import LoopThread
+
+async def seven():
+    return 7
+
+loop = LoopThread()
+if os.fork() == 0:
+    try:
+        loop.run(seven())
+    except Cancelled as error:
+        print(error.what, flush=True)
     loop.stop()
-
-
-def test_stopping_from_its_own_thread_does_not_wait_for_itself(loop: LoopThread) -> None:
-    async def stop_and_wait() -> None:
-        loop.stop()
-        await asyncio.Event().wait()
-
-    with pytest.raises(Cancelled):
-        loop.run(stop_and_wait())
+    os._exit(0)
+os.wait()
+assert loop.run(seven()) == 7
+loop.stop()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert "belongs to the parent process" in done.stdout
