@@ -49,7 +49,10 @@ def gateway_program(directory: Path, port: int = 0, **settings: Any) -> Iterator
     with (directory / "gateway.log").open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
     try:
-        with grpc.insecure_channel(f"127.0.0.1:{port}") as channel:
+        # A connection of its own: channels of a process share theirs, and that to an earlier gateway at this
+        # port, which was killed, may have stopped trying.
+        options = (("grpc.use_local_subchannel_pool", 1),)
+        with grpc.insecure_channel(f"127.0.0.1:{port}", options) as channel:
             grpc.channel_ready_future(channel).result(timeout=_UP_WITHIN_S)
             yield GatewayProgram(process, port, RobotGatewayStub(channel))
     finally:
