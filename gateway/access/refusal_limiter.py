@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
+from common.token_bucket import TokenBucket
+
 BURST: Final = 10
 """Capacity of a bucket, in tokens; each report takes one."""
 REFILL_S: Final = 60.0
@@ -18,9 +20,8 @@ MAX_CALLERS: Final = 256
 
 
 @dataclass(slots=True)
-class _Bucket:
-    tokens: float
-    updated_s: float
+class _Caller:
+    bucket: TokenBucket
     suppressed: int = 0
 
 
@@ -33,11 +34,11 @@ class RefusalLimiter:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._buckets: dict[str, _Bucket] = {}
+        self._callers: dict[str, _Caller] = {}
         """Ordered by last use, the latest at the end."""
 
     def __len__(self) -> int:
-        return len(self._buckets)
+        return len(self._callers)
 
     def take(self, caller: str) -> int | None:
         """Takes a token for one refusal of this caller, a name or an address.
@@ -47,15 +48,12 @@ class RefusalLimiter:
             suppressed, too.
         """
         now_s = self._clock()
-        bucket = self._buckets.pop(caller, None) or _Bucket(BURST, now_s)
-        self._buckets[caller] = bucket
-        if len(self._buckets) > MAX_CALLERS:
-            del self._buckets[next(iter(self._buckets))]
-        bucket.tokens = min(BURST, bucket.tokens + (now_s - bucket.updated_s) / REFILL_S)
-        bucket.updated_s = now_s
-        if bucket.tokens < 1:
-            bucket.suppressed += 1
+        known = self._callers.pop(caller, None) or _Caller(TokenBucket(BURST, now_s))
+        self._callers[caller] = known
+        if len(self._callers) > MAX_CALLERS:
+            del self._callers[next(iter(self._callers))]
+        if not known.bucket.take(now_s, capacity=BURST, refill_per_s=1 / REFILL_S):
+            known.suppressed += 1
             return None
-        bucket.tokens -= 1
-        suppressed, bucket.suppressed = bucket.suppressed, 0
+        suppressed, known.suppressed = known.suppressed, 0
         return suppressed

@@ -20,6 +20,7 @@ from typing import Final
 from common.errors import TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
+from common.token_bucket import TokenBucket
 from gateway.config import LimitSettings
 from gateway.rpc.call import CallContext, Peer
 
@@ -43,8 +44,7 @@ _RETRY_AFTER_S: Final = 1.0
 @dataclass(slots=True)
 class _Connection:
     site: str
-    tokens: float
-    called_s: float
+    bucket: TokenBucket
     streams: int = 0
     refused_s: float = -math.inf
 
@@ -121,18 +121,14 @@ class Admission:
         limits, now_s = self._limits, self._clock()
         connection = self._connections.pop(peer.connection, None) or self._new(peer, now_s)
         self._connections[peer.connection] = connection
-        refilled = connection.tokens + (now_s - connection.called_s) * limits.requests_per_s
-        tokens = min(self._bucket_size(connection, now_s), refilled)
-        connection.called_s = now_s
-        if tokens >= 1:
-            connection.tokens = tokens - 1
+        bucket, capacity = connection.bucket, self._capacity(connection, now_s)
+        if bucket.take(now_s, capacity=capacity, refill_per_s=limits.requests_per_s):
             return
-        connection.tokens = tokens
         connection.refused_s = now_s
         raise TooMuchError(
             f"this connection makes more than {limits.requests_per_s:g} requests a second; call less often",
             Reason.TOO_MANY_REQUESTS,
-            (1 - tokens) / limits.requests_per_s,
+            (1 - bucket.tokens) / limits.requests_per_s,
         )
 
     def open_stream(self, peer: Peer) -> None:
@@ -160,7 +156,7 @@ class Admission:
         self._last_refusal_s = max(now_s + REFUSAL_DELAY_S, self._last_refusal_s + REFUSAL_SPACING_S)
         return self._last_refusal_s - now_s
 
-    def _bucket_size(self, connection: _Connection, now_s: float) -> float:
+    def _capacity(self, connection: _Connection, now_s: float) -> float:
         """Reduced after a refusal: a full bucket would only be emptied at once again."""
         limits = self._limits
         if now_s - connection.refused_s >= FORGIVEN_AFTER_S:
@@ -184,12 +180,13 @@ class Admission:
                 _RETRY_AFTER_S,
             )
         self._per_site[peer.site] += 1
-        return _Connection(peer.site, limits.burst, now_s)
+        return _Connection(peer.site, TokenBucket(limits.burst, now_s))
 
     def _evict(self, now_s: float, site: str | None = None) -> bool:
         """Forgets the quietest connection, of this site or of all; False when none is quiet enough."""
         for connection, each in self._connections.items():
-            if site in (None, each.site) and each.streams == 0 and now_s - each.called_s >= QUIET_AFTER_S:
+            quiet = each.streams == 0 and now_s - each.bucket.updated_s >= QUIET_AFTER_S
+            if quiet and site in (None, each.site):
                 del self._connections[connection]
                 self._per_site[each.site] -= 1
                 if not self._per_site[each.site]:
