@@ -5,11 +5,13 @@ event that the table does not list for the current state is a defect of the call
 names both and changes nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
+
+from common.backoff import Backoff
 
 
 class State(Enum):
@@ -65,8 +67,8 @@ TRANSITIONS: Final[Mapping[State, Mapping[Event, State]]] = MappingProxyType(
     }
 )
 
-RETRY_DELAYS_S: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
-"""Exponential backoff in seconds before the first, second ... retry; the last one repeats."""
+FIRST_RETRY_S: Final = 1.0
+LONGEST_RETRY_S: Final = 30.0
 
 
 class IllegalEventError(Exception):
@@ -98,21 +100,15 @@ class Counters:
 class Lifecycle:
     """Current state, retry backoff and counters.
 
-    Args:
-        retry_delays_s: backoff in seconds; the last delay repeats.
+    Attributes:
+        retry_delay_s: seconds from the newest fault to its retry.
     """
 
-    def __init__(self, retry_delays_s: Sequence[float] = RETRY_DELAYS_S) -> None:
+    def __init__(self) -> None:
         self.state = State.DISABLED
         self.counters = Counters()
-        self._retry_delays_s = tuple(retry_delays_s)
-        self._failed_attempts = 0
-
-    @property
-    def retry_delay_s(self) -> float:
-        """Seconds from the newest fault to its retry."""
-        index = min(max(self._failed_attempts - 1, 0), len(self._retry_delays_s) - 1)
-        return self._retry_delays_s[index]
+        self.retry_delay_s = FIRST_RETRY_S
+        self._backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
 
     def handle(self, event: Event) -> State:
         """Applies an event and returns the new state.
@@ -134,7 +130,7 @@ class Lifecycle:
 
     def reset_backoff(self) -> None:
         """Starts the backoff again: the pipeline has run steadily since its last fault."""
-        self._failed_attempts = 0
+        self._backoff.reset()
 
     def _count(self, before: State, event: Event, after: State) -> None:
         count = self.counters
@@ -142,7 +138,7 @@ class Lifecycle:
             restarts = count.restarts + (before is State.FAULTED)
             self.counters = replace(count, starts=count.starts + 1, restarts=restarts)
         if after is State.FAULTED:
-            self._failed_attempts += 1
+            self.retry_delay_s = self._backoff.next_s()
             self.counters = replace(count, faults=count.faults + 1)
         if event is Event.DISABLE:
             self.reset_backoff()
