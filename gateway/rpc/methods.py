@@ -20,9 +20,9 @@ CONTRACT: Final = DESCRIPTOR.services_by_name["RobotGateway"]
 class Open(Enum):
     """Requirements that are not a role."""
 
-    EVERYBODY = "everybody"
+    PUBLIC = "anyone"
     """No credential is needed."""
-    NOBODY = "nobody"
+    UNDECLARED = "no one"
     """The method declares no role: no credential suffices."""
 
 
@@ -31,7 +31,7 @@ Needed: TypeAlias = Role | Open
 ROLES: Final = {ROLE_VIEWER: Role.VIEWER, ROLE_OPERATOR: Role.OPERATOR, ROLE_ADMIN: Role.ADMIN}
 STANDARD: Final[dict[str, Needed]] = {
     # Shows only that the gateway runs, as its open port does. What restarts a container has no credential.
-    "grpc.health.v1.Health": Open.EVERYBODY,
+    "grpc.health.v1.Health": Open.PUBLIC,
     # Shows what this gateway can do, as its documentation does.
     "grpc.reflection.v1alpha.ServerReflection": Role.VIEWER,
     "grpc.reflection.v1.ServerReflection": Role.VIEWER,
@@ -55,13 +55,13 @@ class Method(interceptors.Method):
     def __init__(self, path: str, *, streaming: bool = False) -> None:
         super().__init__(path, streaming=streaming)
         service, _, self.name = path.removeprefix("/").partition("/")
-        self.needed: Needed = STANDARD.get(service, Open.NOBODY)
+        self.needed: Needed = STANDARD.get(service, Open.UNDECLARED)
         self.of_contract = False
         self.request_type = None
         self.has_parameters = False
         found = _described(service, self.name)
         if found is not None:
-            self.needed = ROLES.get(found.GetOptions().Extensions[required_role], Open.NOBODY)
+            self.needed = ROLES.get(found.GetOptions().Extensions[required_role], Open.UNDECLARED)
             self.of_contract = found.containing_service.file.package == DESCRIPTOR.package
         if found is not None and self.of_contract:
             self.request_type = GetMessageClass(found.input_type)

@@ -65,7 +65,7 @@ class Auth(Interceptor[CallContext]):
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method needs a credential."""
-        return method.needed is not Open.EVERYBODY
+        return method.needed is not Open.PUBLIC
 
     async def on_call(self, call: CallContext) -> None:
         """Sets the call's principal.
@@ -183,7 +183,7 @@ def _fingerprint(pem: bytes) -> str:
 def _authorize(principal: Principal, method: Method) -> None:
     needed = method.needed
     if isinstance(needed, Open):
-        raise NotAllowedError(f"{method.name} declares no role, so nobody may call it")
+        raise NotAllowedError(f"{method.name} declares no role, so no one may call it")
     if not principal.role.may(needed):
         raise NotAllowedError(
             f"{principal.name} is {principal.role.value}, and {method.name} needs {needed.value}"

@@ -71,7 +71,7 @@ def test_a_full_disk_leaves_no_half_line_and_is_told(tmp_path: Path, monkeypatch
         for number in range(10):
             log.record(action(number))
         wait_until(lambda: log.lost > 0, "a line is lost")
-        wait_until(lambda: log.error, "the trouble is told")
+        wait_until(lambda: log.error, "the error is reported")
         assert "No space left" in log.error
     kept = lines(tmp_path / "a")
     assert kept == [str(number) for number in range(len(kept))]

@@ -1,4 +1,4 @@
-"""What is counted, and how it is told."""
+"""What is counted, and how it is shown."""
 
 import asyncio
 import json
@@ -132,52 +132,52 @@ def test_a_histogram_counts_what_is_not_longer_than_each_bound() -> None:
 
 
 def test_calls_are_told_apart_by_method_and_code() -> None:
-    told = values(some_calls())
-    assert told["robot_gateway_requests_total", "code=OK method=GetSystemStatus"] == 2
-    assert told["robot_gateway_requests_total", "code=INVALID_ARGUMENT method=SetPreviewMode"] == 1
+    shown = values(some_calls())
+    assert shown["robot_gateway_requests_total", "code=OK method=GetSystemStatus"] == 2
+    assert shown["robot_gateway_requests_total", "code=INVALID_ARGUMENT method=SetPreviewMode"] == 1
     name = "robot_gateway_request_duration_seconds"
-    assert told[f"{name}_count", "method=GetSystemStatus"] == 2
-    assert told[f"{name}_sum", "method=GetSystemStatus"] == pytest.approx(0.202)
-    assert told[f"{name}_bucket", "le=0.0025 method=GetSystemStatus"] == 1
-    assert told[f"{name}_bucket", "le=+Inf method=GetSystemStatus"] == 2
+    assert shown[f"{name}_count", "method=GetSystemStatus"] == 2
+    assert shown[f"{name}_sum", "method=GetSystemStatus"] == pytest.approx(0.202)
+    assert shown[f"{name}_bucket", "le=0.0025 method=GetSystemStatus"] == 1
+    assert shown[f"{name}_bucket", "le=+Inf method=GetSystemStatus"] == 2
 
 
 def test_streams_and_what_slow_readers_did_not_get() -> None:
-    told = values(some_calls())
-    assert told["robot_gateway_streams", "method=WatchSystemStatus"] == 3
-    assert told["robot_gateway_statuses_skipped_total", ""] == 7
-    assert told["robot_gateway_event_gaps_total", ""] == 1
+    shown = values(some_calls())
+    assert shown["robot_gateway_streams", "method=WatchSystemStatus"] == 3
+    assert shown["robot_gateway_statuses_skipped_total", ""] == 7
+    assert shown["robot_gateway_event_gaps_total", ""] == 1
 
 
 def test_the_robot_and_its_sources() -> None:
-    told = values(Stats())
-    assert told["robot_gateway_build_info", 'name=lab "7" revision=abc version=1.2.3'] == 1
-    assert told["robot_gateway_uptime_seconds", ""] == 61.5
-    assert told["robot_gateway_clients", ""] == 3
-    assert told["robot_gateway_robot_ready", ""] == 0
-    assert told["robot_gateway_source_age_seconds", "source=odometry"] == 0.25
-    assert told["robot_gateway_source_fresh", "source=odometry"] == 1
-    assert told["robot_gateway_source_fresh", "source=vision"] == 0
-    assert ("robot_gateway_source_age_seconds", "source=vision") not in told
-    assert told["robot_gateway_faults", "severity=error"] == 1
-    assert told["robot_gateway_faults", "severity=info"] == 0
+    shown = values(Stats())
+    assert shown["robot_gateway_build_info", 'name=lab "7" revision=abc version=1.2.3'] == 1
+    assert shown["robot_gateway_uptime_seconds", ""] == 61.5
+    assert shown["robot_gateway_clients", ""] == 3
+    assert shown["robot_gateway_robot_ready", ""] == 0
+    assert shown["robot_gateway_source_age_seconds", "source=odometry"] == 0.25
+    assert shown["robot_gateway_source_fresh", "source=odometry"] == 1
+    assert shown["robot_gateway_source_fresh", "source=vision"] == 0
+    assert ("robot_gateway_source_age_seconds", "source=vision") not in shown
+    assert shown["robot_gateway_faults", "severity=error"] == 1
+    assert shown["robot_gateway_faults", "severity=info"] == 0
 
 
 def test_the_running_preview() -> None:
-    told = values(Stats())
-    states = {state: told["robot_gateway_preview_state", f"state={state.value}"] for state in PreviewState}
+    shown = values(Stats())
+    states = {state: shown["robot_gateway_preview_state", f"state={state.value}"] for state in PreviewState}
     assert [state for state, value in states.items() if value] == [PreviewState.RUNNING]
-    counted = [told[f"robot_gateway_preview_{n}_total", ""] for n in ("starts", "restarts", "faults")]
+    counted = [shown[f"robot_gateway_preview_{n}_total", ""] for n in ("starts", "restarts", "faults")]
     assert counted == [4, 3, 2]
-    assert told["robot_gateway_preview_fallbacks_total", ""] == 1
-    assert told["robot_gateway_preview_link_failures", ""] == 3
-    assert told["robot_gateway_preview_encoder_info", "encoder=x264 hardware=false wanted=mpp-h265"] == 1
-    assert told["robot_gateway_preview_viewers", ""] == 2
-    assert told["robot_gateway_preview_bits_per_second", ""] == 2_400_000
-    assert told["robot_gateway_preview_target_bits_per_second", ""] == 2_500_000
-    assert told["robot_gateway_preview_frame_age_seconds", ""] == 0.012
-    assert told["robot_gateway_preview_worst_rtt_seconds", ""] == 0.18
-    assert told["robot_gateway_preview_worst_loss_percent", ""] == 6
+    assert shown["robot_gateway_preview_fallbacks_total", ""] == 1
+    assert shown["robot_gateway_preview_link_failures", ""] == 3
+    assert shown["robot_gateway_preview_encoder_info", "encoder=x264 hardware=false wanted=mpp-h265"] == 1
+    assert shown["robot_gateway_preview_viewers", ""] == 2
+    assert shown["robot_gateway_preview_bits_per_second", ""] == 2_400_000
+    assert shown["robot_gateway_preview_target_bits_per_second", ""] == 2_500_000
+    assert shown["robot_gateway_preview_frame_age_seconds", ""] == 0.012
+    assert shown["robot_gateway_preview_worst_rtt_seconds", ""] == 0.18
+    assert shown["robot_gateway_preview_worst_loss_percent", ""] == 6
 
 
 @pytest.mark.parametrize(
@@ -186,9 +186,9 @@ def test_the_running_preview() -> None:
     ids=["none", "of a minute ago"],
 )
 def test_figures_that_nobody_measured_now_are_not_told(measured: Received[Measurement] | None) -> None:
-    told = values(Stats(), snapshot(replace(PREVIEW, measured=measured)))
-    assert ("robot_gateway_preview_viewers", "") not in told
-    assert told["robot_gateway_preview_starts_total", ""] == 4
+    shown = values(Stats(), snapshot(replace(PREVIEW, measured=measured)))
+    assert ("robot_gateway_preview_viewers", "") not in shown
+    assert shown["robot_gateway_preview_starts_total", ""] == 4
 
 
 def test_a_busy_loop_is_seen() -> None:
@@ -209,12 +209,12 @@ def test_a_busy_loop_is_seen() -> None:
 
 
 def test_the_page_names_what_is_told_and_nothing_else() -> None:
-    told = {family.name for family in families(some_calls())}
+    shown = {family.name for family in families(some_calls())}
     page = (ROOT / "docs/metrics.md").read_text()
     documented = {
         name.removesuffix("_total") for name in re.findall(r"^\| `(robot_gateway_\w+)", page, re.MULTILINE)
     }
-    assert documented == told
+    assert documented == shown
 
 
 def test_the_dashboard_asks_for_what_is_told() -> None:
