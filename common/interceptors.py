@@ -12,8 +12,8 @@ four kinds:
     on_end       last to first, once, for those whose on_call returned
     on_error     after on_end, the same ones, if the call failed; what it raises is what the caller gets
 
-What a call does not need costs it nothing: a poll of the status takes 200 us on a desktop's core, and each
-coroutine or wrapper more would be paid some thousand times a second.
+What a call does not need must cost it next to nothing: a poll of the status takes 200 us on a desktop's core,
+and each coroutine or wrapper more would be paid some thousand times a second.
 """
 
 import logging

@@ -1,8 +1,7 @@
 """Who may call: credentials, certificates and the audit log, put together from the settings."""
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
@@ -45,21 +44,23 @@ class AccessControl:
     def __init__(self, settings: SecuritySettings, events: EventSink, stream_key: StreamKey) -> None:
         directory = settings.credentials
         file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
-        self._log = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
-        self.audit = Audit(events, self._log, RefusalLimiter())
+        self._audit_log = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
+        self.audit = Audit(events, self._audit_log, RefusalLimiter())
         self.auth: Auth | None = None
-        self._watch: CredentialReloader | None = None
+        self._reloader: CredentialReloader | None = None
         self._tls: ServerTls | None = None
         if directory is None:
             return
         files = CredentialDirectory(directory)
         tls_files = tls_files_of(settings, files)
-        self._watch = CredentialReloader(files, tls_files, self._use)
-        self._authenticator = Authenticator(self._watch.loaded.store)
+        self._reloader = CredentialReloader(files, tls_files, self._use)
+        self._authenticator = Authenticator(self._reloader.loaded.store)
         certificates = tls_files is not None and tls_files.client_ca is not None
-        self.auth = Auth(self._authenticator, Lockout(), self._watch, stream_key, certificates=certificates)
-        if self._watch.loaded.tls:
-            self._tls = ServerTls(self._watch.loaded.tls)
+        self.auth = Auth(
+            self._authenticator, Lockout(), self._reloader, stream_key, certificates=certificates
+        )
+        if self._reloader.loaded.tls:
+            self._tls = ServerTls(self._reloader.loaded.tls)
 
     @property
     def server_credentials(self) -> grpc.ServerCredentials | None:
@@ -68,28 +69,26 @@ class AccessControl:
 
     def view(self) -> AccessView:
         """Returns the state of credentials, certificates and audit log, for the fault rules."""
-        error = self._log.error
-        return self._watch.view(error) if self._watch else AccessView(audit_error=error)
+        error = self._audit_log.error
+        return self._reloader.view(error) if self._reloader else AccessView(audit_error=error)
 
-    @contextmanager
-    def recording(self) -> Iterator[None]:
-        """Writes the audit log while the block lasts."""
-        with self._log.writing():
-            yield
+    def recording(self) -> AbstractContextManager[None]:
+        """Returns a block during which the audit log is written."""
+        return self._audit_log.writing()
 
     async def run(self) -> None:
         """Follows changes of the credential files, until cancelled."""
-        if self._watch is None or self.auth is None:
+        if self._reloader is None or self.auth is None:
             return
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._watch.run(), name="credentials")
+            tasks.create_task(self._reloader.run(), name="credentials")
             tasks.create_task(self.auth.run(), name="revocation")
 
     def _use(self, loaded: LoadedAccess) -> None:
         self._authenticator.use(loaded.store)
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        self._log.record(_reloaded(len(loaded.store.credentials)))
+        self._audit_log.record(_reloaded(len(loaded.store.credentials)))
 
 
 def read_access(settings: SecuritySettings, directory: Path) -> LoadedAccess:

@@ -1,7 +1,7 @@
 """The metrics by name. docs/metrics.md explains each; a test holds the page and this module together."""
 
 from collections.abc import Iterator
-from typing import Final, Protocol
+from typing import Final
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily as CounterFamily
@@ -10,31 +10,17 @@ from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from gateway.links.link import LinkHealth
+from gateway.links.preview.control import PreviewLink
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.event_stream import EventStream
 from gateway.rpc.interceptors.stats import Stats
+from gateway.rpc.ports import SnapshotSource
 from gateway.rpc.status_stream import StatusStream
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
 
 _PREFIX: Final = "robot_gateway"
-
-
-class SnapshotSource(Protocol):
-    """Where the gauges come from."""
-
-    def snapshot(self) -> Snapshot:
-        """Returns everything at this instant."""
-
-
-class PreviewLink(Protocol):
-    """The connection to the preview service."""
-
-    @property
-    def health(self) -> LinkHealth:
-        """Its condition at this instant."""
 
 
 class GatewayCollector(Collector):

@@ -56,9 +56,10 @@ class CallContext(Call):
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
         request: the newest message of the caller; None before the first.
         responded: whether a message has left for the caller.
+        answer: what a control action was answered, for the audit log.
     """
 
-    __slots__ = ("peer", "principal", "request", "responded")
+    __slots__ = ("answer", "peer", "principal", "request", "responded")
 
     method: Method
     principal: Principal | None
@@ -70,6 +71,7 @@ class CallContext(Call):
         self.principal = None
         self.request = None
         self.responded = False
+        self.answer = ""
 
     @property
     def request_id(self) -> str:

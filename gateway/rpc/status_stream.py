@@ -58,11 +58,6 @@ class StatusStream:
         self.skipped = 0
         """Responses that came due while the one before was still on its way: those readers got newer ones."""
 
-    @property
-    def watcher_count(self) -> int:
-        """How many streams are open."""
-        return len(self._watchers)
-
     async def run(self) -> NoReturn:
         """Ticks while there are watchers, until cancelled."""
         due_s = self._clock()

@@ -34,7 +34,6 @@ class Audit(Interceptor[CallContext]):
         self._events = events
         self._trail = trail
         self._refusals = refusals
-        self._answers: dict[CallContext, str] = {}
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method is a control action."""
@@ -42,7 +41,7 @@ class Audit(Interceptor[CallContext]):
 
     def on_response(self, call: CallContext, response: Any) -> None:
         """Keeps what the caller is answered until the call ends."""
-        self._answers[call] = getattr(response, "message", "")
+        call.answer = getattr(response, "message", "")
 
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Records how the action ended.
@@ -50,9 +49,8 @@ class Audit(Interceptor[CallContext]):
         Left out are refusals for a rate or a lockout, refusals beyond a caller's share, and calls that ended
         before they were admitted: a caller that leaves while it is authenticated has done nothing.
         """
-        answer = self._answers.pop(call, "")
         if error is None:
-            self._record(call, ControlResult.ACCEPTED, answer)
+            self._record(call, ControlResult.ACCEPTED, call.answer)
         elif isinstance(error, DomainError):
             self._record_refusal(call, error)
         elif call.request is None:
@@ -85,10 +83,10 @@ class Audit(Interceptor[CallContext]):
             request_id=call.request_id,
         )
         self._trail.record(action)
-        self._events.note(control_event(action))
+        self._events.note(_event(action))
 
 
-def control_event(action: ControlAction) -> Event:
+def _event(action: ControlAction) -> Event:
     """Returns the event that shows an action to operators."""
     request = f" ({action.request})" if action.request else ""
     who = action.who or action.address

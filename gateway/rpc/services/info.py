@@ -28,6 +28,8 @@ class InfoService:
 
     def __init__(self, state: SnapshotSource, stats: Stats, configuration_json: str) -> None:
         self._state = state
+        # It can't change while this process lives.
+        self._boot_id = state.snapshot().gateway.boot_id
         self._stats = stats
         self._configuration_json = configuration_json
 
@@ -48,5 +50,5 @@ class InfoService:
         return PingResponse(
             monotonic_ns=monotonic_ns,
             wall_clock_unix_ns=wall_clock_unix_ns,
-            boot_id=self._state.snapshot().gateway.boot_id,
+            boot_id=self._boot_id,
         )
