@@ -40,6 +40,7 @@ QUICK = ClientOptions(stream_backoff=Backoff(first_s=0.01, longest_s=0.05))
 async def operator(tmp_path: Path) -> AsyncIterator[Operator]:
     server = await serve_double(tmp_path / "preview.sock", PreviewDouble())
     async with running_gateway(tmp_path / "preview.sock", faults={"startup_grace_ms": 0}) as operator:
+        await eventually(operator.status, lambda it: it.preview.service_reachable, "they have met")
         yield operator
     await server.stop(None)
 
