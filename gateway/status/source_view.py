@@ -1,9 +1,8 @@
 """The state of every configured source for operators: whether it is received, and if not, why."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from gateway.status.board import Publishers
 from gateway.status.freshness import Freshness
@@ -28,8 +27,7 @@ class SourceState(Enum):
     """The message type is not installed beside the gateway."""
 
 
-@dataclass(frozen=True, slots=True)
-class SourceView:
+class SourceView(NamedTuple):
     """One configured source at one instant; `detail` explains the state, empty if all is well."""
 
     spec: SourceSpec[Any]
@@ -79,7 +77,9 @@ def source_view(
 
 def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
     """Returns the sentence on a source that people know by `name`; empty if all is well."""
-    if state is SourceState.RECEIVING and publishers and publishers.count > 1:
+    if state is SourceState.RECEIVING:
+        if not publishers or publishers.count < 2:
+            return ""
         return f"{publishers.count} programs publish {name}: the values shown may be from any of them"
     if state is SourceState.STALE and publishers and publishers.count == 0:
         return f"{name} stopped coming: nothing on the robot publishes it any more"
