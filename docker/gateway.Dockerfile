@@ -76,7 +76,8 @@ ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     GRPC_VERBOSITY=ERROR \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
-    HEALTH_TARGET=127.0.0.1:50051
+    HEALTH_TARGET=127.0.0.1:50051 \
+    HEALTH_SERVICE=omniseer.gateway.v1.RobotGateway
 # The group is shared with the preview: it owns the socket between the two.
 USER 10001:10000
 STOPSIGNAL SIGTERM

@@ -35,7 +35,15 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)
         return
     for source, publishers in found:
-        yield _topic_finding(source, publishers)
+        if isinstance(publishers, str):
+            yield wrong(
+                f"topic.{source.name}",
+                f"the publishers of {source.topic} can't be listed: {publishers}",
+                "A program in this ROS domain announces itself with a name that is no text",
+                "Set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, so that other machines are left out",
+            )
+        else:
+            yield _topic_finding(source, publishers)
 
 
 def _environment() -> Iterator[Finding]:
@@ -68,15 +76,23 @@ def _type_finding(source: SourceSettings) -> Finding:
     return good(check, f"{source.type} is installed")
 
 
-def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any]]]:
-    """Returns the publishers of each source, once each has one or the time limit is reached."""
+def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any] | str]]:
+    """Returns the publishers of each source, or why they can't be listed, once each has one or time is up."""
     until_s = time.monotonic() + DISCOVERY_S
     while True:
-        found = [(source, list(node.get_publishers_info_by_topic(source.topic))) for source in sources]
+        found = [(source, _publishers(node, source.topic)) for source in sources]
         if all(publishers for _, publishers in found) or time.monotonic() >= until_s:
             return found
         # Polled: graph events need an executor that spins.
         time.sleep(_POLL_EVERY_S)
+
+
+def _publishers(node: Any, topic: str) -> list[Any] | str:
+    """Returns the publishers of a topic, or why they can't be listed."""
+    try:
+        return list(node.get_publishers_info_by_topic(topic))
+    except (RuntimeError, UnicodeError) as error:
+        return str(error)
 
 
 def _topic_finding(source: SourceSettings, publishers: list[Any]) -> Finding:

@@ -25,6 +25,8 @@ class SourceState(Enum):
     """Every publisher has another message type than configured."""
     TYPE_MISSING = "type_missing"
     """The message type is not installed beside the gateway."""
+    UNDECODABLE = "undecodable"
+    """Messages arrive, but can't be decoded: the type has the same name and other fields."""
 
 
 class SourceView(NamedTuple):
@@ -50,8 +52,12 @@ _SENTENCES: Final[Mapping[SourceState, str]] = {
     SourceState.QOS_MISMATCH: "the robot offers {name} with delivery guarantees that exclude the gateway's",
     SourceState.WRONG_TYPE: "the robot offers {name} in another form than the gateway is configured for",
     SourceState.TYPE_MISSING: "{name} can't be read: its message type is not installed beside the gateway",
+    SourceState.UNDECODABLE: "{name} arrives, but can't be decoded: the robot's message type has other fields"
+    " than the one installed beside the gateway",
 }
 """Total: a sentence for every state. It names no topic, node or type: those are the robot's own affair."""
+_BLAMES_SILENCE: Final = frozenset({SourceState.WAITING, SourceState.SILENT, SourceState.STALE})
+_NOT_READ: Final = "the gateway does not read ROS at the moment"
 
 
 def source_view(
@@ -61,6 +67,8 @@ def source_view(
     *,
     required: bool,
     unusable: bool,
+    undecodable: bool,
+    stalled: bool,
 ) -> SourceView:
     """Returns the view of one source.
 
@@ -70,8 +78,12 @@ def source_view(
         publishers: None before the graph was examined.
         required: whether the configuration requires it.
         unusable: whether it can't be subscribed.
+        undecodable: whether its newest message could not be decoded.
+        stalled: whether the ROS sampler makes no progress.
     """
-    state = _state(freshness, publishers, unusable=unusable)
+    state = _state(freshness, publishers, unusable=unusable, undecodable=undecodable)
+    if stalled and state in _BLAMES_SILENCE:
+        return SourceView(spec, state, freshness, required, _NOT_READ)
     return SourceView(spec, state, freshness, required, detail(state, spec.display_name, publishers))
 
 
@@ -88,16 +100,18 @@ def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
     return _SENTENCES[state].format(name=name)
 
 
-def _state(freshness: Freshness, publishers: Publishers | None, *, unusable: bool) -> SourceState:
+def _state(
+    freshness: Freshness, publishers: Publishers | None, *, unusable: bool, undecodable: bool
+) -> SourceState:
     if unusable:
         return SourceState.TYPE_MISSING
     if freshness.fresh:
         return SourceState.RECEIVING
-    if publishers and publishers.count:
-        if publishers.wrong_type:
-            return SourceState.WRONG_TYPE
-        if publishers.qos_mismatch:
-            return SourceState.QOS_MISMATCH
-        if not freshness.available:
-            return SourceState.SILENT
-    return SourceState.STALE if freshness.available else SourceState.WAITING
+    if undecodable:
+        return SourceState.UNDECODABLE
+    offered = publishers is not None and publishers.count > 0
+    if publishers and offered and (publishers.wrong_type or publishers.qos_mismatch):
+        return SourceState.WRONG_TYPE if publishers.wrong_type else SourceState.QOS_MISMATCH
+    if freshness.available:
+        return SourceState.STALE
+    return SourceState.SILENT if offered else SourceState.WAITING
