@@ -3,13 +3,16 @@
 #   wheels    Debian 12 and the Python index's wheels, amd64: tests, and machines without a ROS image
 # Everything above rclpy is the same.
 ARG ROS=packages
+# A tag, or better a tag with its digest (scripts/images digests).
+ARG DEBIAN_IMAGE=debian:bookworm-slim
+ARG ROS_IMAGE=ros:jazzy-ros-core
 
-FROM debian:bookworm-slim AS system-wheels
+FROM ${DEBIAN_IMAGE} AS system-wheels
 RUN apt-get update \
  && apt-get install -y --no-install-recommends python3 tini \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 
-FROM ros:jazzy-ros-core AS system-packages
+FROM ${ROS_IMAGE} AS system-packages
 RUN apt-get update \
  && apt-get install -y --no-install-recommends ros-jazzy-vision-msgs tini \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
@@ -74,6 +77,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-gateway --help > /dev/null
 
 FROM system
+# What is in the image, for a look at advisories: package and version, one line each.
+RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # Volumes take over whose these are; so does a tmpfs on /tmp, whatever mode it is given, before runc 1.1.8.
