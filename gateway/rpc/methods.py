@@ -52,8 +52,10 @@ class Method(interceptors.Method):
 
     request_type: type[Message] | None
 
-    def __init__(self, path: str, *, streaming: bool = False) -> None:
-        super().__init__(path, streaming=streaming)
+    def __init__(
+        self, path: str, *, request_streaming: bool = False, response_streaming: bool = False
+    ) -> None:
+        super().__init__(path, request_streaming=request_streaming, response_streaming=response_streaming)
         service, _, self.name = path.removeprefix("/").partition("/")
         self.needed: Needed = STANDARD.get(service, Open.UNDECLARED)
         self.of_contract = False

@@ -15,7 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from common.errors import TooMuchError
 from common.interceptors import Interceptor
@@ -50,7 +50,10 @@ class _Connection:
 
 
 class RateLimit(Interceptor[CallContext]):
-    """Refuses calls beyond a connection's share with a delay; accounts for open streams."""
+    """Refuses calls beyond a connection's share with a delay; accounts for open streams.
+
+    Each message of a request stream takes a token like a call.
+    """
 
     def __init__(self, admission: "Admission") -> None:
         self._admission = admission
@@ -71,6 +74,16 @@ class RateLimit(Interceptor[CallContext]):
                 raise
             return self._refuse_later(error)
         return None
+
+    def on_request(self, call: CallContext, request: Any) -> Any:
+        """Takes a token for a message of a request stream.
+
+        Raises:
+            TooMuchError: there is none left. It ends the stream at once; opening another one is delayed.
+        """
+        if call.method.request_streaming:
+            self._admission.take_token(call.peer)
+        return request
 
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Gives the stream back."""

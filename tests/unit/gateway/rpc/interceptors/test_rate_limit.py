@@ -178,6 +178,26 @@ def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tupl
                 assert later <= 5 + (last_s - first_s) * 10 + 1e-6
 
 
+def test_each_message_of_a_request_stream_takes_a_token(admission: Admission, clock: Clock) -> None:
+    limit = RateLimit(admission)
+    stream = call_of("Drive", request_streaming=True)
+    assert limit.on_call(stream) is None
+    for _ in range(SMALL.burst - 1):
+        assert limit.on_request(stream, b"message") == b"message"
+    with pytest.raises(TooMuchError) as seen:
+        limit.on_request(stream, b"message")
+    assert seen.value.reason is Reason.TOO_MANY_REQUESTS
+    clock.now_s += 0.1001
+    limit.on_request(stream, b"message")
+
+
+def test_a_request_is_no_message_of_a_stream(admission: Admission) -> None:
+    limit, call = RateLimit(admission), call_of(streaming=True)
+    limit.on_call(call)
+    for _ in range(3 * SMALL.burst):
+        limit.on_request(call, b"message")
+
+
 async def test_a_delayed_refusal_leaves_no_garbage_behind() -> None:
     """A circle of references would keep call and error until the next collection, in a flood of them."""
     limit = RateLimit(Admission(LimitSettings(requests_per_s=0.1, burst=1)))
