@@ -86,6 +86,8 @@ class AccessControl:
 
     def _use(self, loaded: LoadedAccess) -> None:
         self._authenticator.use(loaded.store)
+        if self.auth:
+            self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         self._audit_log.record(_reloaded(len(loaded.store.credentials)))

@@ -114,6 +114,11 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         """Condition of the connection, from memory."""
         return LinkHealth(self._reconciler.error is None, self._backoff.failures, self._last_error)
 
+    @property
+    def refusal(self) -> str | None:
+        """Why the service refuses the desired state; None if it does not."""
+        return self._reconciler.refusal
+
     def request(self, spec: SpecT) -> Desired[SpecT]:
         """Replaces the desired state; returns without waiting for the service."""
         desired = self._reconciler.request(spec, request_id.current())

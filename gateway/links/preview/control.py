@@ -1,11 +1,14 @@
 """Answers to operators who switch the preview."""
 
+import logging
 from typing import Final
 
 from gateway.links.link import ServiceLink
 from gateway.links.preview.model import PreviewModel
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.status.preview import PreviewState, PreviewView, Profile
+
+_log = logging.getLogger(__name__)
 
 PreviewLink = ServiceLink[PreviewSpec, PreviewReport, PreviewView]
 DEADLINE_MARGIN_S: Final = 0.2
@@ -49,6 +52,8 @@ class PreviewControl:
         await self._link.wait_until_settled(desired, patience_s)
         if self._link.desired.revision != desired.revision:
             return f"replaced by a newer request: preview {self._link.desired.spec}"
+        if self._link.refusal is not None:
+            return f"preview service refused the request: {self._link.refusal}"
         return _result(desired.spec, self._link.view)
 
     def renew_passphrase(self) -> None:
@@ -58,6 +63,7 @@ class PreviewControl:
         """
         spec = self._link.desired.spec
         if spec.passphrase:
+            _log.info("preview: a caller has lost access; the stream gets a new passphrase")
             no_passphrase = PreviewSpec(enabled=True, profile=spec.profile)
             self._link.request(self._model.spec(no_passphrase, enabled=True, profile=None))
 
