@@ -85,7 +85,7 @@ class GatewayCollector(Collector):
         )
         durations = HistogramFamily(
             f"{_PREFIX}_request_duration_seconds",
-            "How long calls took; a stream from its first to its last message.",
+            "How long calls took, from arrival to end.",
             labels=("method",),
         )
         for method, stats in methods:

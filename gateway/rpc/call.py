@@ -7,7 +7,6 @@ from urllib.parse import unquote
 
 from google.protobuf.message import Message
 
-from common import request_id
 from common.interceptors import Call, RpcContext
 from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
@@ -56,14 +55,15 @@ class CallContext(Call):
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
         request: the newest message of the caller; None before the first.
         responded: whether a message has left for the caller.
-        answer: what a control action was answered, for the audit log.
+        response: the newest message to the caller, of control actions alone; serialised or not.
     """
 
-    __slots__ = ("answer", "peer", "principal", "request", "responded")
+    __slots__ = ("peer", "principal", "request", "responded", "response")
 
     method: Method
     principal: Principal | None
     request: Message | None
+    response: Message | bytes | None
 
     def __init__(self, method: Method, rpc: RpcContext) -> None:
         super().__init__(method, rpc)
@@ -71,12 +71,7 @@ class CallContext(Call):
         self.principal = None
         self.request = None
         self.responded = False
-        self.answer = ""
-
-    @property
-    def request_id(self) -> str:
-        """The ID that the caller gave the call in its metadata, or one of our own."""
-        return request_id.current()
+        self.response = None
 
     def remaining_s(self) -> float | None:
         """Returns the time until the caller's deadline; None without one."""

@@ -63,12 +63,12 @@ class Stats(Interceptor[CallContext]):
 
     @property
     def contract(self) -> Mapping[str, MethodStats]:
-        """The methods of the contract, by name."""
+        """The methods of the contract, by `Method.key`."""
         return self._contract
 
     @property
     def methods(self) -> Mapping[str, MethodStats]:
-        """All methods that were called, and all of the contract, by name."""
+        """All methods that were called, and all of the contract, by `Method.key`."""
         return self._contract | self._others
 
     @property
@@ -127,9 +127,9 @@ class Stats(Interceptor[CallContext]):
 
     def _of(self, call: CallContext) -> MethodStats:
         known = self._contract if call.method.of_contract else self._others
-        stats = known.get(call.method.name)
+        stats = known.get(call.method.key)
         if stats is None:
-            stats = known[call.method.name] = MethodStats()
+            stats = known[call.method.key] = MethodStats()
         return stats
 
     def _note_active(self, connection: str) -> None:
