@@ -1,12 +1,13 @@
 """Administration of a robot's credentials: initialize, add, revoke, rotate."""
 
+import stat
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from common.errors import UserError
-from common.private_files import directory_lock
+from common.private_files import directory_lock, write_all_private
 from gateway.access.ca import (
     certificate_info,
     issue_client_certificate,
@@ -15,10 +16,10 @@ from gateway.access.ca import (
 )
 from gateway.access.command import credentials_command
 from gateway.access.credential import Credential, Kind, State
-from gateway.access.directory import CredentialDirectory
+from gateway.access.directory import CredentialDirectory, read_public
 from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
-from gateway.access.store import Store, check_name
+from gateway.access.store import Store, check_name, store_text
 from gateway.access.token import hash_of, new_id, new_token
 
 _CA_DAYS: Final = 3650.0
@@ -26,6 +27,7 @@ _SERVER_DAYS: Final = 825.0
 """The longest lifetime that all current TLS libraries accept."""
 _CLIENT_DAYS: Final = 365.0
 _DAY_S: Final = 86_400
+_WRITABLE_BY_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH
 
 Issued: TypeAlias = tuple[Credential, LoginBundle]
 
@@ -71,19 +73,22 @@ class CredentialAdmin:
             again: replaces existing credentials, which become invalid.
 
         Raises:
-            UserError: there are credentials already, or a file can't be written.
+            UserError: there are credentials already, others may write to the directory, or a file can't be
+                written.
         """
         directory = self._directory
+        if directory.path.exists() and directory.path.stat().st_mode & _WRITABLE_BY_OTHERS:
+            raise UserError(
+                f"other users may write to {directory.path}, so that they could replace its files",
+                f"Type: chmod 700 {directory.path}, or choose another directory",
+            )
         with directory_lock(directory.path):
             if directory.store_file.exists() and not again:
                 raise UserError(
                     f"{directory.path} already has credentials",
                     f"Type: {credentials_command('list')}; with --again all of them are discarded",
                 )
-            directory.path.chmod(0o700)
-            self._write_new_ca(hosts)
-            # Last: a directory without a list is incomplete, and may be initialized again.
-            directory.write_store(Store())
+            self._replace_all(hosts, Store())
 
     def add(self, request: CredentialRequest) -> Issued:
         """Issues a credential. Its secret is in the login bundle alone.
@@ -148,10 +153,10 @@ class CredentialAdmin:
             UserError: the CA or the present certificate can't be read, or the new one can't be written.
         """
         directory = self._directory
-        ca = directory.ca.read()
-        with directory_lock(directory.path):
+        with directory.locked():
             known = tuple(hosts) if hosts is not None else self._hosts()
-            directory.server.write(issue_server_certificate(ca, self._robot, known, _SERVER_DAYS))
+            server = issue_server_certificate(directory.ca.read(), self._robot, known, _SERVER_DAYS)
+            write_all_private(directory.server.contents(server))
         return known
 
     def rotate_ca(self, hosts: Iterable[str] | None) -> tuple[Credential, ...]:
@@ -164,28 +169,38 @@ class CredentialAdmin:
             UserError: as `rotate_server`.
         """
         directory, now_s = self._directory, int(self._clock())
-        known = tuple(hosts) if hosts is not None else self._hosts()
-
-        def revoke_certificates(store: Store) -> tuple[Store, tuple[Credential, ...]]:
+        with directory.locked():
+            store = directory.read_store()
             revoked = tuple(
                 each
                 for each in store.credentials.values()
                 if each.kind is Kind.CERTIFICATE and each.state(now_s) in (State.VALID, State.NOT_YET)
             )
-            return store.revoking(revoked, now_s), revoked
-
-        revoked = directory.change_store(revoke_certificates)
-        with directory_lock(directory.path):
-            self._write_new_ca(known)
+            known = tuple(hosts) if hosts is not None else self._hosts()
+            self._replace_all(known, store.revoking(revoked, now_s))
         return revoked
 
-    def _write_new_ca(self, hosts: Iterable[str]) -> None:
+    def _replace_all(self, hosts: Iterable[str], store: Store) -> None:
         ca = new_ca(self._robot, _CA_DAYS)
-        self._directory.ca.write(ca)
-        self._directory.server.write(issue_server_certificate(ca, self._robot, hosts, _SERVER_DAYS))
+        server = issue_server_certificate(ca, self._robot, hosts, _SERVER_DAYS)
+        directory = self._directory
+        # The server's first: after a crash in between, `rotate server` repairs it with the CA that laptops
+        # know. The list last: a directory without one is incomplete, and may be initialized again.
+        write_all_private(
+            directory.server.contents(server)
+            | directory.ca.contents(ca)
+            | {directory.store_file: store_text(store).encode()}
+        )
 
     def _hosts(self) -> tuple[str, ...]:
-        return certificate_info(self._directory.server.read().certificate).hosts
+        """Returns those of the present certificate, whether or not it still has its key."""
+        files = self._directory.server
+        try:
+            return certificate_info(read_public(files.certificate, files.name)).hosts
+        except ValueError as error:
+            raise UserError(
+                f"{files.certificate} can't be parsed: {error}", "Name the hosts: --host"
+            ) from error
 
     def _issue(self, request: CredentialRequest) -> Issued:
         now_s, credential_id, begins_s = int(self._clock()), new_id(), request.begins_s

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import UserError
-from gateway.access.ca import KeyPair, certificate_info, key_matches
+from gateway.access.ca import KeyPair, certificate_info
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store
@@ -82,19 +82,13 @@ def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedA
     server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
     client_ca = read_public(tls.client_ca, "certificate authority") if tls.client_ca else None
     try:
-        matches = key_matches(server)
         ends_s = {"server_certificate": certificate_info(server.certificate).ends_s}
         if client_ca:
             ends_s["authority"] = certificate_info(client_ca).ends_s
     except ValueError as error:
         raise UserError(
-            f"a certificate or key of {tls.certificate} can't be parsed: {error}", "Both must be PEM"
+            f"the certificate authority {tls.client_ca} can't be parsed: {error}", "It must be PEM"
         ) from error
-    if not matches:
-        raise UserError(
-            f"{tls.key} is not the key of {tls.certificate}",
-            f"To replace both, type: {credentials_command('rotate server')}",
-        )
     return LoadedAccess(store, TlsMaterial(server, client_ca), ends_s)
 
 
