@@ -119,7 +119,7 @@ class _BenchRobot:
         finally:
             task.cancel()
 
-    def preview(self) -> "_PreviewInMemory":
+    def preview_connector(self) -> "_PreviewInMemory":
         return _PreviewInMemory()
 
 

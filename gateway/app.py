@@ -105,7 +105,7 @@ async def _report_health(gateway: Gateway) -> None:
     while True:
         seen = link.view
         gateway.health.set_serving(PREVIEW_HEALTH, serving=seen.service_reachable)
-        await link.changes.wait_until(partial(_has_changed, gateway, seen), OBSERVE_EVERY_S)
+        await link.changes.wait_until(partial(_has_changed, gateway, seen))
 
 
 def _has_changed(gateway: Gateway, seen: object) -> bool:

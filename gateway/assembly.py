@@ -55,7 +55,7 @@ class Outside(Protocol):
     def feeding(self, board: Board) -> AbstractContextManager[None]:
         """Writes the robot's values to the board while the block lasts."""
 
-    def preview(self) -> Connector[PreviewSpec, PreviewReport]:
+    def preview_connector(self) -> Connector[PreviewSpec, PreviewReport]:
         """Returns what opens connections to the preview service."""
 
 
@@ -86,7 +86,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
     model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
     name = f"preview service at {settings.preview.socket}"
-    link = ServiceLink(name, outside.preview(), Reconciler(first_revision, model))
+    link = ServiceLink(name, outside.preview_connector(), Reconciler(first_revision, model))
     control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
@@ -155,7 +155,7 @@ class ThisRobot:
             with intake(self._settings.sources, board):
                 yield
 
-    def preview(self) -> PreviewConnector:
+    def preview_connector(self) -> PreviewConnector:
         """Returns a connector to the configured socket."""
         return PreviewConnector(self._settings.preview.socket)
 

@@ -107,7 +107,7 @@ def list_all(config: Config = None, directory: Directory = None, as_json: AsJson
     table.add_row("id", "name", "role", "kind", "made", "ends", "state")
     for each in credentials:
         row = (each.credential_id, each.name, each.role.value, each.kind.value)
-        table.add_row(*row, _minute(each.made_s), _minute(each.ends_s), each.state(now_s).value)
+        table.add_row(*row, _minute(each.made_s), _minute(each.ends_s), each.validity(now_s).value)
     # Without a terminal, rich would fold the table at 80 columns.
     width = None if sys.stdout.isatty() else 160
     Console(highlight=False, markup=False, emoji=False, width=width).print(table)
@@ -203,7 +203,7 @@ def _as_json(credential: Credential, now_s: float) -> dict[str, Any]:
         "name": credential.name,
         "role": credential.role.value,
         "kind": credential.kind.value,
-        "state": credential.state(now_s).value,
+        "state": credential.validity(now_s).value,
         "made_unix_ms": unix_ms(credential.made_s),
         "begins_unix_ms": unix_ms(credential.begins_s),
         "ends_unix_ms": unix_ms(credential.ends_s),

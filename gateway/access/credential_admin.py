@@ -15,7 +15,7 @@ from gateway.access.ca import (
     new_ca,
 )
 from gateway.access.command import credentials_command
-from gateway.access.credential import Credential, Kind, State
+from gateway.access.credential import Credential, Kind, Validity
 from gateway.access.directory import CredentialDirectory, read_public
 from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
@@ -174,7 +174,8 @@ class CredentialAdmin:
             revoked = tuple(
                 each
                 for each in store.credentials.values()
-                if each.kind is Kind.CERTIFICATE and each.state(now_s) in (State.VALID, State.NOT_YET)
+                if each.kind is Kind.CERTIFICATE
+                and each.validity(now_s) in (Validity.VALID, Validity.NOT_YET)
             )
             known = tuple(hosts) if hosts is not None else self._hosts()
             self._replace_all(known, store.revoking(revoked, now_s))

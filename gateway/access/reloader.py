@@ -99,7 +99,6 @@ class CredentialReloader:
         directory: of the credentials.
         tls: files of the certificates; None without TLS.
         on_change: called with each new version.
-        clock: calendar time, seconds since 1970.
 
     Raises:
         UserError: the initial version can't be read.
@@ -110,14 +109,12 @@ class CredentialReloader:
         directory: CredentialDirectory,
         tls: TlsFiles | None,
         on_change: Callable[[LoadedAccess], None],
-        clock: Callable[[], float] = time.time,
     ) -> None:
         self._directory = directory
         self._tls = tls
         self._files = [directory.store_file]
         if tls:
             self._files += [each for each in (tls.certificate, tls.key, tls.client_ca) if each]
-        self._clock = clock
         self._on_change = on_change
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)
@@ -144,7 +141,7 @@ class CredentialReloader:
 
     def view(self, audit_error: str = "") -> AccessView:
         """Returns the state of access control that operators see."""
-        now_s = self._clock()
+        now_s = time.time()
         return AccessView(
             tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
             self._error,

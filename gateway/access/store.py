@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from common.errors import UserError
 from gateway.access.command import credentials_command
-from gateway.access.credential import Credential, Kind, State
+from gateway.access.credential import Credential, Kind, Validity
 from gateway.access.role import Role
 
 MAX_CREDENTIALS: Final = 512
@@ -52,7 +52,7 @@ class Store:
             each
             for each in self.credentials.values()
             if name_or_id in (each.name, each.credential_id)
-            and each.state(now_s) not in (State.REVOKED, State.EXPIRED)
+            and each.validity(now_s) not in (Validity.REVOKED, Validity.EXPIRED)
         )
         if not found:
             raise UserError(

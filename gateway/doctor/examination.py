@@ -8,7 +8,7 @@ from pathlib import Path
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.access.command import credentials_command
-from gateway.access.credential import State
+from gateway.access.credential import Validity
 from gateway.access_control import read_access
 from gateway.config import SecuritySettings, SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
@@ -43,7 +43,7 @@ def _access(settings: SecuritySettings, directory: Path) -> Finding:
     except UserError as error:
         return wrong("access", error.what, "The gateway does not start with it", error.remedy)
     now_s = time.time()
-    valid = sum(each.state(now_s) is State.VALID for each in loaded.store.credentials.values())
+    valid = sum(each.validity(now_s) is Validity.VALID for each in loaded.store.credentials.values())
     if not valid:
         return note(
             "access",

@@ -74,7 +74,7 @@ class GatewayCollector(Collector):
         yield Gauge(
             f"{_PREFIX}_preview_link_failures",
             "Failures in a row to connect to the preview service.",
-            value=self._preview_link.health.failures,
+            value=self._preview_link.failures,
         )
         yield from _stream(now)
 

@@ -25,14 +25,14 @@ class Peer:
         address: for people: "10.0.0.5:41234", or "local socket" for a Unix one.
         host: the address without its port.
         ip: IPv4 also where IPv6 carries it (RFC 4291 2.5.5.2); None for a Unix socket.
-        site: what one sender can't change at will, see `address_prefix`.
+        address_prefix: what one sender can't change at will, see `gateway.access.address_prefix`.
     """
 
     connection: str
     address: str
     host: str
     ip: str | None
-    site: str
+    address_prefix: str
 
 
 @lru_cache(maxsize=_REMEMBERED_CONNECTIONS)

@@ -16,7 +16,7 @@ class HealthState(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Health:
+class RobotHealth:
     """The verdict and its reason in one sentence."""
 
     state: HealthState
@@ -28,10 +28,10 @@ class Health:
         return self.state is HealthState.OK
 
 
-HEALTHY: Final = Health(HealthState.OK, "robot healthy")
+HEALTHY: Final = RobotHealth(HealthState.OK, "robot healthy")
 
 
-def assess(required: Iterable[tuple[str, Freshness]]) -> Health:
+def assess(required: Iterable[tuple[str, Freshness]]) -> RobotHealth:
     """Returns the health that follows from the required sources.
 
     Args:
@@ -39,7 +39,7 @@ def assess(required: Iterable[tuple[str, Freshness]]) -> Health:
     """
     for name, freshness in required:
         if not freshness.available:
-            return Health(HealthState.DEGRADED, f"waiting for {name}")
+            return RobotHealth(HealthState.DEGRADED, f"waiting for {name}")
         if freshness.stale:
-            return Health(HealthState.DEGRADED, f"{name} stale")
+            return RobotHealth(HealthState.DEGRADED, f"{name} stale")
     return HEALTHY

@@ -10,7 +10,7 @@ from gateway.status.command import Command, effective_command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
-from gateway.status.health import Health, assess
+from gateway.status.health import RobotHealth, assess
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.runtime import UNKNOWN, Runtime
 from gateway.status.source_view import SourceView, source_view
@@ -66,7 +66,7 @@ class Snapshot:
     at_s: float
     identity: Identity
     gateway: Runtime
-    health: Health
+    health: RobotHealth
     samples: Mapping[SourceSpec[Any], Sample[Any]]
     command: Sample[Command]
     preview: PreviewView

@@ -114,15 +114,17 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         state=state,
         profile=_PROFILE_OF.get(message.profile),
         last_error=message.last_error,
-        listener=_equal(Listener, message.listener) if message.HasField("listener") else None,
-        stream=_equal(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
-        encoder=_equal(Encoder, message.encoder) if message.HasField("encoder") else None,
-        measurement=_equal(Measurement, message.measurement) if message.HasField("measurement") else None,
-        counters=_equal(Counters, message.counters),
+        listener=_same_fields(Listener, message.listener) if message.HasField("listener") else None,
+        stream=_same_fields(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
+        encoder=_same_fields(Encoder, message.encoder) if message.HasField("encoder") else None,
+        measurement=_same_fields(Measurement, message.measurement)
+        if message.HasField("measurement")
+        else None,
+        counters=_same_fields(Counters, message.counters),
     )
 
 
-def _equal(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
+def _same_fields(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
     """Returns the equally named fields of a message, None for an unset optional one, and those converted."""
     unset = {f.name for f in message.DESCRIPTOR.fields if f.has_presence and not message.HasField(f.name)}
     values: Any = {f.name: None if f.name in unset else getattr(message, f.name) for f in fields(kind)}

@@ -13,7 +13,7 @@ from common.reasons import Reason
 from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.rpc.call import CallContext
 from gateway.rpc.methods import Method
-from gateway.rpc.ports import AuditTrail, EventSink
+from gateway.rpc.ports import AuditSink, EventSink
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 
@@ -27,13 +27,13 @@ class Audit(Interceptor[CallContext]):
 
     Args:
         events: operators see the actions there.
-        trail: keeps them.
+        log: keeps them.
         refusals: limits how many refusals of one caller are recorded: a flood of them must fill neither.
     """
 
-    def __init__(self, events: EventSink, trail: AuditTrail, refusals: RefusalLimiter) -> None:
+    def __init__(self, events: EventSink, log: AuditSink, refusals: RefusalLimiter) -> None:
         self._events = events
-        self._trail = trail
+        self._log = log
         self._refusals = refusals
 
     def applies_to(self, method: Method) -> bool:
@@ -68,7 +68,7 @@ class Audit(Interceptor[CallContext]):
     def _record_refusal(self, call: CallContext, error: DomainError) -> None:
         if isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:
             return
-        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
+        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.address_prefix)
         if left_out is None:
             return
         more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
@@ -87,7 +87,7 @@ class Audit(Interceptor[CallContext]):
             credential=principal.credential_ids[0] if principal else "",
             request_id=request_id.current(),
         )
-        self._trail.record(action)
+        self._log.record(action)
         self._events.note(_event(action))
 
 

@@ -9,7 +9,7 @@ import pytest
 from cryptography.x509 import load_pem_x509_certificate
 
 from common.errors import UserError
-from gateway.access.credential import Kind, State
+from gateway.access.credential import Kind, Validity
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
@@ -28,7 +28,7 @@ def admin(tmp_path: Path) -> CredentialAdmin:
 def states(path: Path) -> list[tuple[str, str]]:
     """Names and states, oldest first."""
     kept = CredentialDirectory(path).read_store().credentials.values()
-    return [(each.name, each.state(NOW_S).value) for each in kept]
+    return [(each.name, each.validity(NOW_S).value) for each in kept]
 
 
 def test_changes_at_once_are_all_kept(admin: CredentialAdmin, tmp_path: Path) -> None:
@@ -47,7 +47,7 @@ def test_a_rotated_token_replaces_the_old_one_now_or_later(admin: CredentialAdmi
     admin.rotate(new.credential_id, overlap_s=60)
     assert states(tmp_path) == [("anna", "revoked"), ("anna", "valid"), ("anna", "valid")]
     kept = CredentialDirectory(tmp_path).read_store().credentials[new.credential_id]
-    assert kept.state(NOW_S + 60) is State.EXPIRED
+    assert kept.validity(NOW_S + 60) is Validity.EXPIRED
 
 
 def test_who_has_two_is_asked_which(admin: CredentialAdmin) -> None:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
-from gateway.status.health import Health, HealthState, assess
+from gateway.status.health import HealthState, RobotHealth, assess
 from gateway.status.snapshot import SourceRule
 from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Odometry, Received, Vision
@@ -90,4 +90,4 @@ def test_health_follows_the_contract_line_by_line(
 
 
 def test_a_robot_without_both_sources_is_healthy() -> None:
-    assert assess([]) == Health(HealthState.OK, "robot healthy")
+    assert assess([]) == RobotHealth(HealthState.OK, "robot healthy")
