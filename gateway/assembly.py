@@ -25,20 +25,20 @@ from gateway.links.reconciler import Reconciler
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
-from gateway.rpc.event_stream import EventStream
+from gateway.rpc.calls.methods import CONTRACT
+from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import Admission, RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT
-from gateway.rpc.recipient import Recipients
-from gateway.rpc.response_cache import ResponseCache
+from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.response_cache import ResponseCache
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.rpc.server import SERVICE, Interceptors, Services
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
 from gateway.rpc.services.status import StatusService
-from gateway.rpc.status_stream import StatusStream
 from gateway.shown_settings import shown_settings
 from gateway.state import State
 from gateway.status.board import Board

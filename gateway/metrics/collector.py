@@ -12,10 +12,10 @@ from prometheus_client.registry import Collector
 
 from gateway.links.preview.control import PreviewLink
 from gateway.metrics.loop_delay import LoopDelay
-from gateway.rpc.event_stream import EventStream
+from gateway.rpc.calls.ports import SnapshotSource
 from gateway.rpc.interceptors.stats import Stats
-from gateway.rpc.ports import SnapshotSource
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot

@@ -17,14 +17,14 @@ from common.health import Health
 from common.interceptors import Behavior, Chain
 from common.rpc import STOP_GRACE_S, new_server
 from gateway.config import GrpcSettings
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT, Method
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService

@@ -125,6 +125,23 @@ def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) ->
     assert not strangers
 
 
+def test_the_gateways_packages_do_not_import_each_other_in_circles() -> None:
+    modules = {str(path.relative_to(ROOT)) for path in (ROOT / "gateway").rglob("*.py")}
+    packages = {str(Path(file).parent) for file in modules}
+    imported: dict[str, set[str]] = {package: set() for package in packages}
+    for found in ALL:
+        path = found.module.replace(".", "/")
+        home = path if path in packages else str(Path(path).parent)
+        if found.importer in modules and home in packages and f"{path}.py" in modules:
+            imported[str(Path(found.importer).parent)].add(home)
+    for package, others in imported.items():
+        others.discard(package)
+    while leaves := {package for package, others in imported.items() if not others & imported.keys()}:
+        for leaf in leaves:
+            del imported[leaf]
+    assert not imported, "each of these is part of a circle, or imports one"
+
+
 def test_the_fence_sees_what_it_should() -> None:
     """A fence that reads no imports would let everybody through."""
     assert offenders("common/gst.py", ("gi",))

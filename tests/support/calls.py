@@ -7,8 +7,8 @@ from typing import Any
 import grpc
 
 from common.interceptors import Chain, Interceptor
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import CONTRACT, Method
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
 
 PEER = "ipv4:10.0.0.5:41234"
 

@@ -11,9 +11,9 @@ from common.errors import DomainError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.access.refusal_limiter import RefusalLimiter
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method
-from gateway.rpc.ports import AuditSink, EventSink
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method
+from gateway.rpc.calls.ports import AuditSink, EventSink
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 

@@ -16,9 +16,9 @@ from common.reasons import Reason
 from gateway.access.authenticator import Authenticator, combined
 from gateway.access.credential import Principal
 from gateway.access.lockout import Lockout
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method, Open
-from gateway.rpc.ports import CredentialFiles, StreamKey
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method, Open
+from gateway.rpc.calls.ports import CredentialFiles, StreamKey
 
 _log = logging.getLogger(__name__)
 

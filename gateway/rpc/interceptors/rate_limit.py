@@ -22,7 +22,7 @@ from common.interceptors import Interceptor
 from common.reasons import Reason
 from common.token_bucket import TokenBucket
 from gateway.config import LimitSettings
-from gateway.rpc.call import CallContext, Peer
+from gateway.rpc.calls.call import CallContext, Peer
 
 QUIET_AFTER_S: Final = 1.0
 """A connection without streams and without calls for this long gives way when room is needed."""

@@ -12,7 +12,7 @@ from common.errors import DomainError
 from common.grpc_errors import status_code
 from common.histogram import Histogram
 from common.interceptors import Interceptor
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
 
 RECENT_S: Final = 10.0
 """A connection that called, or was sent something, this recently counts as a client."""

@@ -3,9 +3,9 @@
 from typing import Final
 
 from common.bind import bracketed
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
 from gateway.rpc.mapping.freshness import freshness_fields
-from gateway.rpc.recipient import Recipient
 from gateway.status.freshness import Sample
 from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb

@@ -3,13 +3,13 @@
 import math
 from typing import Final
 
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
 from gateway.rpc.mapping.faults import fault_message
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
-from gateway.rpc.recipient import Recipient
 from gateway.status.command import Command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.freshness import Sample

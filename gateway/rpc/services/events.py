@@ -2,10 +2,10 @@
 
 from collections.abc import AsyncIterator
 
-from gateway.rpc.call import CallContext
-from gateway.rpc.event_stream import EventStream
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.mapping.enums import least_severity_from
 from gateway.rpc.mapping.events import position_from
+from gateway.rpc.responses.event_stream import EventStream
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest
 
 

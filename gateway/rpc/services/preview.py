@@ -1,11 +1,11 @@
 """The live preview: switched on and off."""
 
 from gateway.links.preview.control import PreviewControl
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.ports import SnapshotSource
+from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.mapping.enums import profile_from
 from gateway.rpc.mapping.preview import preview_status
-from gateway.rpc.ports import SnapshotSource
-from gateway.rpc.recipient import Recipients
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
 
 

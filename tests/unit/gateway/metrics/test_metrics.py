@@ -15,9 +15,9 @@ from prometheus_client.parser import text_string_to_metric_families
 from common.histogram import Histogram
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats, Stats
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import (

@@ -14,8 +14,8 @@ from gateway.config import SourceSettings
 from gateway.config.sources import KINDS
 from gateway.ros.readers import reader_for, registry, types_of
 from gateway.ros.readers.registry import reads
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
-from gateway.rpc.recipient import Recipient
 from gateway.status.board import Board
 from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot, SourceRule

@@ -11,7 +11,7 @@ from common.reasons import Reason
 from gateway.access.credential import Principal
 from gateway.access.refusal_limiter import BURST, RefusalLimiter
 from gateway.access.role import Role
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, Event

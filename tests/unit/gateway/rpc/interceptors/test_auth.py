@@ -14,7 +14,7 @@ from gateway.access.lockout import Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.auth import Auth
 from tests.support.calls import serve
 

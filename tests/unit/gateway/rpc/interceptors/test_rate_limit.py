@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.config import LimitSettings
-from gateway.rpc.call import peer_of
+from gateway.rpc.calls.call import peer_of
 from gateway.rpc.interceptors.rate_limit import (
     FORGIVEN_AFTER_S,
     QUIET_AFTER_S,

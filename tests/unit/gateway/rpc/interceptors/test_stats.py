@@ -7,9 +7,9 @@ import pytest
 from common.errors import InvalidRequestError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.stats import RECENT_S, Stats
-from gateway.rpc.methods import CONTRACT, Method
 from tests.support.calls import call_of, serve
 
 

@@ -10,12 +10,12 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
+from gateway.rpc.calls.methods import Method
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.methods import Method
-from gateway.rpc.recipient import Recipient
 from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board
 from gateway.status.event_log import OperatorEvent

@@ -11,8 +11,8 @@ from typing import Final, TypeAlias
 
 from google.protobuf.message import Message
 
-from gateway.rpc.ports import StatusSource
-from gateway.rpc.recipient import Recipient
+from gateway.rpc.calls.ports import StatusSource
+from gateway.rpc.calls.recipient import Recipient
 from gateway.status.snapshot import Snapshot
 
 REUSE_S: Final = 0.005

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.calls.recipient import Recipient
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take

@@ -10,7 +10,7 @@ from google.protobuf.message import Message
 from common.interceptors import Call, RpcContext
 from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
-from gateway.rpc.methods import Method
+from gateway.rpc.calls.methods import Method
 
 _LOCAL_SOCKET: Final = "local socket"
 _REMEMBERED_CONNECTIONS: Final = 256
