@@ -11,8 +11,10 @@ import grpc
 
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
+from gateway.links.preview.control import PreviewLink
 from gateway.metrics.endpoint import serving_metrics
 from gateway.rpc.server import serving
+from gateway.status.preview import PreviewView
 
 _log = logging.getLogger(__name__)
 
@@ -66,7 +68,6 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 tasks.create_task(gateway.status_stream.run(), name="status-stream"),
                 tasks.create_task(gateway.access.run(), name="access"),
                 tasks.create_task(_observe(gateway), name="observer"),
-                tasks.create_task(_report_health(gateway), name="health"),
             ]
             try:
                 yield port
@@ -91,25 +92,17 @@ async def _metrics(gateway: Gateway) -> AsyncIterator[None]:
 
 
 async def _observe(gateway: Gateway) -> None:
-    """Updates faults and events, whether or not an operator is connected."""
-    link, presence = gateway.preview_link, gateway.interceptors.presence
-    while True:
-        seen = gateway.state.observe(gateway.access.view())
-        presence.report_joined()
-        await link.changes.wait_until(partial(_has_changed, gateway, seen.preview), OBSERVE_EVERY_S)
-
-
-async def _report_health(gateway: Gateway) -> None:
-    """Keeps the health service's entry for the preview up to date."""
+    """Updates faults, events and the preview's health, whether or not an operator is connected."""
     link = gateway.preview_link
     while True:
-        seen = link.view
+        seen = gateway.state.observe(gateway.access.view()).preview
         gateway.health.set_serving(PREVIEW_HEALTH, serving=seen.service_reachable)
-        await link.changes.wait_until(partial(_has_changed, gateway, seen))
+        gateway.interceptors.presence.report_joined()
+        await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
 
 
-def _has_changed(gateway: Gateway, seen: object) -> bool:
-    return gateway.preview_link.view is not seen
+def _has_changed(link: PreviewLink, seen: PreviewView) -> bool:
+    return link.view is not seen
 
 
 def _warn_of_exposure(security: SecuritySettings) -> None:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
 from common.health import Health
@@ -46,7 +47,7 @@ from gateway.status.board import Board
 _log = logging.getLogger(__name__)
 
 _PASSPHRASE_BYTES: Final = 24
-"""32 characters of base64: 192 bits, more than the key of SRT's AES-128 holds."""
+"""32 characters of base64: 192 random bits, beyond guessing whatever the length of SRT's AES key."""
 
 
 class Outside(Protocol):
@@ -84,7 +85,9 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     """
     # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-    model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
+    model = PreviewModel(
+        partial(secrets.token_urlsafe, _PASSPHRASE_BYTES) if settings.preview_encrypted else None
+    )
     name = f"preview service at {settings.preview.socket}"
     link = ServiceLink(name, outside.preview_connector(), Reconciler(first_revision, model))
     control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
@@ -158,7 +161,3 @@ class ThisRobot:
     def preview_connector(self) -> PreviewConnector:
         """Returns a connector to the configured socket."""
         return PreviewConnector(self._settings.preview.socket)
-
-
-def _new_passphrase() -> str:
-    return secrets.token_urlsafe(_PASSPHRASE_BYTES)

@@ -47,9 +47,6 @@ class Lockout:
         self._entries: dict[tuple[str, str], _Entry] = {}
         """Ordered by last failure, the latest at the end."""
 
-    def __len__(self) -> int:
-        return len(self._entries)
-
     def admit(self, address_prefix: str, credential_id: str) -> None:
         """Checks that an attempt may be made.
 

@@ -1,6 +1,7 @@
 """The metrics by name. docs/metrics.md explains each; a test holds the page and this module together."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from prometheus_client import CollectorRegistry, generate_latest
@@ -71,10 +72,9 @@ class GatewayCollector(Collector):
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
-        yield Gauge(
-            f"{_PREFIX}_preview_link_failures",
-            "Failures in a row to connect to the preview service.",
-            value=self._preview_link.failures,
+        failures = self._preview_link.failures
+        yield _gauge(
+            "preview_link_failures", "Failures in a row to connect to the preview service.", failures
         )
         yield from _stream(now)
 
@@ -104,98 +104,93 @@ class GatewayCollector(Collector):
         )
 
     def _streams(self) -> Iterator[Metric]:
-        streams = Gauge(f"{_PREFIX}_streams", "Open streams.", labels=("method",))
-        for method, stats in sorted(self._stats.contract.items()):
-            if stats.open:
-                streams.add_metric((method,), stats.open)
-        yield streams
-        yield CounterFamily(
-            f"{_PREFIX}_statuses_skipped",
-            "Statuses that slow readers did not get, because they got newer ones.",
-            value=self._status_stream.skipped,
-        )
-        yield CounterFamily(
-            f"{_PREFIX}_event_gaps", "Times a subscriber missed events.", value=self._event_stream.gaps
-        )
+        open_streams = {name: each.open for name, each in sorted(self._stats.contract.items()) if each.open}
+        yield _gauges("streams", "Open streams.", "method", open_streams)
+        skipped = "Statuses that slow readers did not get, because they got newer ones."
+        yield _counter("statuses_skipped", skipped, self._status_stream.skipped)
+        yield _counter("event_gaps", "Times a subscriber missed events.", self._event_stream.gaps)
+
+
+def _gauge(name: str, what: str, value: float) -> Metric:
+    return Gauge(f"{_PREFIX}_{name}", what, value=value)
+
+
+def _gauges(name: str, what: str, label: str, values: Mapping[str, float]) -> Metric:
+    """Returns a gauge with a value for each value of its label."""
+    family = Gauge(f"{_PREFIX}_{name}", what, labels=(label,))
+    for labelled, value in values.items():
+        family.add_metric((labelled,), value)
+    return family
+
+
+def _info(name: str, what: str, /, **labels: str) -> Metric:
+    """Returns a gauge that is 1, for the sake of its labels."""
+    family = Gauge(f"{_PREFIX}_{name}", what, labels=tuple(labels))
+    family.add_metric(tuple(labels.values()), 1)
+    return family
+
+
+def _counter(name: str, what: str, value: float) -> Metric:
+    return CounterFamily(f"{_PREFIX}_{name}", what, value=value)
 
 
 def _gateway(now: Snapshot) -> Iterator[Metric]:
-    runtime = now.gateway
-    build = Gauge(f"{_PREFIX}_build_info", "Always 1.", labels=("name", "version", "revision"))
-    build.add_metric((now.identity.name, now.identity.version, runtime.revision), 1)
-    yield build
-    yield Gauge(f"{_PREFIX}_uptime_seconds", "Since the gateway started.", value=runtime.uptime_ms / 1000)
-    clients = runtime.client_count
-    yield Gauge(f"{_PREFIX}_clients", "Connections that called, or got something, lately.", value=clients)
-    yield Gauge(f"{_PREFIX}_robot_ready", "1 when the robot can take work.", value=float(now.health.ready))
+    identity, runtime = now.identity, now.gateway
+    yield _info(
+        "build_info", "Always 1.", name=identity.name, version=identity.version, revision=runtime.revision
+    )
+    yield _gauge("uptime_seconds", "Since the gateway started.", runtime.uptime_ms / 1000)
+    yield _gauge("clients", "Connections that called, or got something, lately.", runtime.client_count)
+    yield _gauge("robot_ready", "1 when the robot can take work.", now.health.ready)
 
 
 def _sources(now: Snapshot) -> Iterator[Metric]:
-    fresh = Gauge(f"{_PREFIX}_source_fresh", "1 while its newest value can be relied on.", labels=("source",))
-    age = Gauge(
-        f"{_PREFIX}_source_age_seconds",
-        "Age of its newest value; absent before the first.",
-        labels=("source",),
-    )
-    for source in now.sources:
-        fresh.add_metric((source.name,), float(source.freshness.fresh))
-        if source.freshness.available:
-            age.add_metric((source.name,), source.freshness.age_ms / 1000)
-    yield from (fresh, age)
+    freshness = {source.spec.name: source.freshness for source in now.sources}
+    fresh = {name: float(each.fresh) for name, each in freshness.items()}
+    yield _gauges("source_fresh", "1 while its newest value can be relied on.", "source", fresh)
+    ages_s = {name: each.age_ms / 1000 for name, each in freshness.items() if each.available}
+    yield _gauges("source_age_seconds", "Age of its newest value; absent before the first.", "source", ages_s)
 
 
 def _faults(now: Snapshot) -> Metric:
-    faults = Gauge(f"{_PREFIX}_faults", "Active faults.", labels=("severity",))
-    for severity in Severity:
-        count = sum(fault.active and fault.condition.severity is severity for fault in now.faults)
-        faults.add_metric((severity.value,), count)
-    return faults
+    active = Counter(fault.condition.severity for fault in now.faults if fault.active)
+    return _gauges("faults", "Active faults.", "severity", {each.value: active[each] for each in Severity})
 
 
 def _preview(preview: PreviewView) -> Iterator[Metric]:
-    state = Gauge(f"{_PREFIX}_preview_state", "1 for the state it is in.", labels=("state",))
-    for each in PreviewState:
-        state.add_metric((each.value,), float(preview.state is each))
-    yield state
-    reachable = float(preview.service_reachable)
-    yield Gauge(f"{_PREFIX}_preview_reachable", "1 while its service answers.", value=reachable)
+    states = {each.value: float(preview.state is each) for each in PreviewState}
+    yield _gauges("preview_state", "1 for the state it is in.", "state", states)
+    yield _gauge("preview_reachable", "1 while its service answers.", preview.service_reachable)
     counters = preview.counters
-    for name, what, count in (
-        ("starts", "Pipelines started.", counters.starts),
-        ("restarts", "Those of them after a fault.", counters.restarts),
-        ("faults", "Times it became faulted.", counters.faults),
-        ("fallbacks", "Encoders that were passed over for the next one.", counters.fallbacks),
-    ):
-        yield CounterFamily(f"{_PREFIX}_preview_{name}", what, value=count)
+    yield _counter("preview_starts", "Pipelines started.", counters.starts)
+    yield _counter("preview_restarts", "Those of them after a fault.", counters.restarts)
+    yield _counter("preview_faults", "Times it became faulted.", counters.faults)
+    passed_over = "Encoders that were passed over for the next one."
+    yield _counter("preview_fallbacks", passed_over, counters.fallbacks)
 
 
 def _stream(now: Snapshot) -> Iterator[Metric]:
     """Of the running preview; nothing while there is none, or while its figures are old."""
     if encoder := now.preview.encoder:
-        info = Gauge(
-            f"{_PREFIX}_preview_encoder_info",
+        yield _info(
+            "preview_encoder_info",
             "Always 1: which encoder runs, and which was wanted.",
-            labels=("encoder", "hardware", "wanted"),
+            encoder=encoder.name,
+            hardware=str(encoder.hardware).lower(),
+            wanted=encoder.wanted,
         )
-        info.add_metric((encoder.name, str(encoder.hardware).lower(), encoder.wanted), 1)
-        yield info
     if stream := now.preview.stream:
         target = stream.target_bitrate_kbps * 1000
-        yield Gauge(f"{_PREFIX}_preview_target_bits_per_second", "The encoder's target.", value=target)
+        yield _gauge("preview_target_bits_per_second", "The encoder's target.", target)
     measured = now.preview_measured.value
     if measured is None or now.preview_measured.freshness.stale:
         return
-    for name, what, value in (
-        ("viewers", "Connected to the stream.", measured.viewer_count),
-        ("bits_per_second", "Leaving for each viewer.", measured.bitrate_kbps * 1000),
-        ("frames_per_second", "Leaving.", measured.fps),
-        ("frame_age_seconds", "Of the newest one that left.", measured.last_frame_age_ms / 1000),
-        ("worst_rtt_seconds", "Of all viewers.", _per_thousand(measured.worst_rtt_ms)),
-        ("worst_loss_percent", "Of all viewers.", measured.worst_loss_percent),
-    ):
-        if value is not None:
-            yield Gauge(f"{_PREFIX}_preview_{name}", what, value=value)
-
-
-def _per_thousand(value: float | None) -> float | None:
-    return None if value is None else value / 1000
+    yield _gauge("preview_viewers", "Connected to the stream.", measured.viewer_count)
+    yield _gauge("preview_bits_per_second", "Leaving for each viewer.", measured.bitrate_kbps * 1000)
+    yield _gauge("preview_frames_per_second", "Leaving.", measured.fps)
+    age_s = measured.last_frame_age_ms / 1000
+    yield _gauge("preview_frame_age_seconds", "Of the newest one that left.", age_s)
+    if measured.worst_rtt_ms is not None:
+        yield _gauge("preview_worst_rtt_seconds", "Of all viewers.", measured.worst_rtt_ms / 1000)
+    if measured.worst_loss_percent is not None:
+        yield _gauge("preview_worst_loss_percent", "Of all viewers.", measured.worst_loss_percent)

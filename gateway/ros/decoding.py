@@ -1,5 +1,6 @@
 """Decodes one serialised message into a value."""
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.serialization import deserialize_message
@@ -9,26 +10,19 @@ from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import is_header_and_list, reader_for
 
 
-class Decoder:
-    """Decodes the messages of one source.
+def decoder_of(source: SourceSettings, message_type: Any) -> Callable[[bytes], Any]:
+    """Returns the function that makes a value of a message; None of one that holds nothing usable.
 
-    Args:
-        source: its settings.
-        message_type: Python class of the messages.
+    Errors of the deserialiser pass.
     """
+    read, max_items, add_truncated = reader_for(source), max_list_items(source), source.spec.add_truncated
 
-    def __init__(self, source: SourceSettings, message_type: Any) -> None:
-        self._source = source
-        self._message_type = message_type
-        self._read = reader_for(source)
-        self._max_items = max_list_items(source)
-
-    def decode(self, raw: bytes) -> Any:
-        """Returns the value; None if the message holds nothing usable. Errors of the deserialiser pass."""
-        raw, truncated = truncate_list(raw, self._max_items) if self._max_items else (raw, 0)
-        value = self._read(deserialize_message(raw, self._message_type), self._source)
-        add_truncated = self._source.spec.add_truncated
+    def decode(raw: bytes) -> Any:
+        raw, truncated = truncate_list(raw, max_items) if max_items else (raw, 0)
+        value = read(deserialize_message(raw, message_type), source)
         return add_truncated(value, truncated) if truncated and add_truncated and value else value
+
+    return decode
 
 
 def max_list_items(source: SourceSettings) -> int | None:

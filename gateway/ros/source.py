@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gateway.config import SourceSettings
-from gateway.ros.decoding import Decoder
+from gateway.ros.decoding import decoder_of
 from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.values import Received
@@ -22,15 +22,15 @@ _MAX_CLOCK_GAP_S = 50e-6
 _CLOCK_TRIES = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class SourceCounts:
     """Outcome of a source's messages so far."""
 
-    values: int
+    values: int = 0
     """Messages that became a value."""
-    without_value: int
+    without_value: int = 0
     """Messages that held nothing usable: a velocity of NaN, for example."""
-    failures: int
+    failures: int = 0
     """Messages that could not be decoded."""
 
 
@@ -50,22 +50,12 @@ class Source:
         self._settings = settings
         self._spec = settings.spec
         self._subscription = subscription
-        self._decoder = Decoder(settings, subscription.msg_type)
+        self._decode = decoder_of(settings, subscription.msg_type)
         self._board = board
         self._emptied_at_s = created_at_s
         self._paused_until_s = created_at_s
         self._warned_at_s: float | None = None
-        self._values = self._without_value = self._failures = 0
-
-    @property
-    def counts(self) -> SourceCounts:
-        """Outcome of the messages so far."""
-        return SourceCounts(self._values, self._without_value, self._failures)
-
-    @property
-    def topic(self) -> str:
-        """The topic as configured."""
-        return self._settings.topic
+        self.counts = SourceCounts()
 
     @property
     def publisher_count(self) -> int:
@@ -96,18 +86,18 @@ class Source:
             raw, info = taken
             self._hand_over(raw, received_at(info["received_timestamp"], now, self._emptied_at_s))
         except Exception as error:  # noqa: BLE001 - one bad message or reader must not end the sampling
-            self._failures += 1
+            self.counts.failures += 1
             self._warn(error, now.monotonic_s)
         return True
 
     def _hand_over(self, raw: bytes, at_s: float) -> None:
-        value = self._decoder.decode(raw)
+        value = self._decode(raw)
         if value is None:
-            self._without_value += 1
+            self.counts.without_value += 1
             return
         # The one place where a value passes from this thread to the others.
         self._board[self._spec] = Received(value, at_s)
-        self._values += 1
+        self.counts.values += 1
 
     def _warn(self, error: Exception, now_s: float) -> None:
         if self._warned_at_s is not None and now_s - self._warned_at_s < _WARN_EVERY_S:
@@ -117,7 +107,7 @@ class Source:
             "%s (%s): a message can't be read, %d so far: %s: %s",
             self._settings.topic,
             self._settings.type,
-            self._failures,
+            self.counts.failures,
             type(error).__name__,
             error,
         )

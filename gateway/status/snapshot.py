@@ -12,7 +12,6 @@ from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
 from gateway.status.health import RobotHealth, assess
 from gateway.status.preview import Measurement, PreviewView
-from gateway.status.runtime import UNKNOWN, Runtime
 from gateway.status.source_view import SourceView, source_view
 from gateway.status.sources import (
     EFFECTIVE_COMMAND,
@@ -34,6 +33,29 @@ class Identity:
     name: str
     version: str
     insecure: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Runtime:
+    """Build and counters of the running gateway.
+
+    Attributes:
+        revision: source revision of the build; empty if unknown.
+        boot_id: the kernel's boot ID; empty if unknown.
+        uptime_ms: since the gateway started.
+        client_count: connections with a recent request.
+        requests_served: calls answered since the start.
+        requests_refused: calls refused since the start.
+        run_id: unique for each start of the gateway; qualifies the sequence numbers of events.
+    """
+
+    revision: str
+    boot_id: str
+    uptime_ms: int
+    client_count: int
+    requests_served: int
+    requests_refused: int
+    run_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +103,9 @@ class Snapshot:
         return self.samples.get(spec, ABSENT)
 
 
+_UNKNOWN: Final = Runtime("", "", 0, 0, 0, 0)
+
+
 def take(
     *,
     identity: Identity,
@@ -90,7 +115,7 @@ def take(
     events: tuple[OperatorEvent, ...],
     now_s: float,
     faults: tuple[Fault, ...] = (),
-    gateway: Runtime = UNKNOWN,
+    gateway: Runtime = _UNKNOWN,
     access: AccessView = UNGUARDED,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""

@@ -5,7 +5,6 @@ docs/adding-a-source.md lists the steps that remain for a new kind: a reader and
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum, auto
 from functools import cached_property
 from typing import Any, Final, Generic, TypeVar
 
@@ -28,15 +27,6 @@ ValueT = TypeVar("ValueT")
 _DAY_MS: Final = 86_400_000
 
 
-class Origin(Enum):
-    """The thread that writes a source onto the board."""
-
-    ROS = auto()
-    """The ROS sampler, from a topic of the configuration."""
-    PLATFORM = auto()
-    """The platform sampler, from the operating system."""
-
-
 @dataclass(frozen=True, eq=False)
 class SourceSpec(Generic[ValueT]):
     """Describes one source. Compared by identity: a spec is the key of its values in dictionaries.
@@ -45,7 +35,6 @@ class SourceSpec(Generic[ValueT]):
         kind: `kind` of the configuration; "odometry" for example.
         value_type: what its readers return.
         label: distinguishes sources of the same kind; None where a kind has one source.
-        origin: the thread that writes it.
         stale_after_ms: default age limit. Of a platform source the configuration's platform.stale_after_ms
             applies instead.
         queue_depth: depth of the subscription's KEEP_LAST history. With 1 the middleware drops older messages
@@ -61,7 +50,6 @@ class SourceSpec(Generic[ValueT]):
     kind: str
     value_type: type[ValueT]
     label: CommandSource | None = None
-    origin: Origin = Origin.ROS
     stale_after_ms: int = 1000
     queue_depth: int = 1
     max_items: int | None = None
@@ -122,12 +110,12 @@ MUX_INPUTS: Final = {
     for label in CommandSource
 }
 """The inputs of the robot's command mux."""
-COMPUTE: Final = SourceSpec("compute", Compute, origin=Origin.PLATFORM)
-NETWORK: Final = SourceSpec("network", Network, origin=Origin.PLATFORM)
-ONBOARD_BATTERY: Final = SourceSpec("onboard_battery", Battery, origin=Origin.PLATFORM)
+COMPUTE: Final = SourceSpec("compute", Compute)
+NETWORK: Final = SourceSpec("network", Network)
+ONBOARD_BATTERY: Final = SourceSpec("onboard_battery", Battery)
 """The computer's own battery, as its operating system reports it."""
 
-SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
+ROS_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     ODOMETRY,
     VISION,
     DETECTIONS,
@@ -136,10 +124,9 @@ SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     MODE,
     EFFECTIVE_COMMAND,
     *MUX_INPUTS.values(),
-    COMPUTE,
-    NETWORK,
-    ONBOARD_BATTERY,
 )
+"""Those that the ROS sampler writes onto the board, from the topics of the configuration."""
+PLATFORM_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (COMPUTE, NETWORK, ONBOARD_BATTERY)
+"""Those that the platform sampler writes, from the operating system."""
+SOURCES: Final = (*ROS_SOURCES, *PLATFORM_SOURCES)
 """Every source. The health summary names the first one in this order that is missing."""
-ROS_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.ROS)
-PLATFORM_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.PLATFORM)

@@ -33,19 +33,9 @@ if TYPE_CHECKING:
 
 ValueT = TypeVar("ValueT", Listener, Stream, Encoder, Measurement, Counters)
 
-STATES: Final[Mapping[int, PreviewState]] = {
-    pb.LIFECYCLE_STATE_DISABLED: PreviewState.DISABLED,
-    pb.LIFECYCLE_STATE_STARTING: PreviewState.STARTING,
-    pb.LIFECYCLE_STATE_RUNNING: PreviewState.RUNNING,
-    pb.LIFECYCLE_STATE_STOPPING: PreviewState.STOPPING,
-    pb.LIFECYCLE_STATE_FAULTED: PreviewState.FAULTED,
-}
-PROFILES: Final[Mapping[Profile, pb.Profile.ValueType]] = {
-    Profile.LOW_BW: pb.PROFILE_LOW_BW,
-    Profile.BALANCED: pb.PROFILE_BALANCED,
-    Profile.HIGH_QUALITY: pb.PROFILE_HIGH_QUALITY,
-}
-CODECS: Final[Mapping[int, Codec]] = {pb.CODEC_H264: Codec.H264, pb.CODEC_H265: Codec.H265}
+STATES: Final = {pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}"): state for state in PreviewState}
+PROFILES: Final = {profile: pb.Profile.Value(f"PROFILE_{profile.name}") for profile in Profile}
+CODECS: Final = {pb.Codec.Value(f"CODEC_{codec.name}"): codec for codec in Codec}
 _PROFILE_OF: Final[Mapping[int, Profile]] = {number: profile for profile, number in PROFILES.items()}
 
 

@@ -1,6 +1,7 @@
 """Events as messages of the contract."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any, Final
 
 from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
@@ -56,22 +57,10 @@ def position_from(message: pb.EventPosition) -> Position:
     return Position(message.run_id, message.sequence)
 
 
-def _raised(detail: FaultRaised, at_s: float) -> pb.FaultRaised:
-    return pb.FaultRaised(fault=fault_message(detail.fault, at_s))
-
-
-def _cleared(detail: FaultCleared, at_s: float) -> pb.FaultCleared:
-    return pb.FaultCleared(fault=fault_message(detail.fault, at_s))
-
-
 def _preview(detail: PreviewChanged, _at_s: float) -> pb.PreviewStateChanged:
     return pb.PreviewStateChanged(
         state=PREVIEW_STATES[detail.state], profile=PROFILES[detail.profile], last_error=detail.last_error
     )
-
-
-def _fallback(detail: EncoderFallback, _at_s: float) -> pb.EncoderFallback:
-    return pb.EncoderFallback(running=detail.running, wanted=detail.wanted, reason=detail.reason)
 
 
 def _control(detail: ControlAction, _at_s: float) -> pb.ControlAction:
@@ -86,13 +75,13 @@ def _control(detail: ControlAction, _at_s: float) -> pb.ControlAction:
 
 
 _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
-    FaultRaised: ("fault_raised", _raised),
-    FaultCleared: ("fault_cleared", _cleared),
+    FaultRaised: ("fault_raised", lambda it, at_s: pb.FaultRaised(fault=fault_message(it.fault, at_s))),
+    FaultCleared: ("fault_cleared", lambda it, at_s: pb.FaultCleared(fault=fault_message(it.fault, at_s))),
     PreviewChanged: ("preview_state_changed", _preview),
-    EncoderFallback: ("encoder_fallback", _fallback),
-    ClientJoined: ("client_joined", lambda detail, _: pb.ClientJoined(address=detail.address)),
-    ClientLeft: ("client_left", lambda detail, _: pb.ClientLeft(address=detail.address)),
+    EncoderFallback: ("encoder_fallback", lambda it, _: pb.EncoderFallback(**asdict(it))),
+    ClientJoined: ("client_joined", lambda it, _: pb.ClientJoined(**asdict(it))),
+    ClientLeft: ("client_left", lambda it, _: pb.ClientLeft(**asdict(it))),
     ControlAction: ("control_action", _control),
-    ModeChanged: ("robot_mode_changed", lambda detail, _: pb.RobotModeChanged(mode=detail.mode)),
+    ModeChanged: ("robot_mode_changed", lambda it, _: pb.RobotModeChanged(**asdict(it))),
 }
 """Total: a test checks every kind of event, and every payload of the schema."""

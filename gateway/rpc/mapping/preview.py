@@ -1,5 +1,6 @@
 """The live preview as messages of the contract."""
 
+from dataclasses import asdict
 from typing import Final
 
 from common.bind import bracketed
@@ -7,7 +8,7 @@ from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
-from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
+from gateway.status.preview import Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
 
 _NO_STREAM: Final = Stream(
@@ -35,10 +36,12 @@ def preview_status(
         if preview.listener
         else None,
         encoder=_encoder(encoder, stream) if encoder else None,
-        video=_video(preview.stream) if preview.stream else None,
+        video=pb.VideoFormat(width_px=stream.width_px, height_px=stream.height_px, fps=stream.fps)
+        if preview.stream
+        else None,
         target_bitrate_kbps=stream.target_bitrate_kbps,
         measured=_measured(measured.value, measured) if measured.value else None,
-        counters=_counters(preview.counters),
+        counters=pb.PreviewCounters(**asdict(preview.counters)),
         service_reachable=preview.service_reachable,
         bitrate_reason=stream.bitrate_reason,
     )
@@ -70,10 +73,6 @@ def _encoder(encoder: Encoder, stream: Stream) -> pb.EncoderStatus:
     )
 
 
-def _video(stream: Stream) -> pb.VideoFormat:
-    return pb.VideoFormat(width_px=stream.width_px, height_px=stream.height_px, fps=stream.fps)
-
-
 def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
     return pb.StreamMeasurement(
         **freshness_fields(sample.freshness),
@@ -83,13 +82,4 @@ def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.Strea
         last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
-    )
-
-
-def _counters(counters: Counters) -> pb.PreviewCounters:
-    return pb.PreviewCounters(
-        starts=counters.starts,
-        restarts=counters.restarts,
-        faults=counters.faults,
-        fallbacks=counters.fallbacks,
     )

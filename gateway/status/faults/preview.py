@@ -31,14 +31,12 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
                 "the preview service does not answer: video is not available",
                 "Start or restart robot-preview on the robot; the gateway connects by itself",
             )
-    elif preview.state is PreviewState.FAULTED or _retrying(preview, active):
+    elif preview.state is PreviewState.FAULTED or (
+        preview.state is PreviewState.STARTING and FAULTED in active
+    ):
         yield _faulted(preview.last_error)
     if preview.encoder and preview.encoder.fallback_reason:
         yield _fallback(preview.encoder)
-
-
-def _retrying(preview: PreviewView, active: frozenset[str]) -> bool:
-    return preview.state is PreviewState.STARTING and FAULTED in active
 
 
 def _faulted(last_error: str) -> Condition:

@@ -52,7 +52,7 @@ def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator
         fault = STATE_FAULTS[source.state]
         if fault and _is_fault(source, settled=settled):
             yield Condition(
-                f"{source.name}.{fault.suffix}",
+                f"{source.spec.name}.{fault.suffix}",
                 Severity.ERROR if source.required else Severity.WARNING,
                 source.spec.display_name,
                 source.detail,

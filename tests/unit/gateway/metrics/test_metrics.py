@@ -31,8 +31,7 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Odometry, Received
 from tests.support.eventually import eventually

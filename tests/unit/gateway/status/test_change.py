@@ -9,8 +9,7 @@ from gateway.status.board import Board
 from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Measurement, PreviewState
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Snapshot, SourceRule
+from gateway.status.snapshot import Runtime, Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.values import Mode, Odometry, Received
 from tests.support.status import OFF, snapshot_of

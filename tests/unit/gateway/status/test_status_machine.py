@@ -149,11 +149,11 @@ class Life(RuleBasedStateMachine):
         active = {fault.condition.fault_id: fault for fault in self.tracker.faults if fault.active}
         for source in now.sources:
             if source.state is SourceState.STALE:
-                assert f"{source.name}.stale" in active
+                assert f"{source.spec.name}.stale" in active
             if source.state is SourceState.WAITING and source.required and self.now_s >= 1000.0 + GRACE_S:
-                assert f"{source.name}.missing" in active
-            if source.state is SourceState.RECEIVING and f"{source.name}.stale" in active:
-                assert self.now_s - active[f"{source.name}.stale"].seen_s < CLEAR_AFTER_S
+                assert f"{source.spec.name}.missing" in active
+            if source.state is SourceState.RECEIVING and f"{source.spec.name}.stale" in active:
+                assert self.now_s - active[f"{source.spec.name}.stale"].seen_s < CLEAR_AFTER_S
         assert self.raised - self.cleared == len(active)
 
 

@@ -32,8 +32,7 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
     BATTERY,
