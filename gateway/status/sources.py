@@ -1,6 +1,6 @@
-"""The table of sources: an entry makes a kind known to board, snapshot, change detection, configuration.
+"""The table of sources: board, snapshot, change detection and configuration take every entry as it is.
 
-docs/adding-a-source.md lists the steps that remain for a new kind: a reader and a field of the schema.
+A new kind also needs a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
 """
 
 from collections.abc import Callable
