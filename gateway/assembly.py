@@ -124,7 +124,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         health=Health(SERVICE),
         loop_delay=loop_delay,
         metrics=GatewayCollector(
-            state,
+            state=state,
             stats=stats,
             loop_delay=loop_delay,
             status_stream=status_stream,
@@ -134,30 +134,26 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     )
 
 
+@dataclass(frozen=True, slots=True)
 class ThisRobot:
-    """The robot that the gateway runs on: its ROS graph, its computer, its preview service.
+    """The robot that the gateway runs on: its ROS graph, its computer, its preview service."""
 
-    Args:
-        settings: name the sources, and the preview's socket.
-    """
-
-    def __init__(self, settings: GatewaySettings) -> None:
-        self._settings = settings
+    settings: GatewaySettings
 
     @contextmanager
     def feeding(self, board: Board) -> Iterator[None]:
         """Samples ROS and the computer while the block lasts. A gateway without sources needs no ROS."""
-        with PlatformSampler(self._settings.platform, board):
-            if not self._settings.sources:
+        with PlatformSampler(self.settings.platform, board):
+            if not self.settings.sources:
                 _log.info("no sources are configured; ROS is not used")
                 yield
                 return
             # Late: a gateway without sources runs where ROS is not installed.
             from gateway.ros.intake import intake  # noqa: PLC0415
 
-            with intake(self._settings.sources, board):
+            with intake(self.settings.sources, board):
                 yield
 
     def preview_connector(self) -> PreviewConnector:
         """Returns a connector to the configured socket."""
-        return PreviewConnector(self._settings.preview.socket)
+        return PreviewConnector(self.settings.preview.socket)

@@ -49,21 +49,18 @@ class CredentialRequest:
     days: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
 class CredentialAdmin:
     """Changes the credential directory of one robot.
 
-    Args:
-        directory: the directory.
+    Attributes:
         robot: name of the gateway.
         clock: calendar time, seconds since 1970.
     """
 
-    def __init__(
-        self, directory: CredentialDirectory, robot: str, clock: Callable[[], float] = time.time
-    ) -> None:
-        self._directory = directory
-        self._robot = robot
-        self._clock = clock
+    directory: CredentialDirectory
+    robot: str
+    clock: Callable[[], float] = time.time
 
     def initialize(self, hosts: Iterable[str], *, again: bool = False) -> None:
         """Creates the CA, the server certificate and an empty list.
@@ -76,7 +73,7 @@ class CredentialAdmin:
             UserError: there are credentials already, others may write to the directory, or a file can't be
                 written.
         """
-        directory = self._directory
+        directory = self.directory
         if directory.path.exists() and directory.path.stat().st_mode & _WRITABLE_BY_OTHERS:
             raise UserError(
                 f"other users may write to {directory.path}, so that they could replace its files",
@@ -98,7 +95,7 @@ class CredentialAdmin:
         """
         check_name(request.name)
         issued = self._issue(request)
-        return self._directory.change_store(lambda store: (store.adding(issued[0]), issued))
+        return self.directory.change_store(lambda store: (store.adding(issued[0]), issued))
 
     def revoke(self, name_or_id: str) -> tuple[Credential, ...]:
         """Revokes all credentials of a name, or the one of an id, and returns them.
@@ -106,13 +103,13 @@ class CredentialAdmin:
         Raises:
             UserError: no valid credential has this name or id.
         """
-        now_s = int(self._clock())
+        now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, tuple[Credential, ...]]:
             found = store.find(name_or_id, now_s)
             return store.revoking(found, now_s), found
 
-        return self._directory.change_store(change)
+        return self.directory.change_store(change)
 
     def rotate(self, name_or_id: str, overlap_s: int = 0) -> Issued:
         """Issues a new secret for the name and role of a credential, which becomes invalid.
@@ -124,7 +121,7 @@ class CredentialAdmin:
         Raises:
             UserError: no valid credential has this name or id, or several do.
         """
-        now_s = int(self._clock())
+        now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, Issued]:
             found = store.find(name_or_id, now_s)
@@ -138,7 +135,7 @@ class CredentialAdmin:
             ended = store.expiring(found, now_s + overlap_s) if overlap_s else store.revoking(found, now_s)
             return ended.adding(issued[0]), issued
 
-        return self._directory.change_store(change)
+        return self.directory.change_store(change)
 
     def rotate_server(self, hosts: Iterable[str] | None) -> tuple[str, ...]:
         """Issues a new server certificate. Clients need no change.
@@ -152,10 +149,10 @@ class CredentialAdmin:
         Raises:
             UserError: the CA or the present certificate can't be read, or the new one can't be written.
         """
-        directory = self._directory
+        directory = self.directory
         with directory.locked():
             known = tuple(hosts) if hosts is not None else self._hosts()
-            server = issue_server_certificate(directory.ca.read(), self._robot, known, _SERVER_DAYS)
+            server = issue_server_certificate(directory.ca.read(), self.robot, known, _SERVER_DAYS)
             write_all_private(directory.server.contents(server))
         return known
 
@@ -168,7 +165,7 @@ class CredentialAdmin:
         Raises:
             UserError: as `rotate_server`.
         """
-        directory, now_s = self._directory, int(self._clock())
+        directory, now_s = self.directory, int(self.clock())
         with directory.locked():
             store = directory.read_store()
             revoked = tuple(
@@ -182,9 +179,9 @@ class CredentialAdmin:
         return revoked
 
     def _replace_all(self, hosts: Iterable[str], store: Store) -> None:
-        ca = new_ca(self._robot, _CA_DAYS)
-        server = issue_server_certificate(ca, self._robot, hosts, _SERVER_DAYS)
-        directory = self._directory
+        ca = new_ca(self.robot, _CA_DAYS)
+        server = issue_server_certificate(ca, self.robot, hosts, _SERVER_DAYS)
+        directory = self.directory
         # The server's first: after a crash in between, `rotate server` repairs it with the CA that laptops
         # know. The list last: a directory without one is incomplete, and may be initialized again.
         write_all_private(
@@ -195,7 +192,7 @@ class CredentialAdmin:
 
     def _hosts(self) -> tuple[str, ...]:
         """Returns those of the present certificate, whether or not it still has its key."""
-        files = self._directory.server
+        files = self.directory.server
         try:
             return certificate_info(read_public(files.certificate, files.name)).hosts
         except ValueError as error:
@@ -204,11 +201,11 @@ class CredentialAdmin:
             ) from error
 
     def _issue(self, request: CredentialRequest) -> Issued:
-        now_s, credential_id, begins_s = int(self._clock()), new_id(), request.begins_s
+        now_s, credential_id, begins_s = int(self.clock()), new_id(), request.begins_s
         certificate = request.kind is Kind.CERTIFICATE
         days = _CLIENT_DAYS if request.days is None and certificate else request.days
         ends_s = None if days is None else int((begins_s or now_s) + days * _DAY_S)
-        ca = self._directory.ca.read()
+        ca = self.directory.ca.read()
         client, token = None, ""
         if certificate:
             # From the issue on, not from `begins_s`: the list alone checks the start of validity.
@@ -221,4 +218,4 @@ class CredentialAdmin:
         credential = Credential(
             credential_id, name, role, request.kind, proof, now_s, begins_s=begins_s, ends_s=ends_s
         )
-        return credential, LoginBundle(name, role.value, self._robot, ca.certificate, token, client)
+        return credential, LoginBundle(name, role.value, self.robot, ca.certificate, token, client)

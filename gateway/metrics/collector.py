@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from prometheus_client import CollectorRegistry, generate_latest
@@ -24,10 +25,11 @@ from gateway.status.snapshot import Snapshot
 _PREFIX: Final = "robot_gateway"
 
 
+@dataclass(eq=False)
 class GatewayCollector(Collector):
     """Collects all metrics at one instant.
 
-    Args:
+    Attributes:
         state: where the gauges come from.
         stats: of the calls.
         loop_delay: how late the event loop was.
@@ -36,28 +38,18 @@ class GatewayCollector(Collector):
         preview_link: counts failures to connect.
     """
 
-    def __init__(
-        self,
-        state: SnapshotSource,
-        *,
-        stats: Stats,
-        loop_delay: LoopDelay,
-        status_stream: StatusStream,
-        event_stream: EventStream,
-        preview_link: PreviewLink,
-    ) -> None:
-        self._state = state
-        self._stats = stats
-        self._loop_delay = loop_delay
-        self._status_stream = status_stream
-        self._event_stream = event_stream
-        self._preview_link = preview_link
-        self._registry = CollectorRegistry()
-        self._registry.register(self)
+    state: SnapshotSource
+    stats: Stats
+    loop_delay: LoopDelay
+    status_stream: StatusStream
+    event_stream: EventStream
+    preview_link: PreviewLink
 
     def text(self) -> bytes:
         """Returns them in Prometheus' text format."""
-        return generate_latest(self._registry)
+        registry = CollectorRegistry()
+        registry.register(self)
+        return generate_latest(registry)
 
     def describe(self) -> list[Metric]:
         """Returns nothing: without this method, registering would collect."""
@@ -65,21 +57,21 @@ class GatewayCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Yields every family."""
-        now = self._state.snapshot()
+        now = self.state.snapshot()
         yield from _gateway(now)
         yield from self._calls()
         yield from self._streams()
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
-        failures = self._preview_link.failures
+        failures = self.preview_link.failures
         yield _gauge(
             "preview_link_failures", "Failures in a row to connect to the preview service.", failures
         )
         yield from _stream(now)
 
     def _calls(self) -> Iterator[Metric]:
-        methods = sorted(self._stats.methods.items())
+        methods = sorted(self.stats.methods.items())
         ended = CounterFamily(
             f"{_PREFIX}_requests", "Calls that ended, by gRPC code.", labels=("method", "code")
         )
@@ -95,7 +87,7 @@ class GatewayCollector(Collector):
                 durations.add_metric((method,), stats.durations.cumulative(), stats.durations.sum_s)
         yield ended
         yield durations
-        delays = self._loop_delay.delays
+        delays = self.loop_delay.delays
         yield HistogramFamily(
             f"{_PREFIX}_event_loop_delay_seconds",
             "How much later than requested the event loop woke.",
@@ -104,11 +96,11 @@ class GatewayCollector(Collector):
         )
 
     def _streams(self) -> Iterator[Metric]:
-        open_streams = {name: each.open for name, each in sorted(self._stats.contract.items()) if each.open}
+        open_streams = {name: each.open for name, each in sorted(self.stats.contract.items()) if each.open}
         yield _gauges("streams", "Open streams.", "method", open_streams)
         skipped = "Statuses that slow readers did not get, because they got newer ones."
-        yield _counter("statuses_skipped", skipped, self._status_stream.skipped)
-        yield _counter("event_gaps", "Times a subscriber missed events.", self._event_stream.gaps)
+        yield _counter("statuses_skipped", skipped, self.status_stream.skipped)
+        yield _counter("event_gaps", "Times a subscriber missed events.", self.event_stream.gaps)
 
 
 def _gauge(name: str, what: str, value: float) -> Metric:

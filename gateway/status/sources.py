@@ -17,7 +17,6 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
-    Odometry,
     Velocity,
     Vision,
 )
@@ -71,7 +70,7 @@ class SourceSpec(Generic[ValueT]):
         return f"commands of {self.label.value}" if self.label else self.kind.replace("_", " ")
 
 
-ODOMETRY: Final = SourceSpec("odometry", Odometry, health_name="odometry")
+ODOMETRY: Final = SourceSpec("odometry", Velocity, health_name="odometry")
 VISION: Final = SourceSpec("vision", Vision, stale_after_ms=2000, health_name="vision telemetry")
 DETECTIONS: Final = SourceSpec(
     "detections",

@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -39,16 +39,16 @@ CODECS: Final = {pb.Codec.Value(f"CODEC_{codec.name}"): codec for codec in Codec
 _PROFILE_OF: Final[Mapping[int, Profile]] = {number: profile for profile, number in PROFILES.items()}
 
 
+@dataclass(frozen=True, slots=True)
 class PreviewConnector:
     """Connects to the preview service on the Unix socket where it listens, or will."""
 
-    def __init__(self, socket: Path) -> None:
-        self._socket = socket
+    socket: Path
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator["PreviewClient"]:
         """Yields a client; connects with its first call."""
-        async with unix_channel(self._socket) as channel:
+        async with unix_channel(self.socket) as channel:
             yield PreviewClient(channel)
 
 

@@ -24,7 +24,7 @@ from gateway.status.sources import (
     ODOMETRY,
     VISION,
 )
-from gateway.status.values import Detection, Detections, Mode, Odometry, Vision
+from gateway.status.values import Detection, Detections, Mode, Velocity, Vision
 from omniseer.gateway.v1 import overlay_pb2, source_pb2, system_status_pb2
 
 NOT_MAPPED: Final = frozenset({DIAGNOSTICS, EFFECTIVE_COMMAND, *MUX_INPUTS.values()})
@@ -81,7 +81,7 @@ def _vision(sample: Sample[Vision]) -> system_status_pb2.VisionStatus:
 def _health(snapshot: Snapshot) -> system_status_pb2.RobotHealth:
     health, odometry = snapshot.health, snapshot[ODOMETRY]
     freshness = odometry.freshness
-    motion = odometry.value or Odometry(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
+    motion = odometry.value or Velocity(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
     return system_status_pb2.RobotHealth(
         state=HEALTH_STATES[health.state],
         ready=health.ready,

@@ -33,7 +33,7 @@ from gateway.status.preview import (
 )
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.sources import ODOMETRY, VISION
-from gateway.status.values import Odometry, Received
+from gateway.status.values import Received, Velocity
 from tests.support.eventually import eventually
 
 ROOT = Path(__file__).parents[4]
@@ -57,7 +57,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
     return take(
         identity=Identity('lab "7"', "1.2.3", insecure=False),
         rules=Rules({ODOMETRY: SourceRule(1000, True), VISION: SourceRule(2000, True)}, 3000),
-        board=Board({ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), NOW_S - 0.25)}),
+        board=Board({ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), NOW_S - 0.25)}),
         preview=preview,
         events=(),
         now_s=NOW_S,

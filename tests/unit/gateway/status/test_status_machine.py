@@ -17,7 +17,7 @@ from gateway.status.faults.tracker import FaultTracker
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import BATTERY, ODOMETRY, VISION, SourceSpec
-from gateway.status.values import Battery, Odometry, Received, Vision
+from gateway.status.values import Battery, Received, Velocity, Vision
 from tests.support.fault_rules import new_observer
 from tests.support.status import snapshot_of
 
@@ -28,9 +28,9 @@ WORDS = {ODOMETRY: "odometry", VISION: "vision telemetry"}
 SPECS = st.sampled_from(sorted(LIMITS_MS, key=lambda spec: spec.name))
 
 
-def value_of(spec: SourceSpec[Any], number: int) -> Odometry | Vision | Battery:
+def value_of(spec: SourceSpec[Any], number: int) -> Velocity | Vision | Battery:
     if spec is ODOMETRY:
-        return Odometry(float(number), 0.0, 0.0)
+        return Velocity(float(number), 0.0, 0.0)
     if spec is VISION:
         return Vision(float(number), 0.0, 0.0, 0, 0)
     return Battery(True, float(number), 80.0, False)

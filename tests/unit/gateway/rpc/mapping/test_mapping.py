@@ -53,7 +53,6 @@ from gateway.status.values import (
     Detections,
     Mode,
     Network,
-    Odometry,
     Received,
     Velocity,
     Vision,
@@ -139,7 +138,7 @@ def everything() -> Snapshot:
     )
     board = Board(
         {
-            ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), at_s),
+            ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), at_s),
             VISION: Received(Vision(30.0, 29.0, 11.0, 7, 1), at_s),
             DETECTIONS: Received(
                 Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s

@@ -35,8 +35,8 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
-    Odometry,
     Received,
+    Velocity,
 )
 from tests.support.fault_rules import LIMITS
 from tests.support.status import OFF, snapshot_of
@@ -77,7 +77,7 @@ def found(of: Snapshot, active: frozenset[str] = frozenset(), up_s: float = 100.
 
 def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:
     well = board()
-    well[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S)
+    well[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S)
     assert found(snapshot(well, odometry=True, battery=False)) == {}
 
 
@@ -102,7 +102,7 @@ def test_a_source_that_does_not_come(
     at_s: float | None, required: bool, up_s: float, expected: dict[str, Severity]
 ) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
 
@@ -122,14 +122,14 @@ def test_a_source_that_does_not_come(
 )
 def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, expected: str | None) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
     of.publishers[ODOMETRY] = publishers
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
 
 def test_two_publishers_of_one_source_are_said_so() -> None:
     of = board()
-    of[ODOMETRY], of.publishers[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S), Publishers(2)
+    of[ODOMETRY], of.publishers[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S), Publishers(2)
     (source,) = snapshot(of, odometry=True).sources
     assert (source.state, source.detail[:24]) == (SourceState.RECEIVING, "2 programs publish odome")
 
