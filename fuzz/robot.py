@@ -6,9 +6,9 @@ from typing import Any, Final
 from rclpy.serialization import deserialize_message
 
 from gateway.config import DEFAULT_SOURCES, SourceSettings
-from gateway.ros.decoding import max_list_items
 from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import reader_for
+from gateway.ros.source import max_list_items
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import overlay_snapshot
 from gateway.status.board import Board

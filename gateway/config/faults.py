@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from common.config import Section
-from gateway.status.faults.limits import Limit, PlatformLimits
+from gateway.status.faults.platform import Limit, PlatformLimits
 
 
 class _LimitSettings(Section):

@@ -2,11 +2,15 @@
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.serialization import deserialize_message
+
 from gateway.config import SourceSettings
-from gateway.ros.decoding import decoder_of
+from gateway.ros.list_truncation import truncate_list
+from gateway.ros.readers import is_header_and_list, reader_for
 from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.values import Received
@@ -50,7 +54,7 @@ class Source:
         self._settings = settings
         self._spec = settings.spec
         self._subscription = subscription
-        self._decode = decoder_of(settings, subscription.msg_type)
+        self._decode = _decoder_of(settings, subscription.msg_type)
         self._board = board
         self._emptied_at_s = created_at_s
         self._paused_until_s = created_at_s
@@ -120,3 +124,23 @@ def _now() -> Instant:
         if time.monotonic() - now.monotonic_s < _MAX_CLOCK_GAP_S:
             break
     return now
+
+
+def _decoder_of(source: SourceSettings, message_type: Any) -> Callable[[bytes], Any]:
+    """Returns the function that makes a value of a message; None of one that holds nothing usable.
+
+    Errors of the deserialiser pass.
+    """
+    read, max_items, add_truncated = reader_for(source), max_list_items(source), source.spec.add_truncated
+
+    def decode(raw: bytes) -> Any:
+        raw, truncated = truncate_list(raw, max_items) if max_items else (raw, 0)
+        value = read(deserialize_message(raw, message_type), source)
+        return add_truncated(value, truncated) if truncated and add_truncated and value else value
+
+    return decode
+
+
+def max_list_items(source: SourceSettings) -> int | None:
+    """Returns the length to truncate lists to; None if the message is not a header and a list."""
+    return (source.spec.max_items or source.max_items) if is_header_and_list(source) else None

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
 from gateway.status.board import Board, Publishers
 from gateway.status.fault import Condition, Severity
-from gateway.status.faults.limits import Limit
+from gateway.status.faults.platform import Limit
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
 from gateway.status.preview import Encoder, PreviewState, PreviewView
