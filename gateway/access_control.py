@@ -88,15 +88,13 @@ class AccessControl:
             self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        self._audit_log.record(_reloaded(len(loaded.store.credentials)))
-
-
-def _reloaded(count: int) -> ControlAction:
-    return ControlAction(
-        who="",
-        address="this robot",
-        method="credentials",
-        request="changed files",
-        result=ControlResult.ACCEPTED,
-        answer=f"{count} credentials and the newest certificates are in force",
-    )
+        self._audit_log.record(
+            ControlAction(
+                who="",
+                address="this robot",
+                method="credentials",
+                request="changed files",
+                result=ControlResult.ACCEPTED,
+                answer=f"{len(loaded.store.credentials)} credentials and the newest certificates are in force",
+            )
+        )
