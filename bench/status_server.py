@@ -64,7 +64,6 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
-    Odometry,
     Received,
     Velocity,
     Vision,
@@ -119,7 +118,7 @@ class _BenchRobot:
         finally:
             task.cancel()
 
-    def preview(self) -> "_PreviewInMemory":
+    def preview_connector(self) -> "_PreviewInMemory":
         return _PreviewInMemory()
 
 
@@ -175,7 +174,7 @@ async def _drive(board: Board) -> None:
     for number in itertools.count():
         now = time.monotonic()
         speed_mps = 0.5 + number % 100 / 1000
-        board[ODOMETRY] = Received(Odometry(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
+        board[ODOMETRY] = Received(Velocity(vx_mps=speed_mps, vy_mps=-0.02, wz_rad_s=0.1), now)
         board[MODE] = Received(Mode("exploring"), now)
         command = Received(Velocity(0.5, 0.0, 0.1), now)
         board[EFFECTIVE_COMMAND] = board[MUX_INPUTS[CommandSource.KEYBOARD]] = command

@@ -16,6 +16,7 @@ What a call does not need must cost it next to nothing: a poll of the status tak
 and each coroutine or wrapper more would be paid some thousand times a second.
 """
 
+import asyncio
 import logging
 import time
 from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable, Mapping, Sequence
@@ -36,6 +37,10 @@ else:
 
 _log = logging.getLogger(__name__)
 
+_CANCELLATION_GRACE_S: Final = 0.1
+"""When a caller leaves, gRPC ends the iterator of its requests as after the last one, and cancels the task
+afterwards, mostly within a millisecond; nothing else distinguishes the two."""
+
 Behavior: TypeAlias = Callable[[Any, Any], Any]
 """A method of a servicer: one request, or an iterator of them, and the call; one response, or an iterator."""
 
@@ -45,12 +50,16 @@ class Method:
 
     Attributes:
         path: on the wire, "/package.Service/Method".
-        streaming: whether requests or responses are a stream.
+        request_streaming: whether requests are a stream.
+        streaming: whether requests or responses are.
     """
 
-    def __init__(self, path: str, *, streaming: bool) -> None:
+    def __init__(
+        self, path: str, *, request_streaming: bool = False, response_streaming: bool = False
+    ) -> None:
         self.path = path
-        self.streaming = streaming
+        self.request_streaming = request_streaming
+        self.streaming = request_streaming or response_streaming
 
 
 class Call:
@@ -93,9 +102,8 @@ class Interceptor(Generic[CallT_contra]):
     def on_end(self, call: CallT_contra, error: BaseException | None) -> None:
         """Called when the call has ended: `error` is None, or what the handler or another hook raised.
 
-        A caller that leaves ends its call with `asyncio.CancelledError`, or a stream with `GeneratorExit`;
-        where requests are a stream, only their iterator ends. What this hook raises is logged, and the others
-        are called all the same: each gives back what it took.
+        A caller that leaves ends its call with `asyncio.CancelledError`, or a stream with `GeneratorExit`.
+        What this hook raises is logged, and the others are called all the same: each gives back what it took.
         """
 
     async def on_error(self, call: CallT_contra, error: BaseException) -> None:
@@ -107,7 +115,7 @@ class Chain(grpc.aio.ServerInterceptor):
 
     Args:
         interceptors: outermost first.
-        method_type: describes a method by path and `streaming`.
+        method_type: describes a method by path, `request_streaming` and `response_streaming`.
         call_type: stands for one call; made of its method and gRPC's context.
     """
 
@@ -176,7 +184,9 @@ class Chain(grpc.aio.ServerInterceptor):
         serializer: Callable[[Any], bytes] | None,
         deserializer: Callable[[bytes], Any] | None = None,
     ) -> Handler:
-        method = self._method_type(path, streaming=request_streaming or response_streaming)
+        method = self._method_type(
+            path, request_streaming=request_streaming, response_streaming=response_streaming
+        )
         passage = _Passage([each for each in self._interceptors if each.applies_to(method)])
         received = passage.each_received if request_streaming else passage.received
         new_call = self._call_type
@@ -231,6 +241,8 @@ class _Passage:
     async def each_received(self, call: Call, requests: AsyncIterable[Any]) -> AsyncIterator[Any]:
         async for request in requests:
             yield self.received(call, request)
+        # Raises CancelledError if the caller has left.
+        await asyncio.sleep(_CANCELLATION_GRACE_S)
 
     def received(self, call: Call, request: Any) -> Any:
         for on_request in self._on_request:

@@ -1,10 +1,11 @@
 """Files readable by their owner alone: atomic replacement, and an advisory lock on their directory."""
 
+import errno
 import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -18,31 +19,58 @@ _LOCK_RETRY_S: Final = 0.02
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Replaces a file atomically (rename(2)) by one with mode 0600; creates missing directories with 0700.
+    """Replaces one file; see `write_all_private`."""
+    write_all_private({path: content})
 
-    After a crash, the file holds either the old or the new content.
+
+def write_all_private(contents: Mapping[Path, bytes]) -> None:
+    """Replaces files by new ones with mode 0600, in this order; creates missing directories with 0700.
+
+    Each is replaced atomically (rename(2)), and none before all are on the disk: after an error they are as
+    before, after a crash each has either the old or the new content. What was replaced survives a power loss.
 
     Raises:
-        UserError: it can't be written.
+        UserError: one can't be written.
     """
+    temporaries: dict[Path, Path] = {}
+    path = Path()
     try:
-        _make_directory(path.parent)
-        # A symbolic link stays one: its target is replaced. mkstemp creates files with mode 0600.
-        path = path.resolve()
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        for path, content in contents.items():
+            _make_directory(path.parent)
+            # A symbolic link stays one: its target is replaced. mkstemp creates files with mode 0600.
+            target = path.resolve()
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            temporaries[target] = Path(name)
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        for path, temporary in temporaries.items():
+            temporary.replace(path)
+        for directory in {target.parent for target in temporaries}:
+            sync_directory(directory)
     except OSError as error:
         raise _unwritable(path, error) from error
+    finally:
+        for temporary in temporaries.values():
+            temporary.unlink(missing_ok=True)
+
+
+def sync_directory(directory: Path) -> None:
+    """Makes new and renamed files of a directory survive a power loss (fsync(2)).
+
+    Raises:
+        OSError: the disk fails.
+    """
+    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).replace(path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise _unwritable(path, error) from error
-        raise
+        os.fsync(handle)
+    except OSError as error:
+        # Some network file systems can't.
+        if error.errno != errno.EINVAL:
+            raise
+    finally:
+        os.close(handle)
 
 
 @contextmanager
@@ -69,6 +97,7 @@ def _make_directory(directory: Path) -> None:
     missing = [each for each in (directory, *directory.parents) if not each.exists()]
     for each in reversed(missing):
         each.mkdir(mode=PRIVATE_DIRECTORY, exist_ok=True)
+        sync_directory(each.parent)
 
 
 def _lock(handle: int, directory: Path) -> None:

@@ -18,7 +18,7 @@ _FIT_TO_LOG: Final = re.compile(r"[A-Za-z0-9._:-]{1,64}")
 _NEW_BYTES: Final = 8
 
 
-class Call(Protocol):
+class HasMetadata(Protocol):
     """The part of grpc.ServicerContext that is used."""
 
     def invocation_metadata(self) -> Any:
@@ -28,7 +28,7 @@ class Call(Protocol):
 class _Request:
     __slots__ = ("_call", "_id")
 
-    def __init__(self, call: Call | None, known: str = "") -> None:
+    def __init__(self, call: HasMetadata | None, known: str = "") -> None:
         self._call = call
         self._id = known
 
@@ -41,7 +41,7 @@ class _Request:
 _request: ContextVar[_Request | None] = ContextVar("request", default=None)
 
 
-def begin(call: Call) -> None:
+def begin(call: HasMetadata) -> None:
     """Associates the current task with this call, until the task ends."""
     _request.set(_Request(call))
 
@@ -62,7 +62,7 @@ def continuing(request_id: str) -> Iterator[None]:
         _request.reset(token)
 
 
-def _sent_by(call: Call | None) -> str:
+def _sent_by(call: HasMetadata | None) -> str:
     for key, value in (call.invocation_metadata() or ()) if call else ():
         if key == HEADER and isinstance(value, str) and _FIT_TO_LOG.fullmatch(value):
             return value

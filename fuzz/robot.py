@@ -6,11 +6,11 @@ from typing import Any, Final
 from rclpy.serialization import deserialize_message
 
 from gateway.config import DEFAULT_SOURCES, SourceSettings
-from gateway.ros.decoding import max_list_items
 from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import reader_for
+from gateway.ros.source import max_list_items
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import overlay_snapshot
-from gateway.rpc.recipient import Recipient
 from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, SourceRule, take

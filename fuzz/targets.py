@@ -26,8 +26,8 @@ from gateway.links.link import LinkLostError
 from gateway.links.preview.wire import from_wire
 from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
+from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT, Method
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import desired_state

@@ -2,21 +2,19 @@
 
 import asyncio
 from contextlib import AbstractContextManager
-from pathlib import Path
 from typing import Final
 
 import grpc
 
 from gateway.access.audit import AuditLog
 from gateway.access.authenticator import Authenticator
-from gateway.access.directory import CredentialDirectory
 from gateway.access.lockout import Lockout
 from gateway.access.refusal_limiter import RefusalLimiter
-from gateway.access.reloader import CredentialReloader, LoadedAccess, TlsFiles, load_access
+from gateway.access.reloader import CredentialReloader, LoadedAccess
 from gateway.config import SecuritySettings
+from gateway.rpc.calls.ports import EventSink, StreamKey
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.auth import Auth
-from gateway.rpc.ports import EventSink, StreamKey
 from gateway.rpc.tls import ServerTls
 from gateway.status.access import AccessView
 from gateway.status.event import ControlAction, ControlResult
@@ -49,10 +47,10 @@ class AccessControl:
         self.auth: Auth | None = None
         self._reloader: CredentialReloader | None = None
         self._tls: ServerTls | None = None
-        if directory is None:
+        access_files = settings.access_files()
+        if access_files is None:
             return
-        files = CredentialDirectory(directory)
-        tls_files = tls_files_of(settings, files)
+        files, tls_files = access_files
         self._reloader = CredentialReloader(files, tls_files, self._use)
         self._authenticator = Authenticator(self._reloader.loaded.store)
         certificates = tls_files is not None and tls_files.client_ca is not None
@@ -86,40 +84,18 @@ class AccessControl:
 
     def _use(self, loaded: LoadedAccess) -> None:
         self._authenticator.use(loaded.store)
+        if self.auth:
+            self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        self._audit_log.record(_reloaded(len(loaded.store.credentials)))
-
-
-def read_access(settings: SecuritySettings, directory: Path) -> LoadedAccess:
-    """Reads credentials and certificates as a gateway does that starts.
-
-    Args:
-        settings: who may call, and how.
-        directory: of the credentials.
-
-    Raises:
-        UserError: something can't be read.
-    """
-    files = CredentialDirectory(directory)
-    return load_access(files, tls_files_of(settings, files))
-
-
-def tls_files_of(settings: SecuritySettings, files: CredentialDirectory) -> TlsFiles | None:
-    """Returns the certificates that the settings name, else those of the directory; None without TLS."""
-    tls = settings.tls
-    if not tls.enabled:
-        return None
-    client_ca = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
-    return TlsFiles(tls.certificate or files.server.certificate, tls.key or files.server.key, client_ca)
-
-
-def _reloaded(count: int) -> ControlAction:
-    return ControlAction(
-        who="",
-        address="this robot",
-        method="credentials",
-        request="changed files",
-        result=ControlResult.ACCEPTED,
-        answer=f"{count} credentials and the newest certificates are in force",
-    )
+        count = len(loaded.store.credentials)
+        self._audit_log.record(
+            ControlAction(
+                who="",
+                address="this robot",
+                method="credentials",
+                request="changed files",
+                result=ControlResult.ACCEPTED,
+                answer=f"{count} credentials and the newest certificates are in force",
+            )
+        )

@@ -11,8 +11,10 @@ import grpc
 
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
+from gateway.links.preview.control import PreviewLink
 from gateway.metrics.endpoint import serving_metrics
 from gateway.rpc.server import SERVICE, serving
+from gateway.status.snapshot import Snapshot
 
 _log = logging.getLogger(__name__)
 
@@ -66,7 +68,6 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 tasks.create_task(gateway.status_stream.run(), name="status-stream"),
                 tasks.create_task(gateway.access.run(), name="access"),
                 tasks.create_task(_observe(gateway), name="observer"),
-                tasks.create_task(_report_health(gateway), name="health"),
             ]
             try:
                 yield port
@@ -91,26 +92,18 @@ async def _metrics(gateway: Gateway) -> AsyncIterator[None]:
 
 
 async def _observe(gateway: Gateway) -> None:
-    """Updates faults and events, whether or not an operator is connected."""
-    link, presence = gateway.preview_link, gateway.interceptors.presence
+    """Updates faults, events and the health service, whether or not an operator is connected."""
+    link, health = gateway.preview_link, gateway.health
     while True:
         seen = gateway.state.observe(gateway.access.view())
-        gateway.health.set_serving(SERVICE, serving=not seen.ros_stalled)
-        presence.report_joined()
-        await link.changes.wait_until(partial(_has_changed, gateway, seen.preview), OBSERVE_EVERY_S)
+        health.set_serving(SERVICE, serving=not seen.ros_stalled)
+        health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
+        gateway.interceptors.presence.report_joined()
+        await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
 
 
-async def _report_health(gateway: Gateway) -> None:
-    """Keeps the health service's entry for the preview up to date."""
-    link = gateway.preview_link
-    while True:
-        seen = link.view
-        gateway.health.set_serving(PREVIEW_HEALTH, serving=seen.service_reachable)
-        await link.changes.wait_until(partial(_has_changed, gateway, seen), OBSERVE_EVERY_S)
-
-
-def _has_changed(gateway: Gateway, seen: object) -> bool:
-    return gateway.preview_link.view is not seen
+def _has_changed(link: PreviewLink, seen: Snapshot) -> bool:
+    return link.view is not seen.preview
 
 
 def _warn_of_exposure(security: SecuritySettings) -> None:

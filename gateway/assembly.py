@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
 from common.health import Health
@@ -25,20 +26,20 @@ from gateway.links.reconciler import Reconciler
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
-from gateway.rpc.event_stream import EventStream
+from gateway.rpc.calls.methods import CONTRACT
+from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import Admission, RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT
-from gateway.rpc.recipient import Recipients
-from gateway.rpc.response_cache import ResponseCache
+from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.response_cache import ResponseCache
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.rpc.server import SERVICE, Interceptors, Services
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
 from gateway.rpc.services.status import StatusService
-from gateway.rpc.status_stream import StatusStream
 from gateway.shown_settings import shown_settings
 from gateway.state import State
 from gateway.status.board import Board
@@ -46,7 +47,7 @@ from gateway.status.board import Board
 _log = logging.getLogger(__name__)
 
 _PASSPHRASE_BYTES: Final = 24
-"""32 characters of base64: 192 bits, more than the key of SRT's AES-128 holds."""
+"""32 characters of base64: 192 random bits, beyond guessing whatever the length of SRT's AES key."""
 
 
 class Outside(Protocol):
@@ -55,7 +56,7 @@ class Outside(Protocol):
     def feeding(self, board: Board) -> AbstractContextManager[None]:
         """Writes the robot's values to the board while the block lasts."""
 
-    def preview(self) -> Connector[PreviewSpec, PreviewReport]:
+    def preview_connector(self) -> Connector[PreviewSpec, PreviewReport]:
         """Returns what opens connections to the preview service."""
 
 
@@ -84,9 +85,11 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     """
     # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-    model = PreviewModel(_new_passphrase if settings.preview_encrypted else None)
+    model = PreviewModel(
+        partial(secrets.token_urlsafe, _PASSPHRASE_BYTES) if settings.preview_encrypted else None
+    )
     name = f"preview service at {settings.preview.socket}"
-    link = ServiceLink(name, outside.preview(), Reconciler(first_revision, model))
+    link = ServiceLink(name, outside.preview_connector(), Reconciler(first_revision, model))
     control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
@@ -121,7 +124,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         health=Health(SERVICE),
         loop_delay=loop_delay,
         metrics=GatewayCollector(
-            state,
+            state=state,
             stats=stats,
             loop_delay=loop_delay,
             status_stream=status_stream,
@@ -131,34 +134,26 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     )
 
 
+@dataclass(frozen=True, slots=True)
 class ThisRobot:
-    """The robot that the gateway runs on: its ROS graph, its computer, its preview service.
+    """The robot that the gateway runs on: its ROS graph, its computer, its preview service."""
 
-    Args:
-        settings: name the sources, and the preview's socket.
-    """
-
-    def __init__(self, settings: GatewaySettings) -> None:
-        self._settings = settings
+    settings: GatewaySettings
 
     @contextmanager
     def feeding(self, board: Board) -> Iterator[None]:
         """Samples ROS and the computer while the block lasts. A gateway without sources needs no ROS."""
-        with PlatformSampler(self._settings.platform, board):
-            if not self._settings.sources:
+        with PlatformSampler(self.settings.platform, board):
+            if not self.settings.sources:
                 _log.info("no sources are configured; ROS is not used")
                 yield
                 return
             # Late: a gateway without sources runs where ROS is not installed.
             from gateway.ros.intake import intake  # noqa: PLC0415
 
-            with intake(self._settings.sources, board):
+            with intake(self.settings.sources, board):
                 yield
 
-    def preview(self) -> PreviewConnector:
+    def preview_connector(self) -> PreviewConnector:
         """Returns a connector to the configured socket."""
-        return PreviewConnector(self._settings.preview.socket)
-
-
-def _new_passphrase() -> str:
-    return secrets.token_urlsafe(_PASSPHRASE_BYTES)
+        return PreviewConnector(self.settings.preview.socket)

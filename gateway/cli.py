@@ -9,7 +9,7 @@ from rich.console import Console
 from common import logs
 from common.findings import exit_code, print_findings
 from common.program import run, run_to_exit
-from gateway.access_control import read_access
+from gateway.access.reloader import load_access
 from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, load_settings
 from gateway.credentials_cli import app as credentials_app
@@ -39,8 +39,8 @@ def serve(config: Config = None) -> None:
 def check(config: Config = None) -> None:
     """Say whether the configuration is good, and what it names to ask callers who they are, and end."""
     settings = load_settings(config)
-    if settings.security.credentials is not None:
-        read_access(settings.security, settings.security.credentials)
+    if access_files := settings.security.access_files():
+        load_access(*access_files)
     count = len(settings.sources)
     where = f"{settings.grpc.host}:{settings.grpc.port}"
     typer.echo(f"configuration good: '{settings.name}' serves at {where} and reads {count} sources")

@@ -75,11 +75,7 @@ def add(
     certificate: Annotated[bool, typer.Option(help="A client certificate instead of a token.")] = False,
     days: Annotated[
         float | None,
-        typer.Option(
-            min=0.0001,
-            max=36500,
-            help="Validity; by default unlimited for tokens, a year for certificates.",
-        ),
+        typer.Option(min=0.0001, max=36500, help=_DAYS_HELP),
     ] = None,
     begins: Annotated[
         datetime | None, typer.Option(help="Not valid before this time (UTC).", metavar="DATE")
@@ -107,7 +103,7 @@ def list_all(config: Config = None, directory: Directory = None, as_json: AsJson
     table.add_row("id", "name", "role", "kind", "made", "ends", "state")
     for each in credentials:
         row = (each.credential_id, each.name, each.role.value, each.kind.value)
-        table.add_row(*row, _minute(each.made_s), _minute(each.ends_s), each.state(now_s).value)
+        table.add_row(*row, _minute(each.made_s), _minute(each.ends_s), each.validity(now_s).value)
     # Without a terminal, rich would fold the table at 80 columns.
     width = None if sys.stdout.isatty() else 160
     Console(highlight=False, markup=False, emoji=False, width=width).print(table)
@@ -195,17 +191,16 @@ def _minute(instant_s: int | None) -> str:
 
 
 def _as_json(credential: Credential, now_s: float) -> dict[str, Any]:
-    def unix_ms(instant_s: int | None) -> int | None:
-        return None if instant_s is None else instant_s * _MS_PER_S
-
+    instants = {
+        "made": credential.made_s,
+        "begins": credential.begins_s,
+        "ends": credential.ends_s,
+        "revoked": credential.revoked_s,
+    }
     return {
         "id": credential.credential_id,
         "name": credential.name,
         "role": credential.role.value,
         "kind": credential.kind.value,
-        "state": credential.state(now_s).value,
-        "made_unix_ms": unix_ms(credential.made_s),
-        "begins_unix_ms": unix_ms(credential.begins_s),
-        "ends_unix_ms": unix_ms(credential.ends_s),
-        "revoked_unix_ms": unix_ms(credential.revoked_s),
-    }
+        "state": credential.validity(now_s).value,
+    } | {f"{name}_unix_ms": None if at_s is None else at_s * _MS_PER_S for name, at_s in instants.items()}

@@ -91,17 +91,15 @@ def _raised(fault: Fault, sentence: str) -> Event:
 
 
 def _preview_changed(preview: PreviewView) -> Event:
-    detail = PreviewChanged(preview.state, preview.profile, "")
-    match preview.state:
-        case PreviewState.RUNNING:
-            sentence = f"preview running, {preview.profile.value if preview.profile else '?'}"
-        case PreviewState.FAULTED:
-            # Without a sentence: the overlay already has the one of the fault.
-            faulted = PreviewChanged(preview.state, preview.profile, preview.last_error)
-            return Event(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
-        case _:
-            sentence = "preview off"
-    return Event(Severity.INFO, _PREVIEW, sentence, detail, sentence)
+    if preview.state is PreviewState.FAULTED:
+        # Without a sentence: the overlay already has the one of the fault.
+        faulted = PreviewChanged(preview.state, preview.profile, preview.last_error)
+        return Event(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
+    sentence = "preview off"
+    if preview.state is PreviewState.RUNNING:
+        sentence = f"preview running, {preview.profile.value if preview.profile else '?'}"
+    changed = PreviewChanged(preview.state, preview.profile, "")
+    return Event(Severity.INFO, _PREVIEW, sentence, changed, sentence)
 
 
 def _fallback(encoder: Encoder) -> Event:

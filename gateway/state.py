@@ -3,13 +3,15 @@
 import logging
 import secrets
 import time
-from typing import Final, Protocol
+from typing import Final
 
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
+from gateway.links.preview.control import PreviewLink
 from gateway.observer import Observer
 from gateway.platform.files import boot_id
+from gateway.rpc.interceptors.stats import Stats
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
 from gateway.status.event import Event
@@ -17,35 +19,11 @@ from gateway.status.event_log import EventLog
 from gateway.status.faults.rules import FaultRules
 from gateway.status.faults.tracker import FaultTracker
 from gateway.status.preview import PreviewView
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Snapshot, take
+from gateway.status.snapshot import Identity, Runtime, Snapshot, take
 
 _log = logging.getLogger(__name__)
 
 _RUN_ID_BYTES: Final = 8
-
-
-class PreviewSource(Protocol):
-    """The link to the preview service."""
-
-    @property
-    def view(self) -> PreviewView:
-        """The preview at this instant; a new object whenever it changed."""
-
-
-class CallCounts(Protocol):
-    """Statistics of the calls since the start."""
-
-    @property
-    def served(self) -> int:
-        """Calls that were answered."""
-
-    @property
-    def refused(self) -> int:
-        """Calls that were refused."""
-
-    def client_count(self) -> int:
-        """Returns how many connections are active."""
 
 
 class State:
@@ -53,22 +31,22 @@ class State:
 
     Args:
         settings: what is expected of the robot.
-        preview: knows the preview.
-        calls: counts the calls.
+        preview_link: has the view of the preview.
+        stats: counts the calls.
 
     Attributes:
         event_added: notified after each event.
         access: of the newest look at it.
     """
 
-    def __init__(self, settings: GatewaySettings, preview: PreviewSource, calls: CallCounts) -> None:
+    def __init__(self, settings: GatewaySettings, preview_link: PreviewLink, stats: Stats) -> None:
         faults = settings.faults
         self._identity = Identity(
             settings.name, project_version(), settings.security.insecure and not settings.security.guarded
         )
         self._rules = settings.status_rules()
-        self._preview = preview
-        self._calls = calls
+        self._preview_link = preview_link
+        self._stats = stats
         self._revision, self._boot_id = project_revision(), boot_id()
         self._started_s = time.monotonic()
         self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
@@ -83,7 +61,7 @@ class State:
     @property
     def preview(self) -> PreviewView:
         """The preview at this instant; a new object whenever it changed."""
-        return self._preview.view
+        return self._preview_link.view
 
     def snapshot(self) -> Snapshot:
         """Returns everything at this instant, from memory."""
@@ -93,7 +71,7 @@ class State:
             gateway=self._runtime(now_s),
             rules=self._rules,
             board=self.board,
-            preview=self._preview.view,
+            preview=self._preview_link.view,
             events=self.events.newest(),
             faults=self._tracker.faults,
             now_s=now_s,
@@ -123,8 +101,8 @@ class State:
             revision=self._revision,
             boot_id=self._boot_id,
             uptime_ms=int((now_s - self._started_s) * 1000),
-            client_count=self._calls.client_count(),
-            requests_served=self._calls.served,
-            requests_refused=self._calls.refused,
+            client_count=self._stats.client_count(),
+            requests_served=self._stats.served,
+            requests_refused=self._stats.refused,
             run_id=self.events.run_id,
         )

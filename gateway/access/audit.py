@@ -21,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
+from common.private_files import sync_directory
 from gateway.status.event import ControlAction
 
 _log = logging.getLogger(__name__)
@@ -93,6 +94,9 @@ class AuditLog:
             try:
                 self._make_room(path, len(line))
                 _append(path, line.encode())
+                # Once for a burst of lines; what waits behind the last one may be the end.
+                if self._queue.qsize() <= 1:
+                    _sync(path)
             except OSError as error:
                 self._lose(f"{path} can't be written: {error.strerror}")
             else:
@@ -106,6 +110,7 @@ class AuditLog:
             return
         if size + more_bytes <= self._most_bytes:
             return
+        _sync(path)
         generations = [
             path,
             *(path.with_name(f"{path.name}.{number}") for number in range(1, self._generations)),
@@ -115,6 +120,7 @@ class AuditLog:
         for newer, older in reversed(list(pairwise(generations))):
             if newer.exists():
                 newer.replace(older)
+        sync_directory(path.parent)
 
     def _lose(self, why: str) -> None:
         self.error = why
@@ -139,8 +145,17 @@ def _line(action: ControlAction, at: datetime) -> str:
     return json.dumps(fields, ensure_ascii=True) + "\n"
 
 
+def _sync(path: Path) -> None:
+    """Makes the file's lines survive a power loss."""
+    handle = os.open(path, os.O_WRONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 def _append(path: Path, line: bytes) -> None:
-    """A whole line or none: of one that a full disk has cut, nothing stays."""
+    """Appends the whole line or nothing of it, where a full disk would cut it."""
     handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, _FILE_MODE)
     try:
         before = os.fstat(handle).st_size
@@ -148,5 +163,7 @@ def _append(path: Path, line: bytes) -> None:
         if written < len(line):
             os.ftruncate(handle, before)
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        if before == 0:
+            sync_directory(path.parent)
     finally:
         os.close(handle)

@@ -7,14 +7,14 @@ from typing import Final
 
 from common.errors import NotAuthenticatedError
 from common.reasons import Reason
-from gateway.access.credential import Credential, Kind, Principal, State
+from gateway.access.credential import Credential, Kind, Principal, Validity
 from gateway.access.store import Store
 from gateway.access.token import Token, parse_token, verify
 
 _INVALID: Final = {
-    State.REVOKED: (Reason.CREDENTIAL_REVOKED, "was revoked"),
-    State.EXPIRED: (Reason.CREDENTIAL_EXPIRED, "has expired"),
-    State.NOT_YET: (Reason.CREDENTIAL_NOT_YET_VALID, "is not valid yet, by the robot's clock"),
+    Validity.REVOKED: (Reason.CREDENTIAL_REVOKED, "was revoked"),
+    Validity.EXPIRED: (Reason.CREDENTIAL_EXPIRED, "has expired"),
+    Validity.NOT_YET: (Reason.CREDENTIAL_NOT_YET_VALID, "is not valid yet, by the robot's clock"),
 }
 
 
@@ -80,13 +80,13 @@ class Authenticator:
         now_s = self._clock()
         credentials = [self._by_id.get(each) for each in principal.credential_ids]
         return all(
-            each is not None and each.state(now_s) is State.VALID and each.role.may(principal.role)
+            each is not None and each.validity(now_s) is Validity.VALID and each.role.may(principal.role)
             for each in credentials
         )
 
     def _principal(self, credential: Credential) -> Principal:
-        state = credential.state(self._clock())
-        if state is not State.VALID:
+        state = credential.validity(self._clock())
+        if state is not Validity.VALID:
             reason, problem = _INVALID[state]
             what = f"the {credential.kind.value} of {credential.name} ({credential.credential_id}) {problem}"
             raise NotAuthenticatedError(what, reason)

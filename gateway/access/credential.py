@@ -13,7 +13,7 @@ class Kind(Enum):
     CERTIFICATE = "certificate"
 
 
-class State(Enum):
+class Validity(Enum):
     """Validity of a credential at one instant."""
 
     VALID = "valid"
@@ -47,15 +47,15 @@ class Credential:
     ends_s: int | None = None
     revoked_s: int | None = None
 
-    def state(self, now_s: float) -> State:
+    def validity(self, now_s: float) -> Validity:
         """Returns the validity at `now_s`; revocation takes precedence."""
         if self.revoked_s is not None:
-            return State.REVOKED
+            return Validity.REVOKED
         if self.ends_s is not None and now_s >= self.ends_s:
-            return State.EXPIRED
+            return Validity.EXPIRED
         if self.begins_s is not None and now_s < self.begins_s:
-            return State.NOT_YET
-        return State.VALID
+            return Validity.NOT_YET
+        return Validity.VALID
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,13 @@
 """Administration of a robot's credentials: initialize, add, revoke, rotate."""
 
+import stat
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from common.errors import UserError
-from common.private_files import directory_lock
+from common.private_files import directory_lock, write_all_private
 from gateway.access.ca import (
     certificate_info,
     issue_client_certificate,
@@ -14,11 +15,11 @@ from gateway.access.ca import (
     new_ca,
 )
 from gateway.access.command import credentials_command
-from gateway.access.credential import Credential, Kind, State
-from gateway.access.directory import CredentialDirectory
+from gateway.access.credential import Credential, Kind, Validity
+from gateway.access.directory import CredentialDirectory, read_public
 from gateway.access.login_bundle import LoginBundle
 from gateway.access.role import Role
-from gateway.access.store import Store, check_name
+from gateway.access.store import Store, check_name, store_text
 from gateway.access.token import hash_of, new_id, new_token
 
 _CA_DAYS: Final = 3650.0
@@ -26,6 +27,7 @@ _SERVER_DAYS: Final = 825.0
 """The longest lifetime that all current TLS libraries accept."""
 _CLIENT_DAYS: Final = 365.0
 _DAY_S: Final = 86_400
+_WRITABLE_BY_OTHERS: Final = stat.S_IWGRP | stat.S_IWOTH
 
 Issued: TypeAlias = tuple[Credential, LoginBundle]
 
@@ -47,21 +49,18 @@ class CredentialRequest:
     days: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
 class CredentialAdmin:
     """Changes the credential directory of one robot.
 
-    Args:
-        directory: the directory.
+    Attributes:
         robot: name of the gateway.
         clock: calendar time, seconds since 1970.
     """
 
-    def __init__(
-        self, directory: CredentialDirectory, robot: str, clock: Callable[[], float] = time.time
-    ) -> None:
-        self._directory = directory
-        self._robot = robot
-        self._clock = clock
+    directory: CredentialDirectory
+    robot: str
+    clock: Callable[[], float] = time.time
 
     def initialize(self, hosts: Iterable[str], *, again: bool = False) -> None:
         """Creates the CA, the server certificate and an empty list.
@@ -71,19 +70,22 @@ class CredentialAdmin:
             again: replaces existing credentials, which become invalid.
 
         Raises:
-            UserError: there are credentials already, or a file can't be written.
+            UserError: there are credentials already, others may write to the directory, or a file can't be
+                written.
         """
-        directory = self._directory
+        directory = self.directory
+        if directory.path.exists() and directory.path.stat().st_mode & _WRITABLE_BY_OTHERS:
+            raise UserError(
+                f"other users may write to {directory.path}, so that they could replace its files",
+                f"Type: chmod 700 {directory.path}, or choose another directory",
+            )
         with directory_lock(directory.path):
             if directory.store_file.exists() and not again:
                 raise UserError(
                     f"{directory.path} already has credentials",
                     f"Type: {credentials_command('list')}; with --again all of them are discarded",
                 )
-            directory.path.chmod(0o700)
-            self._write_new_ca(hosts)
-            # Last: a directory without a list is incomplete, and may be initialized again.
-            directory.write_store(Store())
+            self._replace_all(hosts, Store())
 
     def add(self, request: CredentialRequest) -> Issued:
         """Issues a credential. Its secret is in the login bundle alone.
@@ -93,7 +95,7 @@ class CredentialAdmin:
         """
         check_name(request.name)
         issued = self._issue(request)
-        return self._directory.change_store(lambda store: (store.adding(issued[0]), issued))
+        return self.directory.change_store(lambda store: (store.adding(issued[0]), issued))
 
     def revoke(self, name_or_id: str) -> tuple[Credential, ...]:
         """Revokes all credentials of a name, or the one of an id, and returns them.
@@ -101,13 +103,13 @@ class CredentialAdmin:
         Raises:
             UserError: no valid credential has this name or id.
         """
-        now_s = int(self._clock())
+        now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, tuple[Credential, ...]]:
             found = store.find(name_or_id, now_s)
             return store.revoking(found, now_s), found
 
-        return self._directory.change_store(change)
+        return self.directory.change_store(change)
 
     def rotate(self, name_or_id: str, overlap_s: int = 0) -> Issued:
         """Issues a new secret for the name and role of a credential, which becomes invalid.
@@ -119,7 +121,7 @@ class CredentialAdmin:
         Raises:
             UserError: no valid credential has this name or id, or several do.
         """
-        now_s = int(self._clock())
+        now_s = int(self.clock())
 
         def change(store: Store) -> tuple[Store, Issued]:
             found = store.find(name_or_id, now_s)
@@ -133,7 +135,7 @@ class CredentialAdmin:
             ended = store.expiring(found, now_s + overlap_s) if overlap_s else store.revoking(found, now_s)
             return ended.adding(issued[0]), issued
 
-        return self._directory.change_store(change)
+        return self.directory.change_store(change)
 
     def rotate_server(self, hosts: Iterable[str] | None) -> tuple[str, ...]:
         """Issues a new server certificate. Clients need no change.
@@ -147,11 +149,11 @@ class CredentialAdmin:
         Raises:
             UserError: the CA or the present certificate can't be read, or the new one can't be written.
         """
-        directory = self._directory
-        ca = directory.ca.read()
-        with directory_lock(directory.path):
+        directory = self.directory
+        with directory.locked():
             known = tuple(hosts) if hosts is not None else self._hosts()
-            directory.server.write(issue_server_certificate(ca, self._robot, known, _SERVER_DAYS))
+            server = issue_server_certificate(directory.ca.read(), self.robot, known, _SERVER_DAYS)
+            write_all_private(directory.server.contents(server))
         return known
 
     def rotate_ca(self, hosts: Iterable[str] | None) -> tuple[Credential, ...]:
@@ -163,36 +165,47 @@ class CredentialAdmin:
         Raises:
             UserError: as `rotate_server`.
         """
-        directory, now_s = self._directory, int(self._clock())
-        known = tuple(hosts) if hosts is not None else self._hosts()
-
-        def revoke_certificates(store: Store) -> tuple[Store, tuple[Credential, ...]]:
+        directory, now_s = self.directory, int(self.clock())
+        with directory.locked():
+            store = directory.read_store()
             revoked = tuple(
                 each
                 for each in store.credentials.values()
-                if each.kind is Kind.CERTIFICATE and each.state(now_s) in (State.VALID, State.NOT_YET)
+                if each.kind is Kind.CERTIFICATE
+                and each.validity(now_s) in (Validity.VALID, Validity.NOT_YET)
             )
-            return store.revoking(revoked, now_s), revoked
-
-        revoked = directory.change_store(revoke_certificates)
-        with directory_lock(directory.path):
-            self._write_new_ca(known)
+            known = tuple(hosts) if hosts is not None else self._hosts()
+            self._replace_all(known, store.revoking(revoked, now_s))
         return revoked
 
-    def _write_new_ca(self, hosts: Iterable[str]) -> None:
-        ca = new_ca(self._robot, _CA_DAYS)
-        self._directory.ca.write(ca)
-        self._directory.server.write(issue_server_certificate(ca, self._robot, hosts, _SERVER_DAYS))
+    def _replace_all(self, hosts: Iterable[str], store: Store) -> None:
+        ca = new_ca(self.robot, _CA_DAYS)
+        server = issue_server_certificate(ca, self.robot, hosts, _SERVER_DAYS)
+        directory = self.directory
+        # The server's first: after a crash in between, `rotate server` repairs it with the CA that laptops
+        # know. The list last: a directory without one is incomplete, and may be initialized again.
+        write_all_private(
+            directory.server.contents(server)
+            | directory.ca.contents(ca)
+            | {directory.store_file: store_text(store).encode()}
+        )
 
     def _hosts(self) -> tuple[str, ...]:
-        return certificate_info(self._directory.server.read().certificate).hosts
+        """Returns those of the present certificate, whether or not it still has its key."""
+        files = self.directory.server
+        try:
+            return certificate_info(read_public(files.certificate, files.name)).hosts
+        except ValueError as error:
+            raise UserError(
+                f"{files.certificate} can't be parsed: {error}", "Name the hosts: --host"
+            ) from error
 
     def _issue(self, request: CredentialRequest) -> Issued:
-        now_s, credential_id, begins_s = int(self._clock()), new_id(), request.begins_s
+        now_s, credential_id, begins_s = int(self.clock()), new_id(), request.begins_s
         certificate = request.kind is Kind.CERTIFICATE
         days = _CLIENT_DAYS if request.days is None and certificate else request.days
         ends_s = None if days is None else int((begins_s or now_s) + days * _DAY_S)
-        ca = self._directory.ca.read()
+        ca = self.directory.ca.read()
         client, token = None, ""
         if certificate:
             # From the issue on, not from `begins_s`: the list alone checks the start of validity.
@@ -205,4 +218,4 @@ class CredentialAdmin:
         credential = Credential(
             credential_id, name, role, request.kind, proof, now_s, begins_s=begins_s, ends_s=ends_s
         )
-        return credential, LoginBundle(name, role.value, self._robot, ca.certificate, token, client)
+        return credential, LoginBundle(name, role.value, self.robot, ca.certificate, token, client)

@@ -10,17 +10,19 @@ atomically.
 
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
 from common.errors import ExitCode, UserError
 from common.private_files import directory_lock, write_private
-from gateway.access.ca import KeyPair
+from gateway.access.ca import KeyPair, key_matches
 from gateway.access.command import credentials_command
 from gateway.access.store import Store, parse_store, store_text
 
+_ROOT: Final = 0
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 _MAX_BYTES: Final = 1 << 20
 _STORE: Final = "credentials.json"
@@ -31,30 +33,43 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, slots=True)
 class KeyPairFiles:
-    """A certificate and its key on disk; `name` says in errors whose they are."""
+    """A certificate and its key on disk.
+
+    Attributes:
+        name: says in errors whose they are.
+        argument: of the command `rotate` that replaces them.
+    """
 
     certificate: Path
     key: Path
     name: str
+    argument: str = "server"
 
     def read(self) -> KeyPair:
         """Reads both.
 
         Raises:
-            UserError: one can't be read, or others have permissions on the key.
+            UserError: one can't be read, others have permissions on the key, or they do not match.
         """
-        return KeyPair(
+        pair = KeyPair(
             read_public(self.certificate, self.name), _read_private(self.key, f"key of the {self.name}")
         )
+        try:
+            matches = key_matches(pair)
+        except ValueError as error:
+            raise UserError(
+                f"a certificate or key of {self.certificate} can't be parsed: {error}", "Both must be PEM"
+            ) from error
+        if not matches:
+            raise UserError(
+                f"{self.key} is not the key of {self.certificate}",
+                f"To replace both, type: {credentials_command(f'rotate {self.argument}')}",
+            )
+        return pair
 
-    def write(self, pair: KeyPair) -> None:
-        """Replaces both: the key first. A reader in between finds that they do not match, and reads again.
-
-        Raises:
-            UserError: one can't be written.
-        """
-        write_private(self.key, pair.key)
-        write_private(self.certificate, pair.certificate)
+    def contents(self, pair: KeyPair) -> dict[Path, bytes]:
+        """Returns what to write, the key first: a reader in between finds no match, and reads again."""
+        return {self.key: pair.key, self.certificate: pair.certificate}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +86,7 @@ class CredentialDirectory:
     @property
     def ca(self) -> KeyPairFiles:
         """Files of the robot's CA."""
-        return KeyPairFiles(self.path / "ca.pem", self.path / "ca-key.pem", "certificate authority")
+        return KeyPairFiles(self.path / "ca.pem", self.path / "ca-key.pem", "certificate authority", "ca")
 
     @property
     def server(self) -> KeyPairFiles:
@@ -94,13 +109,17 @@ class CredentialDirectory:
                 exit_code=ExitCode.USAGE,
             ) from error
 
-    def write_store(self, store: Store) -> None:
-        """Replaces the list of credentials.
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keeps other programs from changing the directory while the block lasts.
 
         Raises:
-            UserError: it can't be written.
+            UserError: as `read_store`, or the lock is not free.
         """
-        write_private(self.store_file, store_text(store).encode())
+        # Read before the lock, which would create a missing directory.
+        self.read_store()
+        with directory_lock(self.path):
+            yield
 
     def change_store(self, change: Callable[[Store], tuple[Store, _T]]) -> _T:
         """Replaces the list by the one that `change` returns, under the lock; returns its second result.
@@ -108,11 +127,9 @@ class CredentialDirectory:
         Raises:
             UserError: as `read_store`; what `change` raises; or it can't be written.
         """
-        # Read before the lock, which would create a missing directory.
-        self.read_store()
-        with directory_lock(self.path):
+        with self.locked():
             store, result = change(self.read_store())
-            self.write_store(store)
+            write_private(self.store_file, store_text(store).encode())
         return result
 
 
@@ -126,7 +143,14 @@ def read_public(path: Path, name: str) -> bytes:
 
 
 def _read_private(path: Path, name: str) -> bytes:
-    content, mode = _read(path, name)
+    content, status = _read(path, name)
+    mode = stat.S_IMODE(status.st_mode)
+    if status.st_uid not in {os.geteuid(), _ROOT}:
+        raise UserError(
+            f"the {name} {path} belongs to another user (id {status.st_uid}), who could replace it",
+            f"Type: chown {os.geteuid()} {path}",
+            exit_code=ExitCode.USAGE,
+        )
     if mode & _OTHERS:
         raise UserError(
             f"other users have access to the {name} {path} (mode {mode:04o})",
@@ -136,11 +160,11 @@ def _read_private(path: Path, name: str) -> bytes:
     return content
 
 
-def _read(path: Path, name: str) -> tuple[bytes, int]:
+def _read(path: Path, name: str) -> tuple[bytes, os.stat_result]:
     try:
-        # The mode is that of the opened file, which can't be exchanged between check and read.
+        # The status is that of the opened file, which can't be exchanged between check and read.
         with path.open("rb") as file:
-            mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
+            status = os.fstat(file.fileno())
             content = file.read(_MAX_BYTES + 1)
     except OSError as error:
         raise UserError(
@@ -150,7 +174,7 @@ def _read(path: Path, name: str) -> tuple[bytes, int]:
         ) from error
     if len(content) > _MAX_BYTES:
         raise UserError(f"the {name} {path} is larger than 1 MiB", exit_code=ExitCode.USAGE)
-    return content, mode
+    return content, status
 
 
 def _remedy(path: Path, error: OSError) -> str:

@@ -15,7 +15,6 @@ from typing import Final
 from common.backoff import Backoff
 from common.errors import TooMuchError
 from common.reasons import Reason
-from gateway.access.address_prefix import address_prefix
 
 FREE_FAILURES: Final = 5
 """Failures without a wait: people mistype, and programs start with an old token."""
@@ -48,21 +47,18 @@ class Lockout:
         self._entries: dict[tuple[str, str], _Entry] = {}
         """Ordered by last failure, the latest at the end."""
 
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def admit(self, host: str, credential_id: str) -> None:
+    def admit(self, address_prefix: str, credential_id: str) -> None:
         """Checks that an attempt may be made.
 
         Args:
-            host: address of the caller, without the port.
+            address_prefix: of the caller, see gateway/access/address_prefix.py.
             credential_id: the credential that the token names; empty if this robot has none of that id.
 
         Raises:
             TooMuchError: the pair is locked.
         """
         # Every call passes here, and nearly always there are no entries.
-        entry = self._entries.get((address_prefix(host), credential_id)) if self._entries else None
+        entry = self._entries.get((address_prefix, credential_id)) if self._entries else None
         if entry is None:
             return
         left_s = entry.locked_until_s - self._clock()
@@ -74,9 +70,9 @@ class Lockout:
                 left_s,
             )
 
-    def failed(self, host: str, credential_id: str) -> bool:
+    def failed(self, address_prefix: str, credential_id: str) -> bool:
         """Counts a failed attempt; returns whether the pair is locked now."""
-        key, now_s = (address_prefix(host), credential_id), self._clock()
+        key, now_s = (address_prefix, credential_id), self._clock()
         entry = self._entries.pop(key, None)
         if entry is None or now_s - entry.last_s > FORGET_AFTER_S:
             entry = _Entry(now_s, now_s)
@@ -90,7 +86,7 @@ class Lockout:
             del self._entries[next(iter(self._entries))]
         return locked
 
-    def succeeded(self, host: str, credential_id: str) -> None:
+    def succeeded(self, address_prefix: str, credential_id: str) -> None:
         """Resets the pair after a successful attempt."""
         if self._entries:
-            self._entries.pop((address_prefix(host), credential_id), None)
+            self._entries.pop((address_prefix, credential_id), None)

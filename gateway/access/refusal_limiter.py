@@ -37,9 +37,6 @@ class RefusalLimiter:
         self._callers: dict[str, _Caller] = {}
         """Ordered by last use, the latest at the end."""
 
-    def __len__(self) -> int:
-        return len(self._callers)
-
     def take(self, caller: str) -> int | None:
         """Takes a token for one refusal of this caller, a name or an address.
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import UserError
-from gateway.access.ca import KeyPair, certificate_info, key_matches
+from gateway.access.ca import KeyPair, certificate_info
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store
@@ -82,19 +82,13 @@ def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedA
     server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
     client_ca = read_public(tls.client_ca, "certificate authority") if tls.client_ca else None
     try:
-        matches = key_matches(server)
         ends_s = {"server_certificate": certificate_info(server.certificate).ends_s}
         if client_ca:
             ends_s["authority"] = certificate_info(client_ca).ends_s
     except ValueError as error:
         raise UserError(
-            f"a certificate or key of {tls.certificate} can't be parsed: {error}", "Both must be PEM"
+            f"the certificate authority {tls.client_ca} can't be parsed: {error}", "It must be PEM"
         ) from error
-    if not matches:
-        raise UserError(
-            f"{tls.key} is not the key of {tls.certificate}",
-            f"To replace both, type: {credentials_command('rotate server')}",
-        )
     return LoadedAccess(store, TlsMaterial(server, client_ca), ends_s)
 
 
@@ -105,7 +99,6 @@ class CredentialReloader:
         directory: of the credentials.
         tls: files of the certificates; None without TLS.
         on_change: called with each new version.
-        clock: calendar time, seconds since 1970.
 
     Raises:
         UserError: the initial version can't be read.
@@ -116,14 +109,12 @@ class CredentialReloader:
         directory: CredentialDirectory,
         tls: TlsFiles | None,
         on_change: Callable[[LoadedAccess], None],
-        clock: Callable[[], float] = time.time,
     ) -> None:
         self._directory = directory
         self._tls = tls
         self._files = [directory.store_file]
         if tls:
             self._files += [each for each in (tls.certificate, tls.key, tls.client_ca) if each]
-        self._clock = clock
         self._on_change = on_change
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)
@@ -150,7 +141,7 @@ class CredentialReloader:
 
     def view(self, audit_error: str = "") -> AccessView:
         """Returns the state of access control that operators see."""
-        now_s = self._clock()
+        now_s = time.time()
         return AccessView(
             tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
             self._error,

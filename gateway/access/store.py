@@ -10,13 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from common.errors import UserError
 from gateway.access.command import credentials_command
-from gateway.access.credential import Credential, Kind, State
+from gateway.access.credential import Credential, Kind, Validity
 from gateway.access.role import Role
 
 MAX_CREDENTIALS: Final = 512
 """In one list, including revoked and expired ones."""
 _VERSION: Final = 1
 _NAME: Final = r"[A-Za-z0-9][A-Za-z0-9._@-]{0,62}"
+_RESERVED: Final = frozenset({"ca", "server"})
+"""What `rotate` takes in place of a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class Store:
             each
             for each in self.credentials.values()
             if name_or_id in (each.name, each.credential_id)
-            and each.state(now_s) not in (State.REVOKED, State.EXPIRED)
+            and each.validity(now_s) not in (Validity.REVOKED, Validity.EXPIRED)
         )
         if not found:
             raise UserError(
@@ -78,12 +80,17 @@ def check_name(name: str) -> str:
     """Returns the name if a credential may have it.
 
     Raises:
-        UserError: it has other characters or is too long.
+        UserError: it has other characters, is too long, or means a certificate of the robot.
     """
     if not re.fullmatch(_NAME, name):
         raise UserError(
             f"'{name}' can't be the name on a credential",
             "Use up to 63 letters, digits, . _ @ and -, starting with a letter or digit",
+        )
+    if name in _RESERVED:
+        raise UserError(
+            f"'{name}' can't be the name on a credential: `rotate {name}` is a certificate",
+            "Use another name",
         )
     return name
 

@@ -1,11 +1,12 @@
 """`faults`: the thresholds that the robot's owner tunes."""
 
+from dataclasses import fields
 from typing import Self
 
 from pydantic import Field, model_validator
 
 from common.config import Section
-from gateway.status.faults.limits import Limit, PlatformLimits
+from gateway.status.faults.platform import Limit, PlatformLimits
 
 
 class _LimitSettings(Section):
@@ -58,10 +59,5 @@ class FaultSettings(Section):
 
     def platform_limits(self) -> PlatformLimits:
         """Returns the limits in the form that the fault rules take."""
-        return PlatformLimits(
-            temperature_c=self.temperature_c.limit(),
-            memory_percent=self.memory_percent.limit(),
-            disk_percent=self.disk_percent.limit(),
-            battery_percent=self.battery_percent.limit(),
-            wifi_signal_dbm=self.wifi_signal_dbm.limit(),
-        )
+        names = (field.name for field in fields(PlatformLimits))
+        return PlatformLimits(**{name: getattr(self, name).limit() for name in names})

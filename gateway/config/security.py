@@ -6,6 +6,8 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from common.config import Section
+from gateway.access.directory import CredentialDirectory
+from gateway.access.reloader import TlsFiles
 
 
 class TlsSettings(Section):
@@ -56,6 +58,21 @@ class SecuritySettings(Section):
     def guarded(self) -> bool:
         """Whether callers are authenticated and connections encrypted."""
         return self.credentials is not None and self.tls.enabled
+
+    def access_files(self) -> tuple[CredentialDirectory, TlsFiles | None] | None:
+        """Returns where credentials and certificates are; None if callers are not authenticated.
+
+        The certificates are those named here, else those of the directory; None without TLS.
+        """
+        if self.credentials is None:
+            return None
+        files, tls = CredentialDirectory(self.credentials), self.tls
+        if not tls.enabled:
+            return files, None
+        client_ca = (tls.client_ca or files.ca.certificate) if tls.client_certificates else None
+        return files, TlsFiles(
+            tls.certificate or files.server.certificate, tls.key or files.server.key, client_ca
+        )
 
     @model_validator(mode="after")
     def _need_credentials(self) -> Self:

@@ -102,7 +102,7 @@ def _check_exposure(settings: GatewaySettings) -> None:
         )
     metrics = settings.metrics
     open_metrics = metrics.port is not None and not is_loopback(metrics.host)
-    if open_metrics and not (security.insecure or metrics.insecure):
+    if open_metrics and not metrics.insecure:
         raise UserError(
             f"metrics.host is {metrics.host}: anyone on that network could read the metrics",
             "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",

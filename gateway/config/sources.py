@@ -23,10 +23,6 @@ def _known_kind(kind: str) -> str:
     return kind
 
 
-def _default_staleness(validated: dict[str, Any]) -> int:
-    return _STALE_AFTER_MS[validated["kind"]]
-
-
 class SourceSettings(Section):
     """One ROS 2 topic."""
 
@@ -37,7 +33,7 @@ class SourceSettings(Section):
     type: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")
     reliability: Literal["best_effort", "reliable"] = "best_effort"
     durability: Literal["volatile", "transient_local"] = "volatile"
-    stale_after_ms: int = Field(default_factory=_default_staleness, gt=0)
+    stale_after_ms: int = Field(default_factory=lambda validated: _STALE_AFTER_MS[validated["kind"]], gt=0)
     """Age from which the value is too old to rely on; the default depends on the kind."""
     required: bool = False
     """Whether the robot counts as degraded without this source (odometry and vision only)."""

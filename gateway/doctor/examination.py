@@ -8,9 +8,10 @@ from pathlib import Path
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from gateway.access.command import credentials_command
-from gateway.access.credential import State
-from gateway.access_control import read_access
-from gateway.config import SecuritySettings, SourceSettings, load_settings
+from gateway.access.credential import Validity
+from gateway.access.directory import CredentialDirectory
+from gateway.access.reloader import TlsFiles, load_access
+from gateway.config import SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
 from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
 
@@ -29,25 +30,25 @@ def examine(config: Path | None) -> Iterator[Finding]:
             "security.insecure: everyone who can reach the gateway may read and control everything",
             "Nothing is encrypted, and callers are not authenticated",
         )
-    if settings.security.credentials is not None:
-        yield _access(settings.security, settings.security.credentials)
+    if access_files := settings.security.access_files():
+        yield _access(*access_files)
     yield operator_endpoint(settings.grpc.host, settings.grpc.port)
     yield preview_endpoint(settings.preview.socket)
     yield from device_findings()
     yield from _ros(settings.sources)
 
 
-def _access(settings: SecuritySettings, directory: Path) -> Finding:
+def _access(directory: CredentialDirectory, tls: TlsFiles | None) -> Finding:
     try:
-        loaded = read_access(settings, directory)
+        loaded = load_access(directory, tls)
     except UserError as error:
         return wrong("access", error.what, "The gateway does not start with it", error.remedy)
     now_s = time.time()
-    valid = sum(each.state(now_s) is State.VALID for each in loaded.store.credentials.values())
+    valid = sum(each.validity(now_s) is Validity.VALID for each in loaded.store.credentials.values())
     if not valid:
         return note(
             "access",
-            f"no credential in {directory} is valid",
+            f"no credential in {directory.path} is valid",
             "Every caller must present one",
             f"Type: {credentials_command('add NAME --role operator')}",
         )

@@ -5,7 +5,6 @@ import logging
 import time
 from collections.abc import AsyncIterator, Awaitable, Coroutine
 from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
 from typing import Any, Final, Generic, NoReturn, Protocol, TypeVar
 
 from common import request_id
@@ -60,15 +59,6 @@ class Connector(Protocol[SpecT, ReportT_co]):
         """Returns a connection that closes with the block. Raises LinkLostError if it cannot be opened."""
 
 
-@dataclass(frozen=True, slots=True)
-class LinkHealth:
-    """Whether the service is reachable, failures in a row, and the reason of the last one (empty: none)."""
-
-    reachable: bool
-    failures: int
-    last_error: str
-
-
 class ServiceLink(Generic[SpecT, ReportT, ViewT]):
     """Link to one service, which runs on when the gateway ends.
 
@@ -96,7 +86,6 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         self._silence_s = silence_s
         self._apply_deadline_s = apply_deadline_s
         self._backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
-        self._last_error = ""
         self.changes = Broadcast()
 
     @property
@@ -110,9 +99,14 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
         return self._reconciler.desired
 
     @property
-    def health(self) -> LinkHealth:
-        """Condition of the connection, from memory."""
-        return LinkHealth(self._reconciler.error is None, self._backoff.failures, self._last_error)
+    def failures(self) -> int:
+        """Failures in a row to connect; 0 while the service is reachable."""
+        return self._backoff.failures
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the service refuses the desired state; None if it does not."""
+        return self._reconciler.refusal
 
     def request(self, spec: SpecT) -> Desired[SpecT]:
         """Replaces the desired state; returns without waiting for the service."""
@@ -132,9 +126,9 @@ class ServiceLink(Generic[SpecT, ReportT, ViewT]):
     async def run(self) -> NoReturn:
         """Connects, and reconnects whenever the connection breaks, until cancelled."""
         while True:
-            self._last_error, detail = await self._session()
+            reason, detail = await self._session()
             pause_s = self._backoff.next_s()
-            if self._reconciler.take_loss(self._last_error):
+            if self._reconciler.take_loss(reason):
                 _log.warning("%s lost: %s", self._name, detail)
             elif self._backoff.failures == 1:
                 _log.warning("%s not reached: %s", self._name, detail)

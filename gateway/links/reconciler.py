@@ -55,8 +55,11 @@ class Model(Protocol[SpecT, ReportT, ViewT]):
     def settled(self, spec: SpecT, report: ReportT) -> bool:
         """Whether the service, which has applied the spec, has reached it or failed to."""
 
+    def take_change(self, reconciler: "Reconciler[SpecT, ReportT, ViewT]") -> None:
+        """Called after each change, before `view`."""
+
     def view(self, reconciler: "Reconciler[SpecT, ReportT, ViewT]") -> ViewT:
-        """Returns what clients may know. Called after each change."""
+        """Returns what clients may know; changes nothing."""
 
 
 class Reconciler(Generic[SpecT, ReportT, ViewT]):
@@ -149,7 +152,8 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
     def _adopt(self, report: ReportT) -> None:
         """Continues what an earlier gateway had applied, at the first contact without a request before it."""
         spec, must_be_applied = self._model.adopt(self.desired.spec, report)
-        self.desired = Desired(report.applied_revision + must_be_applied, spec)
+        revision = report.applied_revision
+        self.desired = Desired(revision + 1 if must_be_applied else revision, spec)
         self._owned = True
 
     def _is_outdated(self, report: ReportT) -> bool:
@@ -163,6 +167,7 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
         return self.report.value.applied_revision if self.report else 0
 
     def _update_view(self) -> None:
+        self._model.take_change(self)
         view = self._model.view(self)
         if view != self.view:
             self.view = view

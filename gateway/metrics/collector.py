@@ -1,6 +1,8 @@
 """The metrics by name. docs/metrics.md explains each; a test holds the page and this module together."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from prometheus_client import CollectorRegistry, generate_latest
@@ -12,10 +14,10 @@ from prometheus_client.registry import Collector
 
 from gateway.links.preview.control import PreviewLink
 from gateway.metrics.loop_delay import LoopDelay
-from gateway.rpc.event_stream import EventStream
+from gateway.rpc.calls.ports import SnapshotSource
 from gateway.rpc.interceptors.stats import Stats
-from gateway.rpc.ports import SnapshotSource
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
@@ -23,10 +25,11 @@ from gateway.status.snapshot import Snapshot
 _PREFIX: Final = "robot_gateway"
 
 
+@dataclass(eq=False)
 class GatewayCollector(Collector):
     """Collects all metrics at one instant.
 
-    Args:
+    Attributes:
         state: where the gauges come from.
         stats: of the calls.
         loop_delay: how late the event loop was.
@@ -35,28 +38,18 @@ class GatewayCollector(Collector):
         preview_link: counts failures to connect.
     """
 
-    def __init__(
-        self,
-        state: SnapshotSource,
-        *,
-        stats: Stats,
-        loop_delay: LoopDelay,
-        status_stream: StatusStream,
-        event_stream: EventStream,
-        preview_link: PreviewLink,
-    ) -> None:
-        self._state = state
-        self._stats = stats
-        self._loop_delay = loop_delay
-        self._status_stream = status_stream
-        self._event_stream = event_stream
-        self._preview_link = preview_link
-        self._registry = CollectorRegistry()
-        self._registry.register(self)
+    state: SnapshotSource
+    stats: Stats
+    loop_delay: LoopDelay
+    status_stream: StatusStream
+    event_stream: EventStream
+    preview_link: PreviewLink
 
     def text(self) -> bytes:
         """Returns them in Prometheus' text format."""
-        return generate_latest(self._registry)
+        registry = CollectorRegistry()
+        registry.register(self)
+        return generate_latest(registry)
 
     def describe(self) -> list[Metric]:
         """Returns nothing: without this method, registering would collect."""
@@ -64,28 +57,27 @@ class GatewayCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Yields every family."""
-        now = self._state.snapshot()
+        now = self.state.snapshot()
         yield from _gateway(now)
         yield from self._calls()
         yield from self._streams()
         yield from _sources(now)
         yield _faults(now)
         yield from _preview(now.preview)
-        yield Gauge(
-            f"{_PREFIX}_preview_link_failures",
-            "Failures in a row to connect to the preview service.",
-            value=self._preview_link.health.failures,
+        failures = self.preview_link.failures
+        yield _gauge(
+            "preview_link_failures", "Failures in a row to connect to the preview service.", failures
         )
         yield from _stream(now)
 
     def _calls(self) -> Iterator[Metric]:
-        methods = sorted(self._stats.methods.items())
+        methods = sorted(self.stats.methods.items())
         ended = CounterFamily(
             f"{_PREFIX}_requests", "Calls that ended, by gRPC code.", labels=("method", "code")
         )
         durations = HistogramFamily(
             f"{_PREFIX}_request_duration_seconds",
-            "How long calls took; a stream from its first to its last message.",
+            "How long calls took, from arrival to end.",
             labels=("method",),
         )
         for method, stats in methods:
@@ -95,7 +87,7 @@ class GatewayCollector(Collector):
                 durations.add_metric((method,), stats.durations.cumulative(), stats.durations.sum_s)
         yield ended
         yield durations
-        delays = self._loop_delay.delays
+        delays = self.loop_delay.delays
         yield HistogramFamily(
             f"{_PREFIX}_event_loop_delay_seconds",
             "How much later than requested the event loop woke.",
@@ -104,98 +96,93 @@ class GatewayCollector(Collector):
         )
 
     def _streams(self) -> Iterator[Metric]:
-        streams = Gauge(f"{_PREFIX}_streams", "Open streams.", labels=("method",))
-        for method, stats in sorted(self._stats.contract.items()):
-            if stats.open:
-                streams.add_metric((method,), stats.open)
-        yield streams
-        yield CounterFamily(
-            f"{_PREFIX}_statuses_skipped",
-            "Statuses that slow readers did not get, because they got newer ones.",
-            value=self._status_stream.skipped,
-        )
-        yield CounterFamily(
-            f"{_PREFIX}_event_gaps", "Times a subscriber missed events.", value=self._event_stream.gaps
-        )
+        open_streams = {name: each.open for name, each in sorted(self.stats.contract.items()) if each.open}
+        yield _gauges("streams", "Open streams.", "method", open_streams)
+        skipped = "Statuses that slow readers did not get, because they got newer ones."
+        yield _counter("statuses_skipped", skipped, self.status_stream.skipped)
+        yield _counter("event_gaps", "Times a subscriber missed events.", self.event_stream.gaps)
+
+
+def _gauge(name: str, what: str, value: float) -> Metric:
+    return Gauge(f"{_PREFIX}_{name}", what, value=value)
+
+
+def _gauges(name: str, what: str, label: str, values: Mapping[str, float]) -> Metric:
+    """Returns a gauge with a value for each value of its label."""
+    family = Gauge(f"{_PREFIX}_{name}", what, labels=(label,))
+    for labelled, value in values.items():
+        family.add_metric((labelled,), value)
+    return family
+
+
+def _info(name: str, what: str, /, **labels: str) -> Metric:
+    """Returns a gauge that is 1, for the sake of its labels."""
+    family = Gauge(f"{_PREFIX}_{name}", what, labels=tuple(labels))
+    family.add_metric(tuple(labels.values()), 1)
+    return family
+
+
+def _counter(name: str, what: str, value: float) -> Metric:
+    return CounterFamily(f"{_PREFIX}_{name}", what, value=value)
 
 
 def _gateway(now: Snapshot) -> Iterator[Metric]:
-    runtime = now.gateway
-    build = Gauge(f"{_PREFIX}_build_info", "Always 1.", labels=("name", "version", "revision"))
-    build.add_metric((now.identity.name, now.identity.version, runtime.revision), 1)
-    yield build
-    yield Gauge(f"{_PREFIX}_uptime_seconds", "Since the gateway started.", value=runtime.uptime_ms / 1000)
-    clients = runtime.client_count
-    yield Gauge(f"{_PREFIX}_clients", "Connections that called, or got something, lately.", value=clients)
-    yield Gauge(f"{_PREFIX}_robot_ready", "1 when the robot can take work.", value=float(now.health.ready))
+    identity, runtime = now.identity, now.gateway
+    yield _info(
+        "build_info", "Always 1.", name=identity.name, version=identity.version, revision=runtime.revision
+    )
+    yield _gauge("uptime_seconds", "Since the gateway started.", runtime.uptime_ms / 1000)
+    yield _gauge("clients", "Connections that called, or got something, lately.", runtime.client_count)
+    yield _gauge("robot_ready", "1 when the robot can take work.", now.health.ready)
 
 
 def _sources(now: Snapshot) -> Iterator[Metric]:
-    fresh = Gauge(f"{_PREFIX}_source_fresh", "1 while its newest value can be relied on.", labels=("source",))
-    age = Gauge(
-        f"{_PREFIX}_source_age_seconds",
-        "Age of its newest value; absent before the first.",
-        labels=("source",),
-    )
-    for source in now.sources:
-        fresh.add_metric((source.name,), float(source.freshness.fresh))
-        if source.freshness.available:
-            age.add_metric((source.name,), source.freshness.age_ms / 1000)
-    yield from (fresh, age)
+    freshness = {source.spec.name: source.freshness for source in now.sources}
+    fresh = {name: float(each.fresh) for name, each in freshness.items()}
+    yield _gauges("source_fresh", "1 while its newest value can be relied on.", "source", fresh)
+    ages_s = {name: each.age_ms / 1000 for name, each in freshness.items() if each.available}
+    yield _gauges("source_age_seconds", "Age of its newest value; absent before the first.", "source", ages_s)
 
 
 def _faults(now: Snapshot) -> Metric:
-    faults = Gauge(f"{_PREFIX}_faults", "Active faults.", labels=("severity",))
-    for severity in Severity:
-        count = sum(fault.active and fault.condition.severity is severity for fault in now.faults)
-        faults.add_metric((severity.value,), count)
-    return faults
+    active = Counter(fault.condition.severity for fault in now.faults if fault.active)
+    return _gauges("faults", "Active faults.", "severity", {each.value: active[each] for each in Severity})
 
 
 def _preview(preview: PreviewView) -> Iterator[Metric]:
-    state = Gauge(f"{_PREFIX}_preview_state", "1 for the state it is in.", labels=("state",))
-    for each in PreviewState:
-        state.add_metric((each.value,), float(preview.state is each))
-    yield state
-    reachable = float(preview.service_reachable)
-    yield Gauge(f"{_PREFIX}_preview_reachable", "1 while its service answers.", value=reachable)
+    states = {each.value: float(preview.state is each) for each in PreviewState}
+    yield _gauges("preview_state", "1 for the state it is in.", "state", states)
+    yield _gauge("preview_reachable", "1 while its service answers.", preview.service_reachable)
     counters = preview.counters
-    for name, what, count in (
-        ("starts", "Pipelines started.", counters.starts),
-        ("restarts", "Those of them after a fault.", counters.restarts),
-        ("faults", "Times it became faulted.", counters.faults),
-        ("fallbacks", "Encoders that were passed over for the next one.", counters.fallbacks),
-    ):
-        yield CounterFamily(f"{_PREFIX}_preview_{name}", what, value=count)
+    yield _counter("preview_starts", "Pipelines started.", counters.starts)
+    yield _counter("preview_restarts", "Those of them after a fault.", counters.restarts)
+    yield _counter("preview_faults", "Times it became faulted.", counters.faults)
+    passed_over = "Encoders that were passed over for the next one."
+    yield _counter("preview_fallbacks", passed_over, counters.fallbacks)
 
 
 def _stream(now: Snapshot) -> Iterator[Metric]:
     """Of the running preview; nothing while there is none, or while its figures are old."""
     if encoder := now.preview.encoder:
-        info = Gauge(
-            f"{_PREFIX}_preview_encoder_info",
+        yield _info(
+            "preview_encoder_info",
             "Always 1: which encoder runs, and which was wanted.",
-            labels=("encoder", "hardware", "wanted"),
+            encoder=encoder.name,
+            hardware=str(encoder.hardware).lower(),
+            wanted=encoder.wanted,
         )
-        info.add_metric((encoder.name, str(encoder.hardware).lower(), encoder.wanted), 1)
-        yield info
     if stream := now.preview.stream:
         target = stream.target_bitrate_kbps * 1000
-        yield Gauge(f"{_PREFIX}_preview_target_bits_per_second", "The encoder's target.", value=target)
+        yield _gauge("preview_target_bits_per_second", "The encoder's target.", target)
     measured = now.preview_measured.value
     if measured is None or now.preview_measured.freshness.stale:
         return
-    for name, what, value in (
-        ("viewers", "Connected to the stream.", measured.viewer_count),
-        ("bits_per_second", "Leaving for each viewer.", measured.bitrate_kbps * 1000),
-        ("frames_per_second", "Leaving.", measured.fps),
-        ("frame_age_seconds", "Of the newest one that left.", measured.last_frame_age_ms / 1000),
-        ("worst_rtt_seconds", "Of all viewers.", _per_thousand(measured.worst_rtt_ms)),
-        ("worst_loss_percent", "Of all viewers.", measured.worst_loss_percent),
-    ):
-        if value is not None:
-            yield Gauge(f"{_PREFIX}_preview_{name}", what, value=value)
-
-
-def _per_thousand(value: float | None) -> float | None:
-    return None if value is None else value / 1000
+    yield _gauge("preview_viewers", "Connected to the stream.", measured.viewer_count)
+    yield _gauge("preview_bits_per_second", "Leaving for each viewer.", measured.bitrate_kbps * 1000)
+    yield _gauge("preview_frames_per_second", "Leaving.", measured.fps)
+    age_s = measured.last_frame_age_ms / 1000
+    yield _gauge("preview_frame_age_seconds", "Of the newest one that left.", age_s)
+    if measured.worst_rtt_ms is not None:
+        yield _gauge("preview_worst_rtt_seconds", "Of all viewers.", measured.worst_rtt_ms / 1000)
+    if measured.worst_loss_percent is not None:
+        yield _gauge("preview_worst_loss_percent", "Of all viewers.", measured.worst_loss_percent)

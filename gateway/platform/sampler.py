@@ -7,7 +7,6 @@ the values become stale, as they should. The thread is a daemon, so that the gat
 import logging
 import threading
 import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Self
 
@@ -30,15 +29,11 @@ class PlatformSampler:
     Args:
         settings: sampling interval, disk and network interface.
         board: receives the values.
-        clock: monotonic seconds.
     """
 
-    def __init__(
-        self, settings: PlatformSettings, board: Board, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, settings: PlatformSettings, board: Board) -> None:
         self._settings = settings
         self._board = board
-        self._clock = clock
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="platform-sampler", daemon=True)
 
@@ -56,11 +51,11 @@ class PlatformSampler:
 
     def sample(self) -> None:
         """Samples all values once."""
-        self._board[COMPUTE] = Received(compute.read(self._settings.disk_path), self._clock())
-        self._board[NETWORK] = Received(network.read(self._settings.interface), self._clock())
+        self._board[COMPUTE] = Received(compute.read(self._settings.disk_path), time.monotonic())
+        self._board[NETWORK] = Received(network.read(self._settings.interface), time.monotonic())
         onboard = battery.read()
         if onboard:
-            self._board[ONBOARD_BATTERY] = Received(onboard, self._clock())
+            self._board[ONBOARD_BATTERY] = Received(onboard, time.monotonic())
 
     def _run(self) -> None:
         interval_s = self._settings.interval_ms / 1000

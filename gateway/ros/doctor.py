@@ -69,11 +69,12 @@ def _type_finding(source: SourceSettings) -> Finding:
         reader_for(source)
         installed = message_class(source.type)
     except TypeMissingError as error:
+        package = source.type.partition("/")[0].replace("_", "-")
         return wrong(
             check,
             str(error),
             f"{source.name} can't be read",
-            f"Install the package beside the gateway: apt install ros-$ROS_DISTRO-{_package(source)}",
+            f"Install the package beside the gateway: apt install ros-$ROS_DISTRO-{package}",
         )
     except UserError as error:
         return wrong(check, error.what, f"{source.name} can't be read", error.remedy)
@@ -141,7 +142,3 @@ def _topic_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
             "Set reliability to best_effort and durability to volatile for this source: they fit all",
         )
     return good(check, f"{source.topic}: {len(publishers)} publishing")
-
-
-def _package(source: SourceSettings) -> str:
-    return source.type.partition("/")[0].replace("_", "-")

@@ -27,14 +27,11 @@ def truncate_list(raw: bytes, max_items: int) -> tuple[bytes, int]:
     try:
         frame_id_at = _ENCAPSULATION + _STAMP
         (frame_id_length,) = unsigned.unpack_from(raw, frame_id_at)
-        list_at = _aligned(frame_id_at + _LENGTH + frame_id_length)
+        list_at = frame_id_at + _LENGTH + frame_id_length
+        list_at += -list_at % _LENGTH
         (count,) = unsigned.unpack_from(raw, list_at)
     except struct.error:
         return raw, 0
     if count <= max_items:
         return raw, 0
     return raw[:list_at] + unsigned.pack(max_items) + raw[list_at + _LENGTH :], count - max_items
-
-
-def _aligned(offset: int) -> int:
-    return offset + -offset % _LENGTH

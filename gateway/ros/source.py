@@ -2,11 +2,15 @@
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.serialization import deserialize_message
+
 from gateway.config import SourceSettings
-from gateway.ros.decoding import Decoder
+from gateway.ros.list_truncation import truncate_list
+from gateway.ros.readers import is_header_and_list, reader_for
 from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.values import Received
@@ -22,15 +26,15 @@ _MAX_CLOCK_GAP_S = 50e-6
 _CLOCK_TRIES = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class SourceCounts:
     """Outcome of a source's messages so far."""
 
-    values: int
+    values: int = 0
     """Messages that became a value."""
-    without_value: int
+    without_value: int = 0
     """Messages that held nothing usable: a velocity of NaN, for example."""
-    failures: int
+    failures: int = 0
     """Messages that could not be decoded."""
 
 
@@ -50,22 +54,12 @@ class Source:
         self._settings = settings
         self._spec = settings.spec
         self._subscription = subscription
-        self._decoder = Decoder(settings, subscription.msg_type)
+        self._decode = _decoder_of(settings, subscription.msg_type)
         self._board = board
         self._emptied_at_s = created_at_s
         self._paused_until_s = created_at_s
         self._warned_at_s: float | None = None
-        self._values = self._without_value = self._failures = 0
-
-    @property
-    def counts(self) -> SourceCounts:
-        """Outcome of the messages so far."""
-        return SourceCounts(self._values, self._without_value, self._failures)
-
-    @property
-    def topic(self) -> str:
-        """The topic as configured."""
-        return self._settings.topic
+        self.counts = SourceCounts()
 
     @property
     def publisher_count(self) -> int:
@@ -97,19 +91,19 @@ class Source:
             self._hand_over(raw, received_at(info["received_timestamp"], now, self._emptied_at_s))
             self._board.undecodable.discard(self._spec)
         except Exception as error:  # noqa: BLE001  # one bad message or reader must not end the sampling
-            self._failures += 1
+            self.counts.failures += 1
             self._board.undecodable.add(self._spec)
             self._warn(error, now.monotonic_s)
         return True
 
     def _hand_over(self, raw: bytes, at_s: float) -> None:
-        value = self._decoder.decode(raw)
+        value = self._decode(raw)
         if value is None:
-            self._without_value += 1
+            self.counts.without_value += 1
             return
         # The one place where a value passes from this thread to the others.
         self._board[self._spec] = Received(value, at_s)
-        self._values += 1
+        self.counts.values += 1
 
     def _warn(self, error: Exception, now_s: float) -> None:
         if self._warned_at_s is not None and now_s - self._warned_at_s < _WARN_EVERY_S:
@@ -119,7 +113,7 @@ class Source:
             "%s (%s): a message can't be read, %d so far: %s: %s",
             self._settings.topic,
             self._settings.type,
-            self._failures,
+            self.counts.failures,
             type(error).__name__,
             error,
         )
@@ -132,3 +126,23 @@ def _now() -> Instant:
         if time.monotonic() - now.monotonic_s < _MAX_CLOCK_GAP_S:
             break
     return now
+
+
+def _decoder_of(source: SourceSettings, message_type: Any) -> Callable[[bytes], Any]:
+    """Returns the function that makes a value of a message; None of one that holds nothing usable.
+
+    Errors of the deserialiser pass.
+    """
+    read, max_items, add_truncated = reader_for(source), max_list_items(source), source.spec.add_truncated
+
+    def decode(raw: bytes) -> Any:
+        raw, truncated = truncate_list(raw, max_items) if max_items else (raw, 0)
+        value = read(deserialize_message(raw, message_type), source)
+        return add_truncated(value, truncated) if truncated and add_truncated and value else value
+
+    return decode
+
+
+def max_list_items(source: SourceSettings) -> int | None:
+    """Returns the length to truncate lists to; None if the message is not a header and a list."""
+    return (source.spec.max_items or source.max_items) if is_header_and_list(source) else None

@@ -17,14 +17,14 @@ from common.health import Health
 from common.interceptors import Behavior, Chain
 from common.rpc import STOP_GRACE_S, new_server
 from gateway.config import GrpcSettings
-from gateway.rpc.call import CallContext
-from gateway.rpc.interceptors.audit import Audit
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
+from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
-from gateway.rpc.methods import CONTRACT, Method
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
@@ -78,6 +78,7 @@ class Interceptors:
                 self.audit,  # records what auth and validation refuse
                 *([self.auth] if self.auth else []),
                 self.validation,
+                AuditStart(self.audit),  # records valid requests alone
                 self.presence,  # sees admitted calls alone
             ],
             Method,
@@ -116,18 +117,21 @@ async def serving(
     server.add_generic_rpc_handlers((chain.service(CONTRACT, services.methods()), *extra))
     health.register(server)
     enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)
-    port = bind_tcp(server, settings.host, settings.port, credentials)
-    if settings.socket:
-        bind_unix(server, settings.socket)
-    await server.start()
-    _log.info(
-        "serving operators at %s:%d (%s, %s)",
-        bracketed(settings.host),
-        port,
-        "plaintext" if credentials is None else "TLS",
-        "callers are not authenticated" if interceptors.auth is None else "callers need a credential",
-    )
     try:
+        try:
+            port = bind_tcp(server, settings.host, settings.port, credentials)
+            if settings.socket:
+                bind_unix(server, settings.socket)
+        finally:
+            # After a failure, too: gRPC gives the ports of a server back only if it was started.
+            await server.start()
+        _log.info(
+            "serving operators at %s:%d (%s, %s)",
+            bracketed(settings.host),
+            port,
+            "plaintext" if credentials is None else "TLS",
+            "callers are not authenticated" if interceptors.auth is None else "callers need a credential",
+        )
         yield port
     finally:
         await server.stop(STOP_GRACE_S)

@@ -1,7 +1,7 @@
 """Change detection: what wakes the clients that watch the status.
 
-Total by construction: a source counts unless its spec excludes it, and each field of the snapshot has a
-projection here or is named in EXCLUDED.
+A source counts unless its spec excludes it. Each field of the snapshot has a projection here or is named in
+EXCLUDED, which a test checks.
 """
 
 from collections.abc import Callable, Mapping

@@ -5,7 +5,7 @@ last, and only if that one requested the same velocity just before; in doubt it 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final
 
 from gateway.status.freshness import Sample, sample
@@ -57,8 +57,5 @@ def _source(
 
 
 def _alike(one: Velocity, other: Velocity) -> bool:
-    return (
-        abs(one.vx_mps - other.vx_mps) <= TOLERANCE
-        and abs(one.vy_mps - other.vy_mps) <= TOLERANCE
-        and abs(one.wz_rad_s - other.wz_rad_s) <= TOLERANCE
-    )
+    pairs = zip(astuple(one), astuple(other), strict=True)
+    return all(abs(first - second) <= TOLERANCE for first, second in pairs)

@@ -81,19 +81,15 @@ class EventLog:
         self.run_id = run_id
         self._ring: deque[LoggedEvent] = deque(maxlen=capacity)
         self._unix_ms = unix_ms
-        self._sequence = 0
+        self.sequence = 0
+        """Sequence of the newest event; 0 before the first."""
         self._on_overlay: deque[OperatorEvent] = deque(maxlen=ON_OVERLAY)
         self._overlay_sequence = 0
 
-    @property
-    def sequence(self) -> int:
-        """Sequence of the newest event; 0 before the first."""
-        return self._sequence
-
     def add(self, event: Event, now_s: float) -> LoggedEvent:
         """Appends an event, and returns it with its number."""
-        self._sequence += 1
-        logged = LoggedEvent(self._sequence, now_s, self._unix_ms(), event)
+        self.sequence += 1
+        logged = LoggedEvent(self.sequence, now_s, self._unix_ms(), event)
         self._ring.append(logged)
         if event.sentence is not None:
             self._overlay_sequence += 1
@@ -114,7 +110,7 @@ class EventLog:
         Raises:
             InvalidRequestError: this run has not reached the position.
         """
-        lost = self._sequence - len(self._ring)
+        lost = self.sequence - len(self._ring)
         here, gap = self._locate(after, lost)
         events = tuple(islice(self._ring, here - lost, here - lost + limit))
         return Reading(gap, events, Position(self.run_id, here + len(events)))
@@ -125,9 +121,9 @@ class EventLog:
             return lost, None
         if after.run_id != self.run_id:
             return lost, Gap(GapReason.NEW_RUN, lost, Position(self.run_id, lost))
-        if after.sequence > self._sequence:
+        if after.sequence > self.sequence:
             raise InvalidRequestError(
-                f"event {after.sequence} of this run has not happened yet; the newest is {self._sequence}"
+                f"event {after.sequence} of this run has not happened yet; the newest is {self.sequence}"
             )
         if after.sequence < lost:
             missed = lost - after.sequence

@@ -16,7 +16,7 @@ class HealthState(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Health:
+class RobotHealth:
     """The verdict and its reason in one sentence."""
 
     state: HealthState
@@ -28,11 +28,11 @@ class Health:
         return self.state is HealthState.OK
 
 
-HEALTHY: Final = Health(HealthState.OK, "robot healthy")
-NOT_READ: Final = Health(HealthState.DEGRADED, "the gateway does not read ROS")
+HEALTHY: Final = RobotHealth(HealthState.OK, "robot healthy")
+NOT_READ: Final = RobotHealth(HealthState.DEGRADED, "the gateway does not read ROS")
 
 
-def assess(required: Iterable[tuple[str, Freshness]]) -> Health:
+def assess(required: Iterable[tuple[str, Freshness]]) -> RobotHealth:
     """Returns the health that follows from the required sources.
 
     Args:
@@ -40,7 +40,7 @@ def assess(required: Iterable[tuple[str, Freshness]]) -> Health:
     """
     for name, freshness in required:
         if not freshness.available:
-            return Health(HealthState.DEGRADED, f"waiting for {name}")
+            return RobotHealth(HealthState.DEGRADED, f"waiting for {name}")
         if freshness.stale:
-            return Health(HealthState.DEGRADED, f"{name} stale")
+            return RobotHealth(HealthState.DEGRADED, f"{name} stale")
     return HEALTHY

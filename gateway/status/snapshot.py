@@ -10,9 +10,8 @@ from gateway.status.command import Command, effective_command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
-from gateway.status.health import NOT_READ, Health, assess
+from gateway.status.health import NOT_READ, RobotHealth, assess
 from gateway.status.preview import Measurement, PreviewView
-from gateway.status.runtime import UNKNOWN, Runtime
 from gateway.status.source_view import SourceView, source_view
 from gateway.status.sources import (
     EFFECTIVE_COMMAND,
@@ -36,6 +35,29 @@ class Identity:
     name: str
     version: str
     insecure: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Runtime:
+    """Build and counters of the running gateway.
+
+    Attributes:
+        revision: source revision of the build; empty if unknown.
+        boot_id: the kernel's boot ID; empty if unknown.
+        uptime_ms: since the gateway started.
+        client_count: connections with a recent request.
+        requests_served: calls answered since the start.
+        requests_refused: calls refused since the start.
+        run_id: unique for each start of the gateway; qualifies the sequence numbers of events.
+    """
+
+    revision: str
+    boot_id: str
+    uptime_ms: int
+    client_count: int
+    requests_served: int
+    requests_refused: int
+    run_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +91,7 @@ class Snapshot:
     at_s: float
     identity: Identity
     gateway: Runtime
-    health: Health
+    health: RobotHealth
     samples: Mapping[SourceSpec[Any], Sample[Any]]
     command: Sample[Command]
     preview: PreviewView
@@ -85,6 +107,9 @@ class Snapshot:
         return self.samples.get(spec, ABSENT)
 
 
+_UNKNOWN: Final = Runtime("", "", 0, 0, 0, 0)
+
+
 def take(
     *,
     identity: Identity,
@@ -94,7 +119,7 @@ def take(
     events: tuple[OperatorEvent, ...],
     now_s: float,
     faults: tuple[Fault, ...] = (),
-    gateway: Runtime = UNKNOWN,
+    gateway: Runtime = _UNKNOWN,
     access: AccessView = UNGUARDED,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""

@@ -38,11 +38,6 @@ class SourceView(NamedTuple):
     required: bool
     detail: str
 
-    @property
-    def name(self) -> str:
-        """Unique, stable name for programs."""
-        return self.spec.name
-
 
 _SENTENCES: Final[Mapping[SourceState, str]] = {
     SourceState.WAITING: "no {name} since the gateway started, and nothing on the robot publishes it",

@@ -1,11 +1,10 @@
-"""The table of sources: an entry makes a kind known to board, snapshot, change detection, configuration.
+"""The table of sources: board, snapshot, change detection and configuration take every entry as it is.
 
-docs/adding-a-source.md lists the steps that remain for a new kind: a reader and a field of the schema.
+A new kind also needs a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum, auto
 from functools import cached_property
 from typing import Any, Final, Generic, TypeVar
 
@@ -18,7 +17,6 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
-    Odometry,
     Velocity,
     Vision,
 )
@@ -26,15 +24,6 @@ from gateway.status.values import (
 ValueT = TypeVar("ValueT")
 
 _DAY_MS: Final = 86_400_000
-
-
-class Origin(Enum):
-    """The thread that writes a source onto the board."""
-
-    ROS = auto()
-    """The ROS sampler, from a topic of the configuration."""
-    PLATFORM = auto()
-    """The platform sampler, from the operating system."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +34,6 @@ class SourceSpec(Generic[ValueT]):
         kind: `kind` of the configuration; "odometry" for example.
         value_type: what its readers return.
         label: distinguishes sources of the same kind; None where a kind has one source.
-        origin: the thread that writes it.
         stale_after_ms: default age limit. Of a platform source the configuration's platform.stale_after_ms
             applies instead.
         queue_depth: depth of the subscription's KEEP_LAST history. With 1 the middleware drops older messages
@@ -61,7 +49,6 @@ class SourceSpec(Generic[ValueT]):
     kind: str
     value_type: type[ValueT]
     label: CommandSource | None = None
-    origin: Origin = Origin.ROS
     stale_after_ms: int = 1000
     queue_depth: int = 1
     max_items: int | None = None
@@ -83,7 +70,7 @@ class SourceSpec(Generic[ValueT]):
         return f"commands of {self.label.value}" if self.label else self.kind.replace("_", " ")
 
 
-ODOMETRY: Final = SourceSpec("odometry", Odometry, health_name="odometry")
+ODOMETRY: Final = SourceSpec("odometry", Velocity, health_name="odometry")
 VISION: Final = SourceSpec("vision", Vision, stale_after_ms=2000, health_name="vision telemetry")
 DETECTIONS: Final = SourceSpec(
     "detections",
@@ -122,12 +109,12 @@ MUX_INPUTS: Final = {
     for label in CommandSource
 }
 """The inputs of the robot's command mux."""
-COMPUTE: Final = SourceSpec("compute", Compute, origin=Origin.PLATFORM)
-NETWORK: Final = SourceSpec("network", Network, origin=Origin.PLATFORM)
-ONBOARD_BATTERY: Final = SourceSpec("onboard_battery", Battery, origin=Origin.PLATFORM)
+COMPUTE: Final = SourceSpec("compute", Compute)
+NETWORK: Final = SourceSpec("network", Network)
+ONBOARD_BATTERY: Final = SourceSpec("onboard_battery", Battery)
 """The computer's own battery, as its operating system reports it."""
 
-SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
+ROS_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     ODOMETRY,
     VISION,
     DETECTIONS,
@@ -136,10 +123,9 @@ SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     MODE,
     EFFECTIVE_COMMAND,
     *MUX_INPUTS.values(),
-    COMPUTE,
-    NETWORK,
-    ONBOARD_BATTERY,
 )
+"""Those that the ROS sampler writes onto the board, from the topics of the configuration."""
+PLATFORM_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (COMPUTE, NETWORK, ONBOARD_BATTERY)
+"""Those that the platform sampler writes, from the operating system."""
+SOURCES: Final = (*ROS_SOURCES, *PLATFORM_SOURCES)
 """Every source. The health summary names the first one in this order that is missing."""
-ROS_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.ROS)
-PLATFORM_SOURCES: Final = tuple(spec for spec in SOURCES if spec.origin is Origin.PLATFORM)

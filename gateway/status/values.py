@@ -12,15 +12,6 @@ MAX_COMPONENTS: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Odometry:
-    """Measured velocity in the robot's body frame (REP-105 base_link): x forward, y left, z up (REP-103)."""
-
-    vx_mps: float
-    vy_mps: float
-    wz_rad_s: float
-
-
-@dataclass(frozen=True, slots=True)
 class Vision:
     """Telemetry of the vision process: rates, latency of the newest inference, error counts."""
 
@@ -71,7 +62,10 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Velocity:
-    """A velocity command in the robot's body frame: x forward, y left, z up (REP-103)."""
+    """A measured or commanded velocity in the robot's body frame, base_link of REP-105.
+
+    x points forward, y left, z up (REP-103).
+    """
 
     vx_mps: float
     vy_mps: float

@@ -65,6 +65,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
+        ("gateway/config/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc")),
+        ("gateway/platform/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc")),
+        ("gateway/observer.py", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "asyncio")),
+        ("gateway/access_control.py", (*HEAVY, "google.protobuf", "omniseer", "gateway.ros")),
+        ("gateway/metrics/", (*HEAVY, *WIRE, "gateway.ros", "gateway.config")),
+        ("gateway/doctor/", (*HEAVY, *WIRE, "gateway.rpc", "console")),
         ("gateway/rpc/", ("gateway.ros",)),
         ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
         ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
@@ -123,6 +129,23 @@ def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) ->
         if is_within(found.module, library) and not found.importer.startswith(homes)
     ]
     assert not strangers
+
+
+def test_the_gateways_packages_do_not_import_each_other_in_circles() -> None:
+    modules = {str(path.relative_to(ROOT)) for path in (ROOT / "gateway").rglob("*.py")}
+    packages = {str(Path(file).parent) for file in modules}
+    imported: dict[str, set[str]] = {package: set() for package in packages}
+    for found in ALL:
+        path = found.module.replace(".", "/")
+        home = path if path in packages else str(Path(path).parent)
+        if found.importer in modules and home in packages and f"{path}.py" in modules:
+            imported[str(Path(found.importer).parent)].add(home)
+    for package, others in imported.items():
+        others.discard(package)
+    while leaves := {package for package, others in imported.items() if not others & imported.keys()}:
+        for leaf in leaves:
+            del imported[leaf]
+    assert not imported, "each of these is part of a circle, or imports one"
 
 
 def test_the_fence_sees_what_it_should() -> None:

@@ -9,8 +9,8 @@ from grpc_health.v1.health import SERVICE_NAME as HEALTH
 from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION
 
 from gateway.access.role import Role
-from gateway.rpc import methods
-from gateway.rpc.methods import ROLES, STANDARD, Method, Open
+from gateway.rpc.calls import methods
+from gateway.rpc.calls.methods import ROLES, STANDARD, Method, Open
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_UNSPECIFIED
 from omniseer.gateway.v1.access_pb2 import Role as WireRole

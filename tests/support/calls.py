@@ -7,8 +7,8 @@ from typing import Any
 import grpc
 
 from common.interceptors import Chain, Interceptor
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import CONTRACT, Method
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
 
 PEER = "ipv4:10.0.0.5:41234"
 
@@ -39,10 +39,17 @@ class RpcDouble:
 
 
 def call_of(
-    method: str = "Ping", peer: str = PEER, token: str | None = None, *, streaming: bool = False
+    method: str = "Ping",
+    peer: str = PEER,
+    token: str | None = None,
+    *,
+    streaming: bool = False,
+    request_streaming: bool = False,
 ) -> CallContext:
     rpc: Any = RpcDouble(peer, token)
-    return CallContext(Method(f"/{CONTRACT.full_name}/{method}", streaming=streaming), rpc)
+    path = f"/{CONTRACT.full_name}/{method}"
+    described = Method(path, request_streaming=request_streaming, response_streaming=streaming)
+    return CallContext(described, rpc)
 
 
 async def serve(

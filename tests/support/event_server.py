@@ -9,8 +9,8 @@ import grpc
 from common.broadcast import Broadcast
 from common.rpc import new_server
 from console.client import EventPosition
-from gateway.rpc.event_stream import EventStream
 from gateway.rpc.mapping.events import position_from
+from gateway.rpc.responses.event_stream import EventStream
 from gateway.status.event import Event, ModeChanged
 from gateway.status.event_log import EventLog
 from gateway.status.fault import Severity

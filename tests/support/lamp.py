@@ -45,6 +45,9 @@ class LampModel:
     def settled(self, spec: LampSpec, report: LampReport) -> bool:
         return report.percent == spec.percent
 
+    def take_change(self, reconciler: Reconciler[LampSpec, LampReport, LampView]) -> None:
+        pass
+
     def view(self, reconciler: Reconciler[LampSpec, LampReport, LampView]) -> LampView:
         percent = reconciler.report.value.percent if reconciler.report else 0
         return LampView(reconciler.error is None, percent, reconciler.error or reconciler.refusal or "")

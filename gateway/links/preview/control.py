@@ -1,5 +1,7 @@
 """Answers to operators who switch the preview."""
 
+import logging
+from dataclasses import dataclass
 from typing import Final
 
 from gateway.links.link import ServiceLink
@@ -7,22 +9,24 @@ from gateway.links.preview.model import PreviewModel
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.status.preview import PreviewState, PreviewView, Profile
 
+_log = logging.getLogger(__name__)
+
 PreviewLink = ServiceLink[PreviewSpec, PreviewReport, PreviewView]
 DEADLINE_MARGIN_S: Final = 0.2
 """The answer leaves this long before the caller's deadline, so that it still arrives."""
 
 
+@dataclass(frozen=True, slots=True)
 class PreviewControl:
     """Carries SetPreviewMode out.
 
-    Args:
+    Attributes:
         settle_s: longest wait for a request to settle.
     """
 
-    def __init__(self, link: PreviewLink, model: PreviewModel, settle_s: float) -> None:
-        self._link = link
-        self._model = model
-        self._settle_s = settle_s
+    link: PreviewLink
+    model: PreviewModel
+    settle_s: float
 
     async def set_mode(self, *, enabled: bool, profile: Profile | None, remaining_s: float | None) -> str:
         """Requests the mode, unless it already is the desired one, and waits until that settles.
@@ -35,31 +39,34 @@ class PreviewControl:
         Returns:
             The result, for people. Programs find it in the link's view.
         """
-        desired = self._link.desired
-        spec, state = desired.spec, self._link.view.state
+        desired = self.link.desired
+        spec, state = desired.spec, self.link.view.state
         same = spec.enabled == enabled and (not enabled or profile in {None, spec.profile})
-        if same and state is PreviewState.RUNNING and self._link.settled(desired):
+        if same and state is PreviewState.RUNNING and self.link.settled(desired):
             return f"preview is already running, {spec.profile_name}; nothing changed"
         # The same request again makes a faulted preview retry at once.
         if not same or (enabled and state is PreviewState.FAULTED):
-            desired = self._link.request(self._model.spec(spec, enabled=enabled, profile=profile))
-        patience_s = self._settle_s
+            desired = self.link.request(self.model.spec(spec, enabled=enabled, profile=profile))
+        patience_s = self.settle_s
         if remaining_s is not None:
             patience_s = max(0.0, min(patience_s, remaining_s - DEADLINE_MARGIN_S))
-        await self._link.wait_until_settled(desired, patience_s)
-        if self._link.desired.revision != desired.revision:
-            return f"replaced by a newer request: preview {self._link.desired.spec}"
-        return _result(desired.spec, self._link.view)
+        await self.link.wait_until_settled(desired, patience_s)
+        if self.link.desired.revision != desired.revision:
+            return f"replaced by a newer request: preview {self.link.desired.spec}"
+        if self.link.refusal is not None:
+            return f"preview service refused the request: {self.link.refusal}"
+        return _result(desired.spec, self.link.view)
 
     def renew_passphrase(self) -> None:
         """Replaces the passphrase of a running session, which disconnects all viewers.
 
         Those who may still see the status find the new one there.
         """
-        spec = self._link.desired.spec
+        spec = self.link.desired.spec
         if spec.passphrase:
+            _log.info("preview: a caller has lost access; the stream gets a new passphrase")
             no_passphrase = PreviewSpec(enabled=True, profile=spec.profile)
-            self._link.request(self._model.spec(no_passphrase, enabled=True, profile=None))
+            self.link.request(self.model.spec(no_passphrase, enabled=True, profile=None))
 
 
 def _result(spec: PreviewSpec, view: PreviewView) -> str:

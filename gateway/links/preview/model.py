@@ -67,15 +67,18 @@ class PreviewModel:
             return _profile_in_force(spec, report) is spec.profile
         return report.state is PreviewState.FAULTED
 
-    def view(self, reconciler: PreviewReconciler) -> PreviewView:
-        """Returns the view; a pipeline is in it only while the service is reachable."""
-        spec, last = reconciler.desired.spec, reconciler.report
-        current = last.value if last and reconciler.error is None else None
-        state, last_error = _state(reconciler, current)
-        found_here = current is None or reconciler.refusal is not None
+    def take_change(self, reconciler: PreviewReconciler) -> None:
+        """Counts a fault that the gateway has found, not the service."""
+        state, _ = _state(reconciler)
+        found_here = reconciler.error is not None or reconciler.refusal is not None
         if found_here and state is PreviewState.FAULTED and self._state is not state:
             self._totals.add_fault()
         self._state = state
+
+    def view(self, reconciler: PreviewReconciler) -> PreviewView:
+        """Returns the view; a pipeline is in it only while the service is reachable."""
+        spec, last, current = reconciler.desired.spec, reconciler.report, _current(reconciler)
+        state, last_error = _state(reconciler)
         measured = last.value.measurement if last and state is not PreviewState.DISABLED else None
         return PreviewView(
             state=state,
@@ -92,9 +95,14 @@ class PreviewModel:
         )
 
 
-def _state(reconciler: PreviewReconciler, current: PreviewReport | None) -> tuple[PreviewState, str]:
+def _current(reconciler: PreviewReconciler) -> PreviewReport | None:
+    """Returns the newest report while the service is reachable."""
+    return reconciler.report.value if reconciler.report and reconciler.error is None else None
+
+
+def _state(reconciler: PreviewReconciler) -> tuple[PreviewState, str]:
     """Returns the state and the last error."""
-    enabled = reconciler.desired.spec.enabled
+    enabled, current = reconciler.desired.spec.enabled, _current(reconciler)
     if current is None and enabled:
         return PreviewState.FAULTED, _UNREACHABLE.format(reconciler.error)
     if current is None:

@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -33,32 +33,22 @@ if TYPE_CHECKING:
 
 ValueT = TypeVar("ValueT", Listener, Stream, Encoder, Measurement, Counters)
 
-STATES: Final[Mapping[int, PreviewState]] = {
-    pb.LIFECYCLE_STATE_DISABLED: PreviewState.DISABLED,
-    pb.LIFECYCLE_STATE_STARTING: PreviewState.STARTING,
-    pb.LIFECYCLE_STATE_RUNNING: PreviewState.RUNNING,
-    pb.LIFECYCLE_STATE_STOPPING: PreviewState.STOPPING,
-    pb.LIFECYCLE_STATE_FAULTED: PreviewState.FAULTED,
-}
-PROFILES: Final[Mapping[Profile, pb.Profile.ValueType]] = {
-    Profile.LOW_BW: pb.PROFILE_LOW_BW,
-    Profile.BALANCED: pb.PROFILE_BALANCED,
-    Profile.HIGH_QUALITY: pb.PROFILE_HIGH_QUALITY,
-}
-CODECS: Final[Mapping[int, Codec]] = {pb.CODEC_H264: Codec.H264, pb.CODEC_H265: Codec.H265}
+STATES: Final = {pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}"): state for state in PreviewState}
+PROFILES: Final = {profile: pb.Profile.Value(f"PROFILE_{profile.name}") for profile in Profile}
+CODECS: Final = {pb.Codec.Value(f"CODEC_{codec.name}"): codec for codec in Codec}
 _PROFILE_OF: Final[Mapping[int, Profile]] = {number: profile for profile, number in PROFILES.items()}
 
 
+@dataclass(frozen=True, slots=True)
 class PreviewConnector:
     """Connects to the preview service on the Unix socket where it listens, or will."""
 
-    def __init__(self, socket: Path) -> None:
-        self._socket = socket
+    socket: Path
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator["PreviewClient"]:
         """Yields a client; connects with its first call."""
-        async with unix_channel(self._socket) as channel:
+        async with unix_channel(self.socket) as channel:
             yield PreviewClient(channel)
 
 
@@ -114,15 +104,17 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         state=state,
         profile=_PROFILE_OF.get(message.profile),
         last_error=message.last_error,
-        listener=_equal(Listener, message.listener) if message.HasField("listener") else None,
-        stream=_equal(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
-        encoder=_equal(Encoder, message.encoder) if message.HasField("encoder") else None,
-        measurement=_equal(Measurement, message.measurement) if message.HasField("measurement") else None,
-        counters=_equal(Counters, message.counters),
+        listener=_same_fields(Listener, message.listener) if message.HasField("listener") else None,
+        stream=_same_fields(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
+        encoder=_same_fields(Encoder, message.encoder) if message.HasField("encoder") else None,
+        measurement=_same_fields(Measurement, message.measurement)
+        if message.HasField("measurement")
+        else None,
+        counters=_same_fields(Counters, message.counters),
     )
 
 
-def _equal(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
+def _same_fields(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
     """Returns the equally named fields of a message, None for an unset optional one, and those converted."""
     unset = {f.name for f in message.DESCRIPTOR.fields if f.has_presence and not message.HasField(f.name)}
     values: Any = {f.name: None if f.name in unset else getattr(message, f.name) for f in fields(kind)}

@@ -6,19 +6,18 @@ from gateway.config import SourceSettings
 from gateway.ros.readers.plain import all_finite
 from gateway.ros.readers.registry import reads
 from gateway.status.sources import EFFECTIVE_COMMAND, MUX_INPUTS, ODOMETRY
-from gateway.status.values import Odometry, Velocity
+from gateway.status.values import Velocity
 
 _COMMANDS = (EFFECTIVE_COMMAND, *MUX_INPUTS.values())
 
 
 @reads("nav_msgs/msg/Odometry", ODOMETRY)
-def from_odometry(message: Any, source: SourceSettings) -> Odometry | None:
+def from_odometry(message: Any, source: SourceSettings) -> Velocity | None:
     """Returns the twist, which is in the body frame (child_frame_id); None if it is not finite.
 
     A filter that has diverged publishes NaN.
     """
-    velocity = _planar(message.twist.twist)
-    return Odometry(*velocity) if velocity else None
+    return from_twist(message.twist.twist, source)
 
 
 @reads("geometry_msgs/msg/TwistStamped", *_COMMANDS)
@@ -30,9 +29,5 @@ def from_twist_stamped(message: Any, source: SourceSettings) -> Velocity | None:
 @reads("geometry_msgs/msg/Twist", *_COMMANDS)
 def from_twist(message: Any, source: SourceSettings) -> Velocity | None:
     """Returns the command; None if it is not finite: no robot can follow it."""
-    velocity = _planar(message)
+    velocity = all_finite(message.linear.x, message.linear.y, message.angular.z)
     return Velocity(*velocity) if velocity else None
-
-
-def _planar(twist: Any) -> tuple[float, ...] | None:
-    return all_finite(twist.linear.x, twist.linear.y, twist.angular.z)

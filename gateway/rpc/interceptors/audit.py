@@ -6,13 +6,14 @@ from typing import Any, Final
 from google.protobuf import text_format
 from google.protobuf.message import Message
 
+from common import request_id
 from common.errors import DomainError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.access.refusal_limiter import RefusalLimiter
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method
-from gateway.rpc.ports import AuditTrail, EventSink
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method
+from gateway.rpc.calls.ports import AuditSink, EventSink
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 
@@ -26,13 +27,13 @@ class Audit(Interceptor[CallContext]):
 
     Args:
         events: operators see the actions there.
-        trail: keeps them.
+        log: keeps them.
         refusals: limits how many refusals of one caller are recorded: a flood of them must fill neither.
     """
 
-    def __init__(self, events: EventSink, trail: AuditTrail, refusals: RefusalLimiter) -> None:
+    def __init__(self, events: EventSink, log: AuditSink, refusals: RefusalLimiter) -> None:
         self._events = events
-        self._trail = trail
+        self._log = log
         self._refusals = refusals
 
     def applies_to(self, method: Method) -> bool:
@@ -40,8 +41,12 @@ class Audit(Interceptor[CallContext]):
         return method.changes_robot
 
     def on_response(self, call: CallContext, response: Any) -> None:
-        """Keeps what the caller is answered until the call ends."""
-        call.answer = getattr(response, "message", "")
+        """Keeps the answer until the call ends."""
+        call.response = response
+
+    def record_start(self, call: CallContext) -> None:
+        """Records that a stream has begun, whose end may be hours away."""
+        self._record(call, ControlResult.ACCEPTED, "started")
 
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Records how the action ended.
@@ -50,7 +55,7 @@ class Audit(Interceptor[CallContext]):
         before they were admitted: a caller that leaves while it is authenticated has done nothing.
         """
         if error is None:
-            self._record(call, ControlResult.ACCEPTED, call.answer)
+            self._record(call, ControlResult.ACCEPTED, _answer(call))
         elif isinstance(error, DomainError):
             self._record_refusal(call, error)
         elif call.request is None:
@@ -63,7 +68,7 @@ class Audit(Interceptor[CallContext]):
     def _record_refusal(self, call: CallContext, error: DomainError) -> None:
         if isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:
             return
-        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.site)
+        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.address_prefix)
         if left_out is None:
             return
         more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
@@ -80,10 +85,44 @@ class Audit(Interceptor[CallContext]):
             answer=_shortened(answer),
             role=principal.role.value if principal else "",
             credential=principal.credential_ids[0] if principal else "",
-            request_id=call.request_id,
+            request_id=request_id.current(),
         )
-        self._trail.record(action)
+        self._log.record(action)
         self._events.note(_event(action))
+
+
+class AuditStart(Interceptor[CallContext]):
+    """Records the start of control streams. Further in than validation, which has parsed the request.
+
+    Args:
+        audit: records their end.
+    """
+
+    def __init__(self, audit: Audit) -> None:
+        self._audit = audit
+        self._started: set[CallContext] = set()
+
+    def applies_to(self, method: Method) -> bool:
+        """Returns whether the method is a control action that lasts."""
+        return method.changes_robot and method.streaming
+
+    def on_request(self, call: CallContext, request: Any) -> Any:
+        """Records the first valid request."""
+        if call not in self._started:
+            self._started.add(call)
+            self._audit.record_start(call)
+        return request
+
+    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+        """Forgets the call."""
+        self._started.discard(call)
+
+
+def _answer(call: CallContext) -> str:
+    response, response_type = call.response, call.method.response_type
+    if isinstance(response, bytes) and response_type is not None:
+        response = response_type.FromString(response)
+    return getattr(response, "message", "") or ("ended" if call.method.streaming else "")
 
 
 def _event(action: ControlAction) -> Event:

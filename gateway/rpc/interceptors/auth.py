@@ -5,7 +5,7 @@ import hashlib
 import logging
 import ssl
 from functools import lru_cache
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import grpc
 
@@ -16,15 +16,15 @@ from common.reasons import Reason
 from gateway.access.authenticator import Authenticator, combined
 from gateway.access.credential import Principal
 from gateway.access.lockout import Lockout
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method, Open
-from gateway.rpc.ports import CredentialFiles, StreamKey
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method, Open
+from gateway.rpc.calls.ports import CredentialFiles, StreamKey
 
 _log = logging.getLogger(__name__)
 
-CHECK_EVERY_S: Final = 0.5
-"""How often the credentials behind open streams are checked."""
-_ABORT_WITHIN_S: Final = 1.0
+CHECK_EVERY_S: Final = 0.25
+"""How often credentials are checked for expiry; changes of their list are applied at once."""
+_ABORT_WITHIN_S: Final = 0.25
 """How long a caller has to take the status of a stream that ends; one that doesn't read gets none."""
 TOKEN_HEADER: Final = "authorization"
 """Bearer tokens travel as in HTTP (RFC 6750 2.1)."""
@@ -62,6 +62,7 @@ class Auth(Interceptor[CallContext]):
         self._admitted: dict[tuple[str, ...], Principal] = {}
         """By their credentials, of which there are as many as the robot has."""
         self._streams: dict[CallContext, asyncio.Task[object]] = {}
+        self._aborts: set[asyncio.Task[None]] = set()
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method needs a credential."""
@@ -83,32 +84,55 @@ class Auth(Interceptor[CallContext]):
             assert task is not None, "gRPC serves each call in a task of its own"
             self._streams[call] = task
 
+    def on_response(self, call: CallContext, response: Any) -> None:
+        """Withholds the response of a caller that lost access while it waited: it may hold a new secret.
+
+        Raises:
+            NotAuthenticatedError: the credential is no longer valid.
+        """
+        principal = call.principal
+        assert principal is not None, "on_call has set it"
+        # Its own principal is there unless another call has replaced it, or the caller has lost access.
+        if self._admitted.get(principal.credential_ids) is principal:
+            return
+        if not self._authenticator.still_valid(principal):
+            raise _access_lost()
+
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
         self._streams.pop(call, None)
 
     async def run(self) -> NoReturn:
-        """Ends the streams of callers that lose access, until cancelled."""
-        while True:
-            await asyncio.sleep(CHECK_EVERY_S)
-            await self.revoke()
+        """Applies expiry until cancelled."""
+        try:
+            while True:
+                await asyncio.sleep(CHECK_EVERY_S)
+                self.end_revoked()
+        finally:
+            for each in self._aborts:
+                each.cancel()
 
-    async def revoke(self) -> None:
-        """Ends every stream whose credential is no longer valid, and renews the secret its caller knows."""
-        lost = [ids for ids, each in self._admitted.items() if not self._authenticator.still_valid(each)]
+    def end_revoked(self) -> None:
+        """Ends every stream whose credential is no longer valid, and renews the secret its caller knows.
+
+        Does not wait for the callers: one that does not read delays no other.
+        """
+        valid = self._authenticator.still_valid
+        lost = [ids for ids, each in self._admitted.items() if not valid(each)]
         for credential_ids in lost:
             del self._admitted[credential_ids]
         if lost:
             self._stream_key.renew_passphrase()
-        valid = self._authenticator.still_valid
-        ending = [call for call in self._streams if call.principal and not valid(call.principal)]
-        await asyncio.gather(*(self._end(call, self._streams.pop(call)) for call in ending))
+        for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
+            abort = asyncio.create_task(
+                self._end(call, self._streams.pop(call)), name="revocation of a stream"
+            )
+            self._aborts.add(abort)
+            abort.add_done_callback(self._aborts.discard)
 
     async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
-        error = NotAuthenticatedError(
-            "the credential that opened this stream is no longer valid", Reason.CREDENTIAL_REVOKED
-        )
+        error = _access_lost()
         who = call.principal.name if call.principal else ""
         _log.info("access: %s of %s ended, its credential is no longer valid", call.method.name, who)
         code = STATUS_CODES[NotAuthenticatedError]
@@ -146,17 +170,17 @@ class Auth(Interceptor[CallContext]):
         )
 
     def _of_token(self, call: CallContext, token: str) -> Principal:
-        host, owner = call.peer.host, self._authenticator.id_of_token(token)
-        self._lockout.admit(host, owner)
+        prefix, owner = call.peer.address_prefix, self._authenticator.id_of_token(token)
+        self._lockout.admit(prefix, owner)
         try:
             principal = self._authenticator.authenticate_token(token)
         except NotAuthenticatedError as error:
             # An expired or revoked token is no guess: its secret was right.
-            if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(host, owner):
+            if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(prefix, owner):
                 meant = f"credential {owner}" if owner else "no credential of this robot"
-                _log.warning("access: %s shows wrong tokens (%s) and is locked out", host, meant)
+                _log.warning("access: %s shows wrong tokens (%s) and is locked out", call.peer.host, meant)
             raise
-        self._lockout.succeeded(host, owner)
+        self._lockout.succeeded(prefix, owner)
         return principal
 
 
@@ -178,6 +202,13 @@ def fingerprint_of(rpc: RpcContext) -> str | None:
 @lru_cache(maxsize=_REMEMBERED_CERTIFICATES)
 def _fingerprint(pem: bytes) -> str:
     return hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem.decode("ascii"))).hexdigest()
+
+
+def _access_lost() -> NotAuthenticatedError:
+    return NotAuthenticatedError(
+        "the credential of this call is no longer valid; what it requested may have been done",
+        Reason.CREDENTIAL_REVOKED,
+    )
 
 
 def _authorize(principal: Principal, method: Method) -> None:

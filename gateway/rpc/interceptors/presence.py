@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.interceptors import Interceptor
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method
-from gateway.rpc.ports import EventSink
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method
+from gateway.rpc.calls.ports import EventSink
 from gateway.status.event import ClientJoined, ClientLeft, Event
 from gateway.status.fault import Severity
 

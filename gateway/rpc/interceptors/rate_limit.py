@@ -15,14 +15,14 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from common.errors import TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from common.token_bucket import TokenBucket
 from gateway.config import LimitSettings
-from gateway.rpc.call import CallContext, Peer
+from gateway.rpc.calls.call import CallContext, Peer
 
 QUIET_AFTER_S: Final = 1.0
 """A connection without streams and without calls for this long gives way when room is needed."""
@@ -43,14 +43,17 @@ _RETRY_AFTER_S: Final = 1.0
 
 @dataclass(slots=True)
 class _Connection:
-    site: str
+    address_prefix: str
     bucket: TokenBucket
     streams: int = 0
     refused_s: float = -math.inf
 
 
 class RateLimit(Interceptor[CallContext]):
-    """Refuses calls beyond a connection's share with a delay; accounts for open streams."""
+    """Refuses calls beyond a connection's share with a delay; accounts for open streams.
+
+    Each message of a request stream takes a token like a call.
+    """
 
     def __init__(self, admission: "Admission") -> None:
         self._admission = admission
@@ -71,6 +74,16 @@ class RateLimit(Interceptor[CallContext]):
                 raise
             return self._refuse_later(error)
         return None
+
+    def on_request(self, call: CallContext, request: Any) -> Any:
+        """Takes a token for a message of a request stream.
+
+        Raises:
+            TooMuchError: there is none left. It ends the stream at once; opening another one is delayed.
+        """
+        if call.method.request_streaming:
+            self._admission.take_token(call.peer)
+        return request
 
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Gives the stream back."""
@@ -103,14 +116,9 @@ class Admission:
         self._clock = clock
         self._connections: dict[str, _Connection] = {}
         """By gRPC's name of the connection, the one that called last at the end."""
-        self._per_site: Counter[str] = Counter()
+        self._per_prefix: Counter[str] = Counter()
         self._last_refusal_s = 0.0
         """When the last one of the delayed refusals leaves."""
-
-    @property
-    def connection_count(self) -> int:
-        """How many connections are accounted for."""
-        return len(self._connections)
 
     def take_token(self, peer: Peer) -> None:
         """Takes one token out of the connection's bucket.
@@ -165,7 +173,9 @@ class Admission:
 
     def _new(self, peer: Peer, now_s: float) -> _Connection:
         limits = self._limits
-        if self._per_site[peer.site] >= limits.connections_per_address and not self._evict(now_s, peer.site):
+        if self._per_prefix[peer.address_prefix] >= limits.connections_per_address and not self._evict(
+            now_s, peer.address_prefix
+        ):
             raise TooMuchError(
                 f"this gateway serves {limits.connections_per_address} connections of one address at once, "
                 "and yours are taken; close one, or raise limits.connections_per_address",
@@ -179,17 +189,17 @@ class Admission:
                 Reason.TOO_MANY_CONNECTIONS,
                 _RETRY_AFTER_S,
             )
-        self._per_site[peer.site] += 1
-        return _Connection(peer.site, TokenBucket(limits.burst, now_s))
+        self._per_prefix[peer.address_prefix] += 1
+        return _Connection(peer.address_prefix, TokenBucket(limits.burst, now_s))
 
-    def _evict(self, now_s: float, site: str | None = None) -> bool:
-        """Forgets the quietest connection, of this site or of all; False when none is quiet enough."""
+    def _evict(self, now_s: float, prefix: str | None = None) -> bool:
+        """Forgets the quietest connection, of this prefix or of all; False when none is quiet enough."""
         for connection, each in self._connections.items():
             quiet = each.streams == 0 and now_s - each.bucket.updated_s >= QUIET_AFTER_S
-            if quiet and site in (None, each.site):
+            if quiet and prefix in (None, each.address_prefix):
                 del self._connections[connection]
-                self._per_site[each.site] -= 1
-                if not self._per_site[each.site]:
-                    del self._per_site[each.site]
+                self._per_prefix[each.address_prefix] -= 1
+                if not self._per_prefix[each.address_prefix]:
+                    del self._per_prefix[each.address_prefix]
                 return True
         return False

@@ -12,7 +12,7 @@ from common.errors import DomainError
 from common.grpc_errors import status_code
 from common.histogram import Histogram
 from common.interceptors import Interceptor
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
 
 RECENT_S: Final = 10.0
 """A connection that called, or was sent something, this recently counts as a client."""
@@ -56,30 +56,26 @@ class Stats(Interceptor[CallContext]):
         self, contract_methods: Iterable[str] = (), clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._clock = clock
-        self._contract = {name: MethodStats() for name in contract_methods}
+        self.contract = {name: MethodStats() for name in contract_methods}
+        """The methods of the contract, by `Method.key`."""
         self._others: dict[str, MethodStats] = {}
         self._active_s: dict[str, float] = {}
         """When each connection was active, the one that was last at the end."""
 
     @property
-    def contract(self) -> Mapping[str, MethodStats]:
-        """The methods of the contract, by name."""
-        return self._contract
-
-    @property
     def methods(self) -> Mapping[str, MethodStats]:
-        """All methods that were called, and all of the contract, by name."""
-        return self._contract | self._others
+        """All methods that were called, and all of the contract, by `Method.key`."""
+        return self.contract | self._others
 
     @property
     def served(self) -> int:
         """Calls of the contract that were answered."""
-        return sum(each.served for each in self._contract.values())
+        return sum(each.served for each in self.contract.values())
 
     @property
     def refused(self) -> int:
         """Calls of the contract that were refused."""
-        return sum(each.refused for each in self._contract.values())
+        return sum(each.refused for each in self.contract.values())
 
     def client_count(self) -> int:
         """Returns how many connections were active within RECENT_S."""
@@ -126,10 +122,10 @@ class Stats(Interceptor[CallContext]):
         stats.durations.add(time.perf_counter() - call.began_s)
 
     def _of(self, call: CallContext) -> MethodStats:
-        known = self._contract if call.method.of_contract else self._others
-        stats = known.get(call.method.name)
+        known = self.contract if call.method.of_contract else self._others
+        stats = known.get(call.method.key)
         if stats is None:
-            stats = known[call.method.name] = MethodStats()
+            stats = known[call.method.key] = MethodStats()
         return stats
 
     def _note_active(self, connection: str) -> None:

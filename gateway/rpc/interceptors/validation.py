@@ -8,8 +8,8 @@ from protovalidate import Validator, Violation
 from common.errors import FieldViolation, InvalidRequestError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
-from gateway.rpc.call import CallContext
-from gateway.rpc.methods import Method
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import Method
 
 _VALIDATOR: Final = Validator()
 """Compiles the rules of each message once."""

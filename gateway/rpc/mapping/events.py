@@ -1,6 +1,7 @@
 """Events as messages of the contract."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any, Final
 
 from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
@@ -74,10 +75,6 @@ def _preview(detail: PreviewChanged, _at_s: float) -> pb.PreviewStateChanged:
     )
 
 
-def _fallback(detail: EncoderFallback, _at_s: float) -> pb.EncoderFallback:
-    return pb.EncoderFallback(running=detail.running, wanted=detail.wanted, reason=detail.reason)
-
-
 def _control(detail: ControlAction, _at_s: float) -> pb.ControlAction:
     return pb.ControlAction(
         who=detail.who,
@@ -93,10 +90,10 @@ _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
     FaultRaised: ("fault_raised", _raised),
     FaultCleared: ("fault_cleared", _cleared),
     PreviewChanged: ("preview_state_changed", _preview),
-    EncoderFallback: ("encoder_fallback", _fallback),
-    ClientJoined: ("client_joined", lambda detail, _: pb.ClientJoined(address=detail.address)),
-    ClientLeft: ("client_left", lambda detail, _: pb.ClientLeft(address=detail.address)),
+    EncoderFallback: ("encoder_fallback", lambda it, _: pb.EncoderFallback(**asdict(it))),
+    ClientJoined: ("client_joined", lambda it, _: pb.ClientJoined(**asdict(it))),
+    ClientLeft: ("client_left", lambda it, _: pb.ClientLeft(**asdict(it))),
     ControlAction: ("control_action", _control),
-    ModeChanged: ("robot_mode_changed", lambda detail, _: pb.RobotModeChanged(mode=detail.mode)),
+    ModeChanged: ("robot_mode_changed", lambda it, _: pb.RobotModeChanged(**asdict(it))),
 }
 """Total: a test checks every kind of event, and every payload of the schema."""

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 
 from gateway.rpc.interceptors.stats import MethodStats
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Snapshot
+from gateway.status.snapshot import Runtime, Snapshot
 from omniseer.gateway.v1 import gateway_info_pb2 as pb
 from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse
 

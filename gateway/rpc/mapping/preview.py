@@ -1,32 +1,21 @@
 """The live preview as messages of the contract."""
 
-from typing import Final
+from dataclasses import asdict
 
 from common.bind import bracketed
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
 from gateway.rpc.mapping.freshness import freshness_fields
-from gateway.rpc.recipient import Recipient
 from gateway.status.freshness import Sample
-from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewView, Stream
+from gateway.status.preview import Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
-
-_NO_STREAM: Final = Stream(
-    width_px=0,
-    height_px=0,
-    fps=0.0,
-    target_bitrate_kbps=0,
-    codec=None,
-    encrypted=False,
-    bitrate_reason="",
-)
 
 
 def preview_status(
     preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
 ) -> pb.PreviewStatus:
     """Returns the preview; the passphrase only if the recipient may see it."""
-    stream = preview.stream or _NO_STREAM
-    encoder = preview.encoder
+    stream, encoder = preview.stream, preview.encoder
     return pb.PreviewStatus(
         state=PREVIEW_STATES[preview.state],
         profile=PROFILES[preview.profile],
@@ -35,17 +24,21 @@ def preview_status(
         if preview.listener
         else None,
         encoder=_encoder(encoder, stream) if encoder else None,
-        video=_video(preview.stream) if preview.stream else None,
-        target_bitrate_kbps=stream.target_bitrate_kbps,
+        video=pb.VideoFormat(width_px=stream.width_px, height_px=stream.height_px, fps=stream.fps)
+        if stream
+        else None,
+        target_bitrate_kbps=stream.target_bitrate_kbps if stream else 0,
         measured=_measured(measured.value, measured) if measured.value else None,
-        counters=_counters(preview.counters),
+        counters=pb.PreviewCounters(**asdict(preview.counters)),
         service_reachable=preview.service_reachable,
-        bitrate_reason=stream.bitrate_reason,
+        bitrate_reason=stream.bitrate_reason if stream else "",
     )
 
 
-def _endpoint(listener: Listener, stream: Stream, passphrase: str, recipient: Recipient) -> pb.StreamEndpoint:
-    encrypted = stream.encrypted or bool(passphrase)
+def _endpoint(
+    listener: Listener, stream: Stream | None, passphrase: str, recipient: Recipient
+) -> pb.StreamEndpoint:
+    encrypted = bool(passphrase) or (stream is not None and stream.encrypted)
     host = recipient.robot_host
     return pb.StreamEndpoint(
         transport=pb.STREAM_TRANSPORT_SRT,
@@ -53,25 +46,21 @@ def _endpoint(listener: Listener, stream: Stream, passphrase: str, recipient: Re
         port=listener.port,
         uri=f"srt://{bracketed(host)}:{listener.port}?mode=caller&latency={listener.latency_ms}",
         latency_ms=listener.latency_ms,
-        codec=CODECS[stream.codec],
+        codec=CODECS[stream.codec if stream else None],
         container=pb.STREAM_CONTAINER_MPEG_TS,
         passphrase=passphrase if recipient.sees_passphrase else "",
         encrypted=encrypted,
     )
 
 
-def _encoder(encoder: Encoder, stream: Stream) -> pb.EncoderStatus:
+def _encoder(encoder: Encoder, stream: Stream | None) -> pb.EncoderStatus:
     return pb.EncoderStatus(
         name=encoder.name,
         hardware=encoder.hardware,
         wanted=encoder.wanted,
         fallback_reason=encoder.fallback_reason,
-        codec=CODECS[stream.codec],
+        codec=CODECS[stream.codec if stream else None],
     )
-
-
-def _video(stream: Stream) -> pb.VideoFormat:
-    return pb.VideoFormat(width_px=stream.width_px, height_px=stream.height_px, fps=stream.fps)
 
 
 def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
@@ -83,13 +72,4 @@ def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.Strea
         last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
-    )
-
-
-def _counters(counters: Counters) -> pb.PreviewCounters:
-    return pb.PreviewCounters(
-        starts=counters.starts,
-        restarts=counters.restarts,
-        faults=counters.faults,
-        fallbacks=counters.fallbacks,
     )

@@ -3,13 +3,13 @@
 import math
 from typing import Final
 
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
 from gateway.rpc.mapping.faults import fill_fault
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
-from gateway.rpc.recipient import Recipient
 from gateway.status.command import Command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.freshness import Sample
@@ -24,7 +24,7 @@ from gateway.status.sources import (
     ODOMETRY,
     VISION,
 )
-from gateway.status.values import Detection, Detections, Mode, Odometry, Vision
+from gateway.status.values import Detection, Detections, Mode, Velocity, Vision
 from omniseer.gateway.v1 import overlay_pb2, source_pb2, system_status_pb2
 
 NOT_MAPPED: Final = frozenset({DIAGNOSTICS, EFFECTIVE_COMMAND, *MUX_INPUTS.values()})
@@ -85,7 +85,7 @@ def _vision(sample: Sample[Vision]) -> system_status_pb2.VisionStatus:
 def _health(snapshot: Snapshot) -> system_status_pb2.RobotHealth:
     health, odometry = snapshot.health, snapshot[ODOMETRY]
     freshness = odometry.freshness
-    motion = odometry.value or Odometry(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
+    motion = odometry.value or Velocity(vx_mps=0.0, vy_mps=0.0, wz_rad_s=0.0)
     return system_status_pb2.RobotHealth(
         state=HEALTH_STATES[health.state],
         ready=health.ready,

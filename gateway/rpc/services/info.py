@@ -3,10 +3,10 @@
 import time
 from typing import Final
 
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.ports import SnapshotSource
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.mapping.info import gateway_info
-from gateway.rpc.ports import SnapshotSource
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetGatewayInfoRequest,
     GetGatewayInfoResponse,

@@ -2,11 +2,11 @@
 
 from collections.abc import AsyncIterator
 
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.recipient import Recipients
-from gateway.rpc.response_cache import ResponseCache
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.responses.response_cache import ResponseCache
+from gateway.rpc.responses.status_stream import StatusStream
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetOverlaySnapshotRequest,
     GetSystemStatusRequest,

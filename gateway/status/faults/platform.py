@@ -1,11 +1,10 @@
-"""Faults of the robot's computer and batteries."""
+"""Faults of the robot's computer and batteries, found by limits with hysteresis: noise raises no events."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 from gateway.status.fault import Condition, Severity
-from gateway.status.faults.limits import Limit, PlatformLimits
 from gateway.status.freshness import Sample
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
@@ -16,91 +15,114 @@ _COOL_DOWN: Final = "Check fan and dust, reduce the load (preview profile), let 
 
 
 @dataclass(frozen=True, slots=True)
-class _Check:
-    """A measured value, None if unknown, with its limit and the condition of its violation."""
+class Limit:
+    """A threshold with hysteresis.
 
-    value: float | None
-    limit: Limit
-    fault_id: str
-    component: str
-    message: str
-    remedy: str
+    An upper limit if `raise_at` is the larger value (temperature), a lower limit if it is the smaller one
+    (state of charge).
+    """
 
-    def condition(self) -> Condition:
-        return Condition(self.fault_id, Severity.WARNING, self.component, self.message, self.remedy)
+    raise_at: float
+    clear_at: float
+
+    def broken(self, value: float, *, was_broken: bool) -> bool:
+        """Returns whether `value` violates the limit, given the previous verdict."""
+        threshold = self.clear_at if was_broken else self.raise_at
+        if self.raise_at > self.clear_at:
+            return value > threshold if was_broken else value >= threshold
+        return value < threshold if was_broken else value <= threshold
+
+
+@dataclass(frozen=True, slots=True)
+class PlatformLimits:
+    """The limits of the robot's computer and batteries."""
+
+    temperature_c: Limit
+    memory_percent: Limit
+    disk_percent: Limit
+    battery_percent: Limit
+    wifi_signal_dbm: Limit
 
 
 def platform_faults(
     snapshot: Snapshot, limits: PlatformLimits, active: frozenset[str]
 ) -> Iterator[Condition]:
     """Yields the present conditions. An unknown or stale value neither raises nor clears a fault."""
-    for check in _checks(snapshot, limits):
-        was_broken = check.fault_id in active
-        if was_broken if check.value is None else check.limit.broken(check.value, was_broken=was_broken):
-            yield check.condition()
+    for value, limit, condition in _checks(snapshot, limits):
+        was_broken = condition.fault_id in active
+        if was_broken if value is None else limit.broken(value, was_broken=was_broken):
+            yield condition
     yield from _throttling(snapshot, active)
     if snapshot[COMPUTE].freshness.stale or snapshot[NETWORK].freshness.stale:
-        yield Condition(
+        yield _warning(
             "platform.stale",
-            Severity.WARNING,
             _COMPUTER,
             "the values of the robot's computer are no longer updated",
             "Its file system may hang: check the configured platform.disk_path, then restart the gateway",
         )
 
 
-def _checks(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[_Check]:
+def _checks(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[tuple[float | None, Limit, Condition]]:
+    """Yields each measured value, None if unknown, with its limit and the condition of its violation."""
     compute = snapshot[COMPUTE].value if snapshot[COMPUTE].freshness.fresh else None
     network = snapshot[NETWORK].value if snapshot[NETWORK].freshness.fresh else None
-    yield _Check(
+    yield (
         compute.cpu_temperature_c if compute else None,
         limits.temperature_c,
-        "platform.temperature",
-        _COMPUTER,
-        f"the processor is hot: {limits.temperature_c.raise_at:g} °C or more",
-        _COOL_DOWN,
+        _warning(
+            "platform.temperature",
+            _COMPUTER,
+            f"the processor is hot: {limits.temperature_c.raise_at:g} °C or more",
+            _COOL_DOWN,
+        ),
     )
-    yield _Check(
+    yield (
         compute.ram_used_percent if compute else None,
         limits.memory_percent,
-        "platform.memory",
-        _COMPUTER,
-        f"memory is nearly full: {limits.memory_percent.raise_at:g} % or more",
-        "Find the largest program on the robot (top, then M) and restart it",
+        _warning(
+            "platform.memory",
+            _COMPUTER,
+            f"memory is nearly full: {limits.memory_percent.raise_at:g} % or more",
+            "Find the largest program on the robot (top, then M) and restart it",
+        ),
     )
-    yield _Check(
+    yield (
         compute.disk_used_percent if compute else None,
         limits.disk_percent,
-        "platform.disk",
-        _COMPUTER,
-        f"the disk is nearly full: {limits.disk_percent.raise_at:g} % or more",
-        "Move recordings and logs off the robot",
+        _warning(
+            "platform.disk",
+            _COMPUTER,
+            f"the disk is nearly full: {limits.disk_percent.raise_at:g} % or more",
+            "Move recordings and logs off the robot",
+        ),
     )
-    yield _Check(
+    yield (
         network.wifi_signal_dbm if network else None,
         limits.wifi_signal_dbm,
-        "platform.wifi",
-        "network",
-        f"the Wi-Fi signal is weak: {limits.wifi_signal_dbm.raise_at:g} dBm or less",
-        "Move the robot closer to the access point, or select a smaller preview profile",
+        _warning(
+            "platform.wifi",
+            "network",
+            f"the Wi-Fi signal is weak: {limits.wifi_signal_dbm.raise_at:g} dBm or less",
+            "Move the robot closer to the access point, or select a smaller preview profile",
+        ),
     )
     charge = f"is low: {limits.battery_percent.raise_at:g} % or less"
-    yield _Check(
+    yield (
         _charge_percent(snapshot[BATTERY]),
         limits.battery_percent,
-        "battery.low",
-        "power",
-        f"the robot's battery {charge}",
-        "Bring the robot to its charger",
+        _warning("battery.low", "power", f"the robot's battery {charge}", "Bring the robot to its charger"),
     )
-    yield _Check(
+    yield (
         _charge_percent(snapshot[ONBOARD_BATTERY]),
         limits.battery_percent,
-        "platform.battery_low",
-        "power",
-        f"the computer's battery {charge}",
-        "Connect its power supply",
+        _warning(
+            "platform.battery_low", "power", f"the computer's battery {charge}", "Connect its power supply"
+        ),
     )
+
+
+def _warning(fault_id: str, component: str, message: str, remedy: str) -> Condition:
+    return Condition(fault_id, Severity.WARNING, component, message, remedy)
 
 
 def _throttling(snapshot: Snapshot, active: frozenset[str]) -> Iterator[Condition]:
@@ -108,9 +130,7 @@ def _throttling(snapshot: Snapshot, active: frozenset[str]) -> Iterator[Conditio
     throttled = compute.value.thermal_throttled if compute.value and compute.freshness.fresh else None
     fault_id = "platform.throttled"
     if throttled or (throttled is None and fault_id in active):
-        yield Condition(
-            fault_id, Severity.WARNING, _COMPUTER, "the processor is slowed down by heat", _COOL_DOWN
-        )
+        yield _warning(fault_id, _COMPUTER, "the processor is slowed down by heat", _COOL_DOWN)
 
 
 def _charge_percent(sample: Sample[Battery]) -> float | None:

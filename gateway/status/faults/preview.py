@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from gateway.status.fault import Condition, Severity
-from gateway.status.preview import Encoder, PreviewState, PreviewView
+from gateway.status.preview import PreviewState, PreviewView
 
 UNREACHABLE: Final = "preview.unreachable"
 FAULTED: Final = "preview.faulted"
@@ -31,32 +31,23 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
                 "the preview service does not answer: video is not available",
                 "Start or restart robot-preview on the robot; the gateway connects by itself",
             )
-    elif preview.state is PreviewState.FAULTED or _retrying(preview, active):
-        yield _faulted(preview.last_error)
-    if preview.encoder and preview.encoder.fallback_reason:
-        yield _fallback(preview.encoder)
-
-
-def _retrying(preview: PreviewView, active: frozenset[str]) -> bool:
-    return preview.state is PreviewState.STARTING and FAULTED in active
-
-
-def _faulted(last_error: str) -> Condition:
-    return Condition(
-        FAULTED,
-        Severity.ERROR,
-        _COMPONENT,
-        f"the preview does not work: {last_error}" if last_error else "the preview does not work",
-        "The robot retries by itself; to retry at once type: robotctl preview on",
-    )
-
-
-def _fallback(encoder: Encoder) -> Condition:
-    in_software = "" if encoder.hardware else " on the robot's own processor"
-    return Condition(
-        FALLBACK,
-        Severity.WARNING,
-        _COMPONENT,
-        f"{encoder.name} encodes{in_software} instead of {encoder.wanted}: {encoder.fallback_reason}",
-        "Type on the robot: robot-preview encoders",
-    )
+    elif preview.state is PreviewState.FAULTED or (
+        preview.state is PreviewState.STARTING and FAULTED in active
+    ):
+        yield Condition(
+            FAULTED,
+            Severity.ERROR,
+            _COMPONENT,
+            "the preview does not work" + (f": {preview.last_error}" if preview.last_error else ""),
+            "The robot retries by itself; to retry at once type: robotctl preview on",
+        )
+    encoder = preview.encoder
+    if encoder and encoder.fallback_reason:
+        in_software = "" if encoder.hardware else " on the robot's own processor"
+        yield Condition(
+            FALLBACK,
+            Severity.WARNING,
+            _COMPONENT,
+            f"{encoder.name} encodes{in_software} instead of {encoder.wanted}: {encoder.fallback_reason}",
+            "Type on the robot: robot-preview encoders",
+        )

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from gateway.status.fault import Condition
 from gateway.status.faults.access import access_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
-from gateway.status.faults.limits import PlatformLimits
-from gateway.status.faults.platform import platform_faults
+from gateway.status.faults.platform import PlatformLimits, platform_faults
 from gateway.status.faults.preview import preview_faults
 from gateway.status.faults.sources import sampler_fault, source_faults
 from gateway.status.snapshot import Snapshot

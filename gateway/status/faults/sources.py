@@ -1,44 +1,32 @@
 """Faults of the sources: expected and not received."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Final
 
 from gateway.status.fault import Condition, Severity
 from gateway.status.source_view import SourceState, SourceView
 
-
-@dataclass(frozen=True, slots=True)
-class _FaultOfState:
-    """Suffix of the fault id and remedy; the message is the source's own detail."""
-
-    suffix: str
-    remedy: str
-
-
-STATE_FAULTS: Final[Mapping[SourceState, _FaultOfState | None]] = {
+STATE_FAULTS: Final[Mapping[SourceState, tuple[str, str] | None]] = {
     SourceState.RECEIVING: None,
-    SourceState.WAITING: _FaultOfState(
-        "missing", "Start the program that publishes it; check that it runs in the gateway's ROS domain"
+    SourceState.WAITING: (
+        "missing",
+        "Start the program that publishes it; check that it runs in the gateway's ROS domain",
     ),
-    SourceState.SILENT: _FaultOfState(
-        "silent", "Check the program that publishes it: it is running but sends nothing"
+    SourceState.SILENT: ("silent", "Check the program that publishes it: it is running but sends nothing"),
+    SourceState.STALE: ("stale", "Check the program that publishes it, and the load of the robot"),
+    SourceState.QOS_MISMATCH: (
+        "qos_mismatch",
+        "Change reliability or durability of this source in the gateway's configuration",
     ),
-    SourceState.STALE: _FaultOfState(
-        "stale", "Check the program that publishes it, and the load of the robot"
-    ),
-    SourceState.QOS_MISMATCH: _FaultOfState(
-        "qos_mismatch", "Change reliability or durability of this source in the gateway's configuration"
-    ),
-    SourceState.WRONG_TYPE: _FaultOfState(
-        "wrong_type", "Correct the type of this source in the gateway's configuration"
-    ),
-    SourceState.TYPE_MISSING: _FaultOfState("type_missing", "Type on the robot: robot-gateway doctor"),
-    SourceState.UNDECODABLE: _FaultOfState(
-        "undecodable", "Install the robot's version of this message package beside the gateway"
+    SourceState.WRONG_TYPE: ("wrong_type", "Correct the type of this source in the gateway's configuration"),
+    SourceState.TYPE_MISSING: ("type_missing", "Type on the robot: robot-gateway doctor"),
+    SourceState.UNDECODABLE: (
+        "undecodable",
+        "Install the robot's version of this message package beside the gateway",
     ),
 }
-"""Total: the fault of each state; None for the one that is none."""
+"""Total: suffix of the fault id, and remedy; None for the state that is no fault. The message is the source's
+own detail."""
 
 _STARTUP_STATES: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
 """States in which every source begins."""
@@ -65,12 +53,13 @@ def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator
     for source in sources:
         fault = STATE_FAULTS[source.state]
         if fault and _is_fault(source, settled=settled):
+            suffix, remedy = fault
             yield Condition(
-                f"{source.name}.{fault.suffix}",
+                f"{source.spec.name}.{suffix}",
                 Severity.ERROR if source.required else Severity.WARNING,
                 source.spec.display_name,
                 source.detail,
-                fault.remedy,
+                remedy,
             )
 
 

@@ -65,7 +65,8 @@ class FaultTracker:
         gone = [self._active.pop(fault_id) for fault_id in self._active.keys() - listed.keys()]
         # A fault that lost its place in the list to a more severe one is still present.
         absent = [fault for fault in gone if fault.condition.fault_id not in candidates]
-        cleared = [self._clear(fault, now_s) for fault in absent]
+        cleared = [replace(fault, cleared_s=now_s) for fault in absent]
+        self._cleared |= {fault.condition.fault_id: fault for fault in cleared}
         self._forget(now_s)
         self.faults = (*_by_weight(self._active.values()), *reversed(self._cleared.values()))
         return Changes(_by_weight(raised), _by_weight(worsened), _by_weight(cleared))
@@ -98,10 +99,6 @@ class FaultTracker:
         self._cleared.pop(fault_id, None)
         fault = self._active[fault_id] = Fault(condition, now_s, now_s, None, times)
         return fault
-
-    def _clear(self, fault: Fault, now_s: float) -> Fault:
-        cleared = self._cleared[fault.condition.fault_id] = replace(fault, cleared_s=now_s)
-        return cleared
 
     def _forget(self, now_s: float) -> None:
         newest = list(self._cleared.items())[-MOST_CLEARED:]

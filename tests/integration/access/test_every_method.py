@@ -15,7 +15,7 @@ from common.reasons import Reason
 from console.client.refusal import refusal_in
 from gateway.access.credential import Kind
 from gateway.access.role import Role
-from gateway.rpc.methods import ROLES
+from gateway.rpc.calls.methods import ROLES
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot

@@ -147,6 +147,26 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
         unread.cancel()
 
 
+@pytest.mark.timed
+async def test_a_hundred_revoked_streams_end_within_a_second(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    credential, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot, limits={"streams_per_connection": 100}):
+        calls = stub(robot)
+        streams = [
+            calls.SubscribeEvents(SubscribeEventsRequest(), metadata=login.metadata()) for _ in range(100)
+        ]
+        for stream in streams:
+            await stream.read()
+        began_s = time.monotonic()
+        robot.admin.revoke(credential.credential_id)
+        ends = await asyncio.gather(*map(to_its_end, streams), return_exceptions=True)
+        assert time.monotonic() - began_s < 1.0
+        assert {each.code() for each in ends if isinstance(each, grpc.aio.AioRpcError)} == {
+            grpc.StatusCode.UNAUTHENTICATED
+        }
+
+
 async def test_callers_who_leave_while_they_are_sent_away_harm_nobody(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     credential, login = robot.add(Role.VIEWER)

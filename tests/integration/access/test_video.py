@@ -1,5 +1,6 @@
 """Authenticated callers get the stream's passphrase, from any address; others do not."""
 
+import asyncio
 import ipaddress
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,8 @@ from typing import Any
 import grpc
 import pytest
 
+from common.reasons import Reason
+from console.client.refusal import refusal_in
 from gateway.access.role import Role
 from gateway.platform.hosts import find_hosts
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -20,7 +23,7 @@ from omniseer.gateway.v1.states_pb2 import PREVIEW_RUNNING
 from tests.support.eventually import eventually
 from tests.support.free import free_tcp_port
 from tests.support.guarded_gateway import HOSTS, guarded_gateway, new_robot
-from tests.support.preview_double import PreviewDouble, serve_double
+from tests.support.preview_double import Behaviour, PreviewDouble, serve_double
 from tests.support.running_gateway import Operator, running_gateway
 
 
@@ -99,6 +102,33 @@ async def test_who_is_let_in_no_more_knows_a_passphrase_that_is_worth_nothing(tm
             assert [each.enabled for each in known] == [True, True]
             assert known[1].passphrase not in {"", before.passphrase}
             assert (await status()).preview.endpoint.passphrase == known[1].passphrase
+    finally:
+        await server.stop(None)
+
+
+async def test_a_pending_request_is_not_answered_with_the_new_passphrase(tmp_path: Path) -> None:
+    """Its wait ends with the renewal that the revocation of its own caller has caused."""
+    robot, double = new_robot(tmp_path / "c"), PreviewDouble(Behaviour.STAYS_STARTING)
+    anna, annas = robot.add(Role.OPERATOR)
+    server = await serve_double(robot.directory.path / "preview.sock", double)
+    settings = {"socket": robot.directory.path / "preview.sock", "settle_ms": 20_000}
+    try:
+        async with guarded_gateway(robot, preview=settings):
+            calls: Any = RobotGatewayStub(robot.channel())
+            pending = asyncio.ensure_future(
+                calls.SetPreviewMode(SetPreviewModeRequest(enabled=True), metadata=annas.metadata())
+            )
+
+            async def applied() -> int:
+                return len(double.applied)
+
+            await eventually(applied, bool, "the request has arrived")
+            robot.admin.revoke(anna.credential_id)
+            with pytest.raises(grpc.aio.AioRpcError) as seen:
+                await asyncio.wait_for(pending, 10)
+            assert seen.value.code() is grpc.StatusCode.UNAUTHENTICATED
+            assert refusal_in(seen.value.trailing_metadata()).reason == Reason.CREDENTIAL_REVOKED
+            await eventually(applied, lambda count: count > 1, "the new passphrase is applied")
     finally:
         await server.stop(None)
 

@@ -1,6 +1,7 @@
 """The reading methods over a real connection, good requests and bad ones."""
 
 import asyncio
+import socket
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 from common.errors import UserError
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.eventually import eventually
+from tests.support.free import free_tcp_port
 from tests.support.running_gateway import Operator, running_gateway
 
 STATUS = "/omniseer.gateway.v1.RobotGateway/GetSystemStatus"
@@ -34,6 +36,20 @@ async def test_a_gateway_without_sources_is_healthy_and_tells_its_computer(opera
     assert status.health.ready
     assert status.platform.compute.ram_total_bytes > 0
     assert not status.platform.compute.stale
+
+
+async def test_a_gateway_that_can_not_have_its_socket_gives_the_port_back(tmp_path: Path) -> None:
+    port = free_tcp_port()
+    with pytest.raises(UserError, match="directory") as seen:
+        async with running_gateway(
+            tmp_path / "p.sock", port=port, grpc={"port": port, "socket": tmp_path / "none" / "g.sock"}
+        ):
+            pass
+    # The traceback still holds all that was alive then.
+    assert seen.value.__traceback__
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", port))
+        probe.listen()
 
 
 async def test_ages_grow_with_the_clock(tmp_path: Path) -> None:

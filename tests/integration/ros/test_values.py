@@ -19,7 +19,7 @@ from gateway.ros.intake import intake
 from gateway.ros.readers import registry
 from gateway.status.board import Board
 from gateway.status.sources import BATTERY, DETECTIONS, ODOMETRY, VISION
-from gateway.status.values import Battery, Detection, Odometry, Vision
+from gateway.status.values import Battery, Detection, Velocity, Vision
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
 
@@ -61,7 +61,7 @@ def test_every_default_source_arrives(talker: Talker) -> None:
             lambda: board[ODOMETRY] and board[VISION] and board[DETECTIONS] and board[BATTERY], "all values"
         )
     assert board[ODOMETRY]
-    assert board[ODOMETRY].value == Odometry(0.5, -0.25, 0.125)
+    assert board[ODOMETRY].value == Velocity(0.5, -0.25, 0.125)
     assert board[VISION]
     assert board[VISION].value == Vision(30.0, 29.5, 18.25, 2**64 - 1, 3)
     assert board[DETECTIONS]

@@ -1,5 +1,6 @@
 """The chain: every hook in its order, for all four kinds of method, whatever one of them does."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from typing import Any
@@ -99,6 +100,31 @@ async def test_every_message_of_a_stream_passes(kind: str) -> None:
     assert b"+".join(responses) == b"1a+2a"
     assert [each for each in steps if each in {"a 1", "a 2"}] == ["a 1", "a 2"]
     assert steps[-1] == "a end"
+
+
+@pytest.mark.parametrize("kind", ["Requests", "Both"])
+async def test_a_caller_that_leaves_a_stream_of_requests_has_not_finished_it(kind: str) -> None:
+    ended: asyncio.Future[BaseException | None] = asyncio.get_running_loop().create_future()
+
+    class Ending(Interceptor[Call]):
+        def on_end(self, call: Call, error: BaseException | None) -> None:
+            ended.set_result(error)
+
+    make, name = KINDS[kind]
+    server = new_server(Chain([ErrorInterceptor(), Ending()]))
+    handlers = {kind: make(BEHAVIORS[kind])}
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            call: Any = getattr(channel, name)(f"/test.Service/{kind}")()
+            await call.write(b"1")
+            call.cancel()
+            error = await asyncio.wait_for(ended, 10)
+            assert isinstance(error, asyncio.CancelledError | GeneratorExit), repr(error)
+    finally:
+        await server.stop(None)
 
 
 class Refusing(Interceptor[Call]):

@@ -98,6 +98,7 @@ def test_exposure_can_be_accepted(tmp_path: Path) -> None:
         "{grpc: {host: 10.0.0.5}, security: {credentials: /c, tls: {enabled: false}}}",
         "{metrics: {host: 0.0.0.0, port: 9464}}",
         "{metrics: {host: '::', port: 0}, security: {credentials: /c}}",
+        "{metrics: {host: 0.0.0.0, port: 9464}, security: {insecure: true}}",
     ],
 )
 def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_somebody_accepts_it(
@@ -117,7 +118,6 @@ def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_somebody_acce
         "{grpc: {host: 127.0.0.1}, security: {credentials: /c, tls: {enabled: false}}}",
         "{metrics: {host: 0.0.0.0}}",
         "{metrics: {host: 0.0.0.0, port: 9464, insecure: true}}",
-        "{metrics: {host: 0.0.0.0, port: 9464}, security: {insecure: true}}",
     ],
 )
 def test_what_is_guarded_kept_in_or_accepted_is_good(tmp_path: Path, text: str) -> None:

@@ -6,7 +6,7 @@ from gateway.status.fault import Severity
 from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
-from gateway.status.values import Mode, Odometry, Received
+from gateway.status.values import Mode, Received, Velocity
 from tests.support import status
 from tests.support.fault_rules import new_observer
 
@@ -32,11 +32,11 @@ def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
     assert sentences(observer.observe(snapshot(board, now_s=99.0))) == []
     missing = "no odometry since the gateway started, and nothing on the robot publishes it"
     assert sentences(observer.observe(snapshot(board, now_s=99.2))) == [f"error: {missing}"]
-    board[ODOMETRY] = Received(Odometry(0, 0, 0), at_s=100.0)
+    board[ODOMETRY] = Received(Velocity(0, 0, 0), at_s=100.0)
     assert sentences(observer.observe(snapshot(board, now_s=100.1))) == [f"cleared: {missing}"]
     assert sentences(observer.observe(snapshot(board, now_s=100.2))) == []
     assert sentences(observer.observe(snapshot(board, now_s=101.5))) == ["error: odometry stopped coming"]
-    board[ODOMETRY] = Received(Odometry(0, 0, 0), at_s=102.0)
+    board[ODOMETRY] = Received(Velocity(0, 0, 0), at_s=102.0)
     assert sentences(observer.observe(snapshot(board, now_s=102.0))) == ["cleared: odometry stopped coming"]
 
 

@@ -1,6 +1,7 @@
 """The failure table of gateway.links for any service: one in memory, and the preview's over real gRPC."""
 
 import asyncio
+import re
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -16,7 +17,7 @@ from gateway.links.preview.state import PreviewSpec
 from gateway.links.preview.wire import PROFILES, PreviewConnector
 from gateway.links.reconciler import Reconciler
 from gateway.status.preview import Profile
-from tests.support.lamp import LampConnector, LampModel, LampService, LampSpec
+from tests.support.lamp import LampConnector, LampModel, LampService, LampSpec, LampView
 from tests.support.preview_double import Behaviour, PreviewDouble, serve_double
 
 if TYPE_CHECKING:
@@ -170,23 +171,28 @@ async def link(ground: Ground) -> AsyncIterator[ServiceLink[Any, Any, Any]]:
         yield link
 
 
+def reachable(link: ServiceLink[Any, Any, Any]) -> bool:
+    view = link.view
+    return bool(view.reachable if isinstance(view, LampView) else view.service_reachable)
+
+
 async def until(link: ServiceLink[Any, Any, Any], condition: Callable[[], object]) -> None:
-    assert await link.changes.wait_until(lambda: bool(condition()), WITHIN_S), link.health
+    assert await link.changes.wait_until(lambda: bool(condition()), WITHIN_S), link.view
 
 
 async def connected(link: ServiceLink[Any, Any, Any]) -> None:
-    await until(link, lambda: link.health.reachable)
+    await until(link, lambda: reachable(link))
 
 
 async def test_a_service_that_comes_late_gets_the_desired_state(ground: Ground, link: Any) -> None:
     desired = link.request(ground.some)
-    await until(link, lambda: link.health.failures >= 2)
-    assert not link.health.reachable
-    assert link.health.last_error
+    await until(link, lambda: link.failures >= 2)
+    assert not reachable(link)
+    assert re.search("no process runs|nothing answers", repr(link.view))
     service = await ground.start()
-    await until(link, lambda: link.health.reachable and service.applied)
+    await until(link, lambda: reachable(link) and service.applied)
     assert await link.wait_until_settled(desired, WITHIN_S)
-    assert link.health.failures == 0
+    assert link.failures == 0
     assert ground.sent() == [ground.some]
 
 
@@ -195,7 +201,7 @@ async def test_a_new_process_gets_the_desired_state_again(ground: Ground, link: 
     await connected(link)
     assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     await ground.stop()
-    await until(link, lambda: not link.health.reachable)
+    await until(link, lambda: not reachable(link))
     second = await ground.start()
     await until(link, lambda: second.applied)
     assert ground.sent() == [ground.some]
@@ -209,8 +215,8 @@ async def test_a_frozen_service_is_noticed_and_the_same_process_is_sent_nothing_
     await connected(link)
     assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     service.thawed.clear()
-    await until(link, lambda: not link.health.reachable)
-    assert link.health.last_error == "no report for 1 s"
+    await until(link, lambda: not reachable(link))
+    assert "no report for 1 s" in repr(link.view)
     service.thawed.set()
     await connected(link)
     assert len(service.applied) == 1
@@ -222,9 +228,9 @@ async def test_a_request_that_is_not_answered_is_a_lost_service(ground: Ground, 
     service.thawed.clear()
     desired = link.request(ground.some)
     assert await link.wait_until_settled(desired, WITHIN_S)
-    assert link.health.last_error == "no answer to a request for 0.3 s"
+    assert "no answer to a request for 0.3 s" in repr(link.view)
     service.thawed.set()
-    await until(link, lambda: service.applied and link.health.reachable)
+    await until(link, lambda: service.applied and reachable(link))
     assert await link.wait_until_settled(desired, WITHIN_S)
 
 
@@ -235,7 +241,7 @@ async def test_a_refused_request_is_not_repeated(ground: Ground, link: Any) -> N
     assert await link.wait_until_settled(link.request(ground.refused), WITHIN_S)
     view = link.view
     assert ground.refusal in repr(view)
-    assert link.health.reachable
+    assert reachable(link)
     later = asyncio.get_running_loop().time() + 2 * SILENCE_S
     await link.changes.wait_until(lambda: asyncio.get_running_loop().time() > later, 3 * SILENCE_S)
     assert len(service.applied) == 1, "though it has reported since then"
@@ -245,9 +251,10 @@ async def test_a_refused_request_is_not_repeated(ground: Ground, link: Any) -> N
 async def test_a_stream_of_reports_that_ends_is_a_lost_service(ground: Ground, link: Any) -> None:
     service = await ground.start()
     await connected(link)
+    assert await link.wait_until_settled(link.request(ground.some), WITHIN_S)
     service.reports_end = True
-    await until(link, lambda: not link.health.reachable)
-    assert "closed its stream" in link.health.last_error
+    await until(link, lambda: not reachable(link))
+    assert "closed its stream" in repr(link.view)
     await connected(link)
 
 
@@ -283,10 +290,10 @@ async def test_the_newest_of_many_requests_counts(ground: Ground, link: Any) -> 
 
 
 async def test_a_request_cuts_a_pause_short(ground: Ground, link: Any) -> None:
-    await until(link, lambda: link.health.failures == 6)
+    await until(link, lambda: link.failures == 6)
     # The pause that has begun now is 1 s long.
     assert await link.wait_until_settled(link.request(ground.some), 0.8)
-    assert link.health.failures >= 7
+    assert link.failures >= 7
 
 
 async def test_connections_close_with_the_link() -> None:

@@ -13,12 +13,11 @@ from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.histogram import Histogram
-from gateway.links.link import LinkHealth
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats, Stats
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import (
@@ -32,10 +31,9 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.sources import ODOMETRY, VISION
-from gateway.status.values import Odometry, Received
+from gateway.status.values import Received, Velocity
 from tests.support.eventually import eventually
 
 ROOT = Path(__file__).parents[4]
@@ -59,7 +57,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
     return take(
         identity=Identity('lab "7"', "1.2.3", insecure=False),
         rules=Rules({ODOMETRY: SourceRule(1000, True), VISION: SourceRule(2000, True)}, 3000),
-        board=Board({ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), NOW_S - 0.25)}),
+        board=Board({ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), NOW_S - 0.25)}),
         preview=preview,
         events=(),
         now_s=NOW_S,
@@ -73,7 +71,7 @@ class World:
 
     skipped = 7
     gaps = 1
-    health = LinkHealth(reachable=False, failures=3, last_error="nothing answers")
+    failures = 3
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now

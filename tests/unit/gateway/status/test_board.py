@@ -5,7 +5,6 @@ from gateway.status.values import (
     DiagnosticItem,
     DiagnosticLevel,
     Diagnostics,
-    Odometry,
     Received,
     Velocity,
 )
@@ -14,7 +13,7 @@ KEYBOARD, AUTONOMY = MUX_INPUTS[CommandSource.KEYBOARD], MUX_INPUTS[CommandSourc
 
 
 def test_a_value_is_kept_as_it_is() -> None:
-    board, received = Board(), Received(Odometry(1, 2, 3), 5.0)
+    board, received = Board(), Received(Velocity(1, 2, 3), 5.0)
     assert board[ODOMETRY] is None
     board[ODOMETRY] = received
     assert board[ODOMETRY] is received

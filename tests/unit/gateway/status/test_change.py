@@ -9,10 +9,9 @@ from gateway.status.board import Board
 from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Measurement, PreviewState
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Snapshot, SourceRule
+from gateway.status.snapshot import Runtime, Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
-from gateway.status.values import Mode, Odometry, Received
+from gateway.status.values import Mode, Received, Velocity
 from tests.support.status import OFF, snapshot_of
 
 FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
@@ -20,7 +19,7 @@ FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"),
 
 def snapshot(now_s: float = 100.0, **changed: Any) -> Snapshot:
     values: dict[str, Any] = {
-        "board": Board({ODOMETRY: Received(Odometry(0.5, 0, 0), 99.9), MODE: Received(Mode("idle"), 99.0)}),
+        "board": Board({ODOMETRY: Received(Velocity(0.5, 0, 0), 99.9), MODE: Received(Mode("idle"), 99.0)}),
         "sources": {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(60_000, required=False)},
         "preview": replace(OFF, measured=Received(Measurement(30, 2500, 1, 10, None, None), 99.9)),
         "faults": (FAULT,),
@@ -40,7 +39,7 @@ BEFORE = change_key(snapshot())
         pytest.param(
             snapshot(
                 board=Board(
-                    {ODOMETRY: Received(Odometry(0.5, 0, 0), 99.99), MODE: Received(Mode("idle"), 99.5)}
+                    {ODOMETRY: Received(Velocity(0.5, 0, 0), 99.99), MODE: Received(Mode("idle"), 99.5)}
                 )
             ),
             id="the same values come again",
@@ -56,7 +55,7 @@ def test_this_is_no_change(later: Snapshot) -> None:
     "later",
     [
         pytest.param(
-            snapshot(board=Board({ODOMETRY: Received(Odometry(0.6, 0, 0), 99.9)})), id="another speed"
+            snapshot(board=Board({ODOMETRY: Received(Velocity(0.6, 0, 0), 99.9)})), id="another speed"
         ),
         pytest.param(snapshot(now_s=101.5), id="it grows stale"),
         pytest.param(snapshot(faults=()), id="a fault is gone"),

@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 
 from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
-from gateway.status.health import Health, HealthState, assess
+from gateway.status.health import HealthState, RobotHealth, assess
 from gateway.status.snapshot import SourceRule
 from gateway.status.sources import ODOMETRY, VISION
-from gateway.status.values import Odometry, Received, Vision
+from gateway.status.values import Received, Velocity, Vision
 from tests.support.status import snapshot_of
 
 SECONDS = st.floats(min_value=0, max_value=1e7, allow_nan=False)
@@ -77,7 +77,7 @@ def test_health_follows_the_contract_line_by_line(
     # Half a millisecond off, so that no age sits on a rounding edge.
     board = Board()
     if odometry_age_ms is not None:
-        board[ODOMETRY] = Received(Odometry(0, 0, 0), now_s - (odometry_age_ms + 0.5) / 1000)
+        board[ODOMETRY] = Received(Velocity(0, 0, 0), now_s - (odometry_age_ms + 0.5) / 1000)
     if vision_age_ms is not None:
         board[VISION] = Received(Vision(0, 0, 0, 0, 0), now_s - (vision_age_ms + 0.5) / 1000)
 
@@ -90,4 +90,4 @@ def test_health_follows_the_contract_line_by_line(
 
 
 def test_a_robot_without_both_sources_is_healthy() -> None:
-    assert assess([]) == Health(HealthState.OK, "robot healthy")
+    assert assess([]) == RobotHealth(HealthState.OK, "robot healthy")

@@ -14,8 +14,8 @@ from gateway.config import SourceSettings
 from gateway.config.sources import KINDS
 from gateway.ros.readers import reader_for, registry, types_of
 from gateway.ros.readers.registry import reads
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
-from gateway.rpc.recipient import Recipient
 from gateway.status.board import Board
 from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot, SourceRule
@@ -121,7 +121,8 @@ def test_the_configuration_page_lists_every_kind_with_its_types() -> None:
 def test_the_page_on_adding_a_source_lists_every_source() -> None:
     rows = columns("adding-a-source.md", "| source | value type | written by |")
     expected = {
-        (f"`{spec.kind}`", f"`{spec.value_type.__name__}`", spec.origin.name.lower()) for spec in SOURCES
+        (f"`{spec.kind}`", f"`{spec.value_type.__name__}`", "ros" if spec in ROS_SOURCES else "platform")
+        for spec in SOURCES
     }
     assert {(row[0], row[1], row[2]) for row in rows} == expected
 

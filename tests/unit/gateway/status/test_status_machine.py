@@ -17,7 +17,7 @@ from gateway.status.faults.tracker import FaultTracker
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import BATTERY, ODOMETRY, VISION, SourceSpec
-from gateway.status.values import Battery, Odometry, Received, Vision
+from gateway.status.values import Battery, Received, Velocity, Vision
 from tests.support.fault_rules import new_observer
 from tests.support.status import snapshot_of
 
@@ -28,9 +28,9 @@ WORDS = {ODOMETRY: "odometry", VISION: "vision telemetry"}
 SPECS = st.sampled_from(sorted(LIMITS_MS, key=lambda spec: spec.name))
 
 
-def value_of(spec: SourceSpec[Any], number: int) -> Odometry | Vision | Battery:
+def value_of(spec: SourceSpec[Any], number: int) -> Velocity | Vision | Battery:
     if spec is ODOMETRY:
-        return Odometry(float(number), 0.0, 0.0)
+        return Velocity(float(number), 0.0, 0.0)
     if spec is VISION:
         return Vision(float(number), 0.0, 0.0, 0, 0)
     return Battery(True, float(number), 80.0, False)
@@ -149,11 +149,11 @@ class Life(RuleBasedStateMachine):
         active = {fault.condition.fault_id: fault for fault in self.tracker.faults if fault.active}
         for source in now.sources:
             if source.state is SourceState.STALE:
-                assert f"{source.name}.stale" in active
+                assert f"{source.spec.name}.stale" in active
             if source.state is SourceState.WAITING and source.required and self.now_s >= 1000.0 + GRACE_S:
-                assert f"{source.name}.missing" in active
-            if source.state is SourceState.RECEIVING and f"{source.name}.stale" in active:
-                assert self.now_s - active[f"{source.name}.stale"].seen_s < CLEAR_AFTER_S
+                assert f"{source.spec.name}.missing" in active
+            if source.state is SourceState.RECEIVING and f"{source.spec.name}.stale" in active:
+                assert self.now_s - active[f"{source.spec.name}.stale"].seen_s < CLEAR_AFTER_S
         assert self.raised - self.cleared == len(active)
 
 

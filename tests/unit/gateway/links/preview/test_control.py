@@ -1,5 +1,7 @@
 """Answers to operators who switch the preview."""
 
+import asyncio
+import logging
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,7 @@ import pytest
 from gateway.links.link import ServiceLink
 from gateway.links.preview.control import PreviewControl, PreviewLink
 from gateway.links.preview.model import PreviewModel, PreviewReconciler
-from gateway.links.preview.state import PreviewReport
+from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.preview.wire import PreviewConnector
 from gateway.links.reconciler import Reconciler
 from gateway.status.preview import Counters, PreviewState, Profile
@@ -97,6 +99,22 @@ async def test_without_the_service(ground: Ground) -> None:
         "preview has failed and the robot keeps trying: preview service unreachable (nothing answers on its"
         " socket). Start or restart it; the gateway reconnects by itself"
     )
+
+
+async def test_the_robot_does_not_keep_trying_what_its_service_refuses(ground: Ground) -> None:
+    answer = asyncio.ensure_future(ground.control.set_mode(enabled=ON, profile=None, remaining_s=None))
+    await asyncio.sleep(0)
+    ground.reconciler.take_refusal(ground.link.desired, "no encoder for this profile")
+    ground.link.changes.notify_all()
+    assert await answer == "preview service refused the request: no encoder for this profile"
+
+
+def test_a_new_passphrase_is_logged_as_such(ground: Ground, caplog: pytest.LogCaptureFixture) -> None:
+    encrypted = PreviewSpec(enabled=True, profile=Profile.BALANCED, passphrase="old")
+    ground.link.request(encrypted)
+    with caplog.at_level(logging.INFO):
+        ground.control.renew_passphrase()
+    assert "new passphrase" in caplog.text
 
 
 async def test_another_profile_is_a_new_request(ground: Ground) -> None:

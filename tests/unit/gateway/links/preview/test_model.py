@@ -143,6 +143,14 @@ def test_a_refused_request_is_quoted_and_counts_as_a_fault() -> None:
     assert preview.settled(desired)
 
 
+def test_looking_at_the_view_counts_nothing() -> None:
+    preview = Preview()
+    preview.switch(True)
+    preview.take_loss("nothing answers on its socket")
+    assert preview.model.view(preview) == preview.model.view(preview) == preview.view
+    assert preview.view.counters.faults == 1
+
+
 def test_a_fault_that_the_service_reports_is_counted_by_the_service_alone() -> None:
     preview = connected()
     desired = preview.switch(True)

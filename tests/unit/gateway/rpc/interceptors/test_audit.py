@@ -11,14 +11,14 @@ from common.reasons import Reason
 from gateway.access.credential import Principal
 from gateway.access.refusal_limiter import BURST, RefusalLimiter
 from gateway.access.role import Role
-from gateway.rpc.call import CallContext
-from gateway.rpc.interceptors.audit import Audit
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
 from omniseer.gateway.v1.preview_pb2 import PREVIEW_PROFILE_LOW_BW
 from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPreviewModeResponse
-from tests.support.calls import serve
+from tests.support.calls import call_of, serve
 
 ON = SetPreviewModeRequest(enabled=True)
 ANNA = Principal("anna", Role.OPERATOR, ("a1",))
@@ -29,13 +29,13 @@ class Records:
 
     def __init__(self) -> None:
         self.events: list[Event] = []
-        self.trail: list[ControlAction] = []
+        self.actions: list[ControlAction] = []
 
     def note(self, event: Event) -> None:
         self.events.append(event)
 
     def record(self, action: ControlAction) -> None:
-        self.trail.append(action)
+        self.actions.append(action)
 
 
 class Authenticated(Interceptor[CallContext]):
@@ -59,12 +59,12 @@ class Ground:
 
     async def call(
         self,
-        outcome: SetPreviewModeResponse | BaseException,
+        outcome: SetPreviewModeResponse | bytes | BaseException,
         request: bytes = ON.SerializeToString(),
         auth: Authenticated | None = None,
         method: str = "SetPreviewMode",
     ) -> None:
-        async def behavior(_request: Any, _call: CallContext) -> SetPreviewModeResponse:
+        async def behavior(_request: Any, _call: CallContext) -> SetPreviewModeResponse | bytes:
             if isinstance(outcome, BaseException):
                 raise outcome
             return outcome
@@ -82,7 +82,7 @@ async def recorded(
         await ground.call(outcome, request)
     except (InvalidRequestError, ZeroDivisionError, asyncio.CancelledError) as error:
         assert error is outcome or not request, "the caller gets it all the same"  # noqa: PT017
-    [action] = ground.records.trail
+    [action] = ground.records.actions
     [event] = ground.records.events
     assert event.detail is action
     return action
@@ -102,6 +102,37 @@ async def test_an_accepted_action_has_the_robots_answer() -> None:
         request_id=action.request_id,
     )
     assert action.request_id
+
+
+async def test_a_serialised_answer_is_recorded_as_well() -> None:
+    ground = Ground()
+    await ground.call(SetPreviewModeResponse(message="preview is running").SerializeToString())
+    assert [each.answer for each in ground.records.actions] == ["preview is running"]
+
+
+def control_stream() -> CallContext:
+    stream = call_of("SetPreviewMode", request_streaming=True)
+    stream.principal = ANNA
+    return stream
+
+
+def test_a_control_stream_is_recorded_when_it_starts_and_when_it_ends() -> None:
+    ground, stream = Ground(), control_stream()
+    start = AuditStart(ground.audit)
+    assert start.applies_to(stream.method)
+    stream.request = ON
+    for _ in range(3):
+        start.on_request(stream, ON)
+    [first] = ground.records.actions
+    assert (first.who, first.request, first.answer) == ("anna", "enabled: true", "started")
+    ground.audit.on_end(stream, None)
+    start.on_end(stream, None)
+    assert [each.answer for each in ground.records.actions] == ["started", "ended"]
+
+
+def test_a_single_control_action_has_no_start() -> None:
+    assert not AuditStart(Ground().audit).applies_to(call_of("SetPreviewMode").method)
+    assert not AuditStart(Ground().audit).applies_to(call_of("WatchSystemStatus", streaming=True).method)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +176,7 @@ async def test_a_request_that_breaks_the_rules_is_recorded() -> None:
     ground = Ground()
     with pytest.raises(InvalidRequestError):
         await ground.call(SetPreviewModeResponse(), request=b"\xff")
-    [action] = ground.records.trail
+    [action] = ground.records.actions
     assert action.result is ControlResult.REFUSED
     assert "can't be parsed" in action.answer
 
@@ -162,8 +193,8 @@ async def test_what_auth_refuses_is_recorded_until_there_are_too_many(error: Exc
     for _ in range(BURST + 5):
         with pytest.raises(type(error)):
             await ground.call(SetPreviewModeResponse(), auth=Authenticated(None, error))
-    assert len(ground.records.trail) == len(ground.records.events) == BURST
-    assert {each.result for each in ground.records.trail} == {ControlResult.REFUSED}
+    assert len(ground.records.actions) == len(ground.records.events) == BURST
+    assert {each.result for each in ground.records.actions} == {ControlResult.REFUSED}
     assert ground.records.events[0].severity is Severity.WARNING
 
 
@@ -173,7 +204,7 @@ async def test_a_caller_that_is_locked_out_is_not_recorded() -> None:
         await ground.call(
             SetPreviewModeResponse(), auth=Authenticated(None, TooMuchError("wait", Reason.LOCKED_OUT))
         )
-    assert ground.records.trail == []
+    assert ground.records.actions == []
 
 
 class Leaving(Interceptor[CallContext]):
@@ -187,7 +218,7 @@ async def test_a_caller_that_leaves_before_it_is_authenticated_has_done_nothing(
     ground = Ground()
     with pytest.raises(asyncio.CancelledError):
         await serve([ground.audit, Leaving(), Validation(10_000)], "SetPreviewMode", None)
-    assert ground.records.trail == []
+    assert ground.records.actions == []
     assert ground.records.events == []
 
 
@@ -196,13 +227,13 @@ async def test_a_flood_of_refused_requests_fills_neither_log_nor_events() -> Non
     for _ in range(BURST + 20):
         with pytest.raises(InvalidRequestError):
             await ground.call(SetPreviewModeResponse(), request=b"\xff")
-    assert len(ground.records.trail) == len(ground.records.events) == BURST
+    assert len(ground.records.actions) == len(ground.records.events) == BURST
 
 
 async def test_looking_is_no_control_action() -> None:
     ground = Ground()
     await ground.call(SetPreviewModeResponse(), request=b"", method="Ping")
-    assert ground.records.trail == []
+    assert ground.records.actions == []
 
 
 async def test_long_texts_are_shortened() -> None:

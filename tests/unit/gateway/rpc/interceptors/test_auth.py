@@ -7,13 +7,14 @@ from typing import Any
 import pytest
 
 from common.errors import NotAuthenticatedError
+from common.reasons import Reason
 from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
 from gateway.access.lockout import Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.auth import Auth
 from tests.support.calls import serve
 
@@ -73,7 +74,7 @@ def ground() -> Ground:
 
 async def test_nothing_happens_while_all_credentials_are_valid(ground: Ground) -> None:
     assert await ground.ping("anna") == b"anna"
-    await ground.auth.revoke()
+    ground.auth.end_revoked()
     assert ground.renewals == 0
 
 
@@ -82,11 +83,11 @@ async def test_an_admitted_caller_that_loses_access_is_noticed_once(ground: Grou
         await ground.ping(name)
     ground.revoke("anna", "ben")
     for _ in range(3):
-        await ground.auth.revoke()
+        ground.auth.end_revoked()
     assert ground.renewals == 1
     with pytest.raises(NotAuthenticatedError, match="was revoked"):
         await ground.ping("anna")
-    await ground.auth.revoke()
+    ground.auth.end_revoked()
     assert ground.renewals == 1
 
 
@@ -95,8 +96,44 @@ async def test_a_caller_that_was_never_admitted_knows_no_secret(ground: Ground) 
     ground.revoke("carla")
     with pytest.raises(NotAuthenticatedError):
         await ground.ping("carla")
-    await ground.auth.revoke()
+    ground.auth.end_revoked()
     assert ground.renewals == 0
+
+
+@pytest.mark.parametrize("method", ["SetPreviewMode", "GetSystemStatus"])
+async def test_an_answer_is_withheld_from_a_caller_that_lost_access_while_it_waited(
+    ground: Ground, method: str
+) -> None:
+    async def answer(_request: Any, _call: CallContext) -> bytes:
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        return b"the new passphrase"
+
+    ground.credentials["anna"] = replace(ground.credentials["anna"], role=Role.OPERATOR)
+    ground.reload()
+    with pytest.raises(NotAuthenticatedError) as seen:
+        await serve([ground.auth], method, answer, token=ground.tokens["anna"].text())
+    assert seen.value.reason is Reason.CREDENTIAL_REVOKED
+    assert ground.renewals == 1
+
+
+async def test_calls_of_one_caller_do_not_disturb_each_other(ground: Ground) -> None:
+    async def answer(_request: Any, _call: CallContext) -> Any:
+        assert await ground.ping("anna") == b"anna"
+        return b"answer"
+
+    assert await serve([ground.auth], "Ping", answer, token=ground.tokens["anna"].text()) == b"answer"
+
+
+async def test_a_stream_gets_nothing_after_its_caller_lost_access(ground: Ground) -> None:
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        yield b"the passphrase"
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        yield b"the new passphrase"
+
+    with pytest.raises(NotAuthenticatedError):
+        await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
 
 
 async def test_a_credential_added_since_the_last_look_is_accepted_at_once(ground: Ground) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.config import LimitSettings
-from gateway.rpc.call import peer_of
+from gateway.rpc.calls.call import peer_of
 from gateway.rpc.interceptors.rate_limit import (
     FORGIVEN_AFTER_S,
     QUIET_AFTER_S,
@@ -39,6 +39,11 @@ def clock() -> Clock:
 @pytest.fixture
 def admission(clock: Clock) -> Admission:
     return Admission(SMALL, clock)
+
+
+def count(admission: Admission) -> int:
+    """How many connections it keeps."""
+    return len(vars(admission)["_connections"])
 
 
 def refusal(admission: Admission, peer: str) -> TooMuchError:
@@ -97,7 +102,7 @@ def test_a_new_connection_takes_the_place_of_the_quietest(admission: Admission, 
     clock.now_s += QUIET_AFTER_S
     admission.take_token(peer_of("a"))
     admission.take_token(peer_of("d"))
-    assert admission.connection_count == 3
+    assert count(admission) == 3
     admission.take_token(peer_of("c"))
     assert refusal(admission, "b").reason is Reason.TOO_MANY_CONNECTIONS, "b was the quietest"
 
@@ -120,7 +125,7 @@ def test_one_address_may_take_its_part_of_the_connections_and_no_more(clock: Clo
         "its quietest gave way, not another's"
     )
     admission.take_token(peer_of("ipv4:10.0.0.7:1"))
-    assert admission.connection_count == 4
+    assert count(admission) == 4
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.floats(0, 3)), max_size=60))
@@ -139,7 +144,7 @@ def test_no_address_ever_has_more_than_its_part(asked: list[tuple[int, int, floa
             assert len(same) >= 3 or len(busy) >= 6, "refused only where its part, or everything, is taken"
             continue
         served[peer] = clock.now_s
-        assert admission.connection_count <= 6
+        assert count(admission) <= 6
 
 
 def test_who_has_a_stream_open_is_never_put_out(admission: Admission, clock: Clock) -> None:
@@ -176,6 +181,26 @@ def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tupl
         for number, first_s in enumerate(instants):
             for later, last_s in enumerate(instants[number:], start=1):
                 assert later <= 5 + (last_s - first_s) * 10 + 1e-6
+
+
+def test_each_message_of_a_request_stream_takes_a_token(admission: Admission, clock: Clock) -> None:
+    limit = RateLimit(admission)
+    stream = call_of("Drive", request_streaming=True)
+    assert limit.on_call(stream) is None
+    for _ in range(SMALL.burst - 1):
+        assert limit.on_request(stream, b"message") == b"message"
+    with pytest.raises(TooMuchError) as seen:
+        limit.on_request(stream, b"message")
+    assert seen.value.reason is Reason.TOO_MANY_REQUESTS
+    clock.now_s += 0.1001
+    limit.on_request(stream, b"message")
+
+
+def test_a_request_is_no_message_of_a_stream(admission: Admission) -> None:
+    limit, call = RateLimit(admission), call_of(streaming=True)
+    limit.on_call(call)
+    for _ in range(3 * SMALL.burst):
+        limit.on_request(call, b"message")
 
 
 async def test_a_delayed_refusal_leaves_no_garbage_behind() -> None:

@@ -7,9 +7,10 @@ import pytest
 from common.errors import InvalidRequestError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
-from gateway.rpc.call import CallContext
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.stats import RECENT_S, Stats
-from tests.support.calls import serve
+from tests.support.calls import call_of, serve
 
 
 class Clock:
@@ -65,6 +66,15 @@ async def test_what_an_inner_interceptor_refuses_is_counted_and_makes_no_client(
 async def test_methods_have_counts_before_their_first_call() -> None:
     stats = Stats(["Ping", "GetSystemStatus"])
     assert set(stats.contract) == {"Ping", "GetSystemStatus"}
+
+
+async def test_methods_of_two_services_that_share_a_name_are_counted_apart() -> None:
+    stats = Stats(clock=Clock())
+    for path in ("/grpc.health.v1.Health/Watch", "/test.Lamp/Watch", f"/{CONTRACT.full_name}/Ping"):
+        call = call_of()
+        call.method = Method(path)
+        stats.on_end(call, None)
+    assert set(stats.methods) == {"grpc.health.v1.Health/Watch", "test.Lamp/Watch", "Ping"}
 
 
 async def test_a_connection_is_a_client_while_it_calls() -> None:

@@ -10,12 +10,12 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
+from gateway.rpc.calls.methods import Method
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
 from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.methods import Method
-from gateway.rpc.recipient import Recipient
 from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board
 from gateway.status.event_log import OperatorEvent
@@ -32,8 +32,7 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
-from gateway.status.runtime import Runtime
-from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
+from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
     BATTERY,
@@ -54,7 +53,6 @@ from gateway.status.values import (
     Detections,
     Mode,
     Network,
-    Odometry,
     Received,
     Velocity,
     Vision,
@@ -140,7 +138,7 @@ def everything() -> Snapshot:
     )
     board = Board(
         {
-            ODOMETRY: Received(Odometry(0.3, 0.4, -0.5), at_s),
+            ODOMETRY: Received(Velocity(0.3, 0.4, -0.5), at_s),
             VISION: Received(Vision(30.0, 29.0, 11.0, 7, 1), at_s),
             DETECTIONS: Received(
                 Detections(1280, 720, 3, (Detection(5, "person", 0.5, "t1", 1.0, 2.0, 3.0, 4.0),)), at_s

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
 from gateway.status.board import Board, Publishers
 from gateway.status.fault import Condition, Severity
-from gateway.status.faults.limits import Limit
+from gateway.status.faults.platform import Limit
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
 from gateway.status.preview import Encoder, PreviewState, PreviewView
@@ -35,8 +35,8 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
-    Odometry,
     Received,
+    Velocity,
 )
 from tests.support.fault_rules import LIMITS
 from tests.support.status import OFF, snapshot_of
@@ -77,7 +77,7 @@ def found(of: Snapshot, active: frozenset[str] = frozenset(), up_s: float = 100.
 
 def test_nothing_is_wrong_with_a_robot_that_is_well() -> None:
     well = board()
-    well[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S)
+    well[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S)
     assert found(snapshot(well, odometry=True, battery=False)) == {}
 
 
@@ -102,7 +102,7 @@ def test_a_source_that_does_not_come(
     at_s: float | None, required: bool, up_s: float, expected: dict[str, Severity]
 ) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
 
@@ -122,7 +122,7 @@ def test_a_source_that_does_not_come(
 )
 def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, expected: str | None) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
     of.publishers[ODOMETRY] = publishers
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
@@ -132,14 +132,14 @@ def test_messages_that_cant_be_decoded() -> None:
     of.publishers[ODOMETRY] = Publishers(1)
     of.undecodable.add(ODOMETRY)
     assert set(found(snapshot(of, odometry=True))) == {"odometry.undecodable"}
-    of[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S)
+    of[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S)
     assert found(snapshot(of, odometry=True)) == {}, "a fresh value was decoded"
 
 
 def test_a_sampler_without_progress_is_one_fault_and_accuses_no_publisher() -> None:
     of = board()
     of.publishers[ODOMETRY] = Publishers(1)
-    of[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S - 3)
+    of[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S - 3)
     of.ros_passed_s = NOW_S - 2.1
     stalled = snapshot(of, odometry=True)
     assert set(found(stalled)) == {"ros.stalled"}
@@ -154,7 +154,7 @@ def test_a_sampler_without_progress_is_one_fault_and_accuses_no_publisher() -> N
 
 def test_two_publishers_of_one_source_are_said_so() -> None:
     of = board()
-    of[ODOMETRY], of.publishers[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S), Publishers(2)
+    of[ODOMETRY], of.publishers[ODOMETRY] = Received(Velocity(0, 0, 0), NOW_S), Publishers(2)
     (source,) = snapshot(of, odometry=True).sources
     assert (source.state, source.detail[:24]) == (SourceState.RECEIVING, "2 programs publish odome")
 

@@ -4,7 +4,7 @@ import pytest
 
 from gateway.access.credential import Principal
 from gateway.access.role import Role
-from gateway.rpc.recipient import Recipient, Recipients
+from gateway.rpc.calls.recipient import Recipient, Recipients
 from tests.support.calls import call_of
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 from ipaddress import ip_address
 from typing import Final
 
-from gateway.rpc.call import CallContext, peer_of
+from gateway.rpc.calls.call import CallContext, peer_of
 
 _log = logging.getLogger(__name__)
 

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
+from gateway.rpc.calls.ports import SnapshotSource
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import detections_message, system_status
-from gateway.rpc.ports import SnapshotSource
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.response_cache import REUSE_S
+from gateway.rpc.responses.response_cache import REUSE_S
 from gateway.status.change import change_key
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import DETECTIONS

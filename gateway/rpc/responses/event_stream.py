@@ -8,7 +8,7 @@ from typing import Final
 from common.broadcast import Broadcast
 from gateway.rpc.mapping.events import event_message, gap_message, position_message
 from gateway.status.event import LoggedEvent
-from gateway.status.event_log import EventLog, Gap, Position
+from gateway.status.event_log import EventLog, Position
 from gateway.status.fault import Severity
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 
@@ -54,7 +54,7 @@ class EventStream:
             after = here = reading.position
             if reading.gap:
                 self.gaps += 1
-                yield _gap(reading.gap)
+                yield SubscribeEventsResponse(gap=gap_message(reading.gap)).SerializeToString()
             for logged in reading.events:
                 if logged.event.severity.rank >= least.rank:
                     yield self._event(logged)
@@ -62,7 +62,7 @@ class EventStream:
                 continue
             if loop.time() - position_sent_s >= HEARTBEAT_S:
                 position_sent_s = loop.time()
-                yield _caught_up(here)
+                yield SubscribeEventsResponse(caught_up=position_message(here)).SerializeToString()
             await self._appended.wait_until(
                 partial(self._has_events_after, here),
                 max(0.0, position_sent_s + HEARTBEAT_S - loop.time()),
@@ -80,11 +80,3 @@ class EventStream:
             if len(self._serialised) > _MAX_CACHED:
                 del self._serialised[next(iter(self._serialised))]
         return serialised
-
-
-def _gap(gap: Gap) -> bytes:
-    return SubscribeEventsResponse(gap=gap_message(gap)).SerializeToString()
-
-
-def _caught_up(position: Position) -> bytes:
-    return SubscribeEventsResponse(caught_up=position_message(position)).SerializeToString()

@@ -21,7 +21,6 @@ from gateway.status.values import (
     DiagnosticItem,
     DiagnosticLevel,
     Mode,
-    Odometry,
     Velocity,
     Vision,
 )
@@ -67,7 +66,7 @@ def battery(percentage: float = 0.5, voltage: float = 15.0, status: int = 2) -> 
 
 
 def test_odometry_reads_the_twist() -> None:
-    assert read(ODOMETRY, odometry(0.5, -0.1, 0.25)) == Odometry(0.5, -0.1, 0.25)
+    assert read(ODOMETRY, odometry(0.5, -0.1, 0.25)) == Velocity(0.5, -0.1, 0.25)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])

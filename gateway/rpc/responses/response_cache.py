@@ -11,8 +11,8 @@ from typing import Final, TypeAlias
 
 from google.protobuf.message import Message
 
-from gateway.rpc.ports import State
-from gateway.rpc.recipient import Recipient
+from gateway.rpc.calls.ports import StatusSource
+from gateway.rpc.calls.recipient import Recipient
 from gateway.status.snapshot import Snapshot
 
 REUSE_S: Final = 0.01
@@ -29,7 +29,7 @@ class ResponseCache:
         clock: seconds, monotonic; the one that snapshots are dated by.
     """
 
-    def __init__(self, state: State, clock: Callable[[], float]) -> None:
+    def __init__(self, state: StatusSource, clock: Callable[[], float]) -> None:
         self._state = state
         self._clock = clock
         self._snapshot = state.snapshot()

@@ -66,6 +66,6 @@ def test_memory_is_bounded_and_the_newest_are_remembered() -> None:
     for number in range(3 * MAX_ENTRIES):
         for _ in range(FREE_FAILURES + 1):
             lockout.failed(f"10.{number >> 16}.{number >> 8 & 255}.{number & 255}", "a")
-    assert len(lockout) == MAX_ENTRIES
+    assert len(vars(lockout)["_entries"]) == MAX_ENTRIES
     newest = 3 * MAX_ENTRIES - 1
     assert waits_s(lockout, host=f"10.{newest >> 16}.{newest >> 8 & 255}.{newest & 255}")

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.status_stream import StatusStream
+from gateway.rpc.calls.recipient import Recipient
+from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.preview import Counters, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, SourceRule, take
 from gateway.status.sources import DETECTIONS, ODOMETRY
-from gateway.status.values import Detection, Detections, Odometry, Received
+from gateway.status.values import Detection, Detections, Received, Velocity
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusResponse
 
 CALLER = Recipient("10.0.0.1", sees_passphrase=False)
@@ -83,7 +83,7 @@ async def test_new_detections_wake_those_who_requested_them_and_no_others(
     world.see(CUP, CUP)
     assert (await read(full, QUIET_S)).detections.detection_count == 2
     assert not waiting.done(), "a status without detections has not changed"
-    world.board[ODOMETRY] = Received(Odometry(0.1, 0.0, 0.0), time.monotonic())
+    world.board[ODOMETRY] = Received(Velocity(0.1, 0.0, 0.0), time.monotonic())
     assert (await waiting).status.health.measured_vx_mps == pytest.approx(0.1)
     assert (await read(full)).status.health.measured_vx_mps == pytest.approx(0.1)
 

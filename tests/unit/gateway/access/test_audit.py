@@ -40,6 +40,24 @@ def test_every_record_is_a_line_and_nothing_breaks_one(tmp_path: Path) -> None:
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o600
 
 
+def test_lines_survive_a_power_loss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[tuple[str, int]] = []
+
+    def fsync(handle: int) -> None:
+        synced.append((str(Path(f"/proc/self/fd/{handle}").readlink()), os.fstat(handle).st_size))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    file = tmp_path / "a"
+    log = AuditLog(file, 4096, 2)
+    with log.writing():
+        for number in range(30):
+            log.record(action(number))
+    sizes = [size for path, size in synced if path == str(file)]
+    assert sizes[-1] == file.stat().st_size, "the newest line"
+    assert (tmp_path / "a.1").stat().st_size in sizes, "the last line of an older generation"
+    assert str(tmp_path) in dict(synced), "the files' names"
+
+
 @pytest.mark.parametrize("generations", [1, 3])
 def test_files_are_bounded_and_the_newest_lines_stay(tmp_path: Path, generations: int) -> None:
     log = AuditLog(tmp_path / "a", 4096, generations)

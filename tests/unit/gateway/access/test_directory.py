@@ -1,11 +1,14 @@
 """Errors of files that can't be read suggest `init` only where nothing would be replaced."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from common.errors import UserError
+from gateway.access.credential_admin import CredentialAdmin
 from gateway.access.directory import CredentialDirectory, KeyPairFiles
+from gateway.access.store import Store
 
 
 def test_where_there_is_nothing_the_line_says_how_to_begin(tmp_path: Path) -> None:
@@ -21,6 +24,23 @@ def test_in_a_container_it_is_the_command_that_works_there(
     with pytest.raises(UserError) as caught:
         CredentialDirectory(tmp_path).ca.read()
     assert caught.value.remedy == "Type: docker compose run --rm -T credentials init"
+
+
+def test_a_file_of_another_user_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files, fstat = CredentialDirectory(tmp_path), os.fstat
+    CredentialAdmin(files, "lab").initialize(("localhost",))
+    assert files.read_store() == Store()
+
+    def of_another_user(handle: int) -> os.stat_result:
+        found = list(fstat(handle))
+        found[4] = os.geteuid() + 1
+        return os.stat_result(found)
+
+    monkeypatch.setattr(os, "fstat", of_another_user)
+    for read in (files.read_store, files.server.read, files.ca.read):
+        with pytest.raises(UserError, match="belongs to another user") as seen:
+            read()
+        assert seen.value.remedy.startswith("Type: chown ")
 
 
 def test_what_somebody_else_has_made_is_not_to_be_made_anew(tmp_path: Path) -> None:

@@ -44,20 +44,26 @@ class Method(interceptors.Method):
 
     Attributes:
         name: without its service, "Ping" for example.
+        key: unique name for statistics: `name` in the operator's service, else "package.Service/Method".
         needed: what a caller needs.
         of_contract: whether it belongs to the operators' contract, so that it is counted and validated.
         request_type: of the contract's methods; None for others.
+        response_type: the same.
         has_parameters: whether the request has fields, and so possibly rules.
     """
 
     request_type: type[Message] | None
+    response_type: type[Message] | None
 
-    def __init__(self, path: str, *, streaming: bool = False) -> None:
-        super().__init__(path, streaming=streaming)
+    def __init__(
+        self, path: str, *, request_streaming: bool = False, response_streaming: bool = False
+    ) -> None:
+        super().__init__(path, request_streaming=request_streaming, response_streaming=response_streaming)
         service, _, self.name = path.removeprefix("/").partition("/")
+        self.key = self.name if service == CONTRACT.full_name else f"{service}/{self.name}"
         self.needed: Needed = STANDARD.get(service, Open.UNDECLARED)
         self.of_contract = False
-        self.request_type = None
+        self.request_type = self.response_type = None
         self.has_parameters = False
         found = _described(service, self.name)
         if found is not None:
@@ -65,6 +71,7 @@ class Method(interceptors.Method):
             self.of_contract = found.containing_service.file.package == DESCRIPTOR.package
         if found is not None and self.of_contract:
             self.request_type = GetMessageClass(found.input_type)
+            self.response_type = GetMessageClass(found.output_type)
             self.has_parameters = bool(found.input_type.fields)
 
     @property

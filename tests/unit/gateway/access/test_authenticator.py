@@ -7,7 +7,7 @@ import pytest
 from common.errors import NotAuthenticatedError
 from common.reasons import Reason
 from gateway.access.authenticator import Authenticator, combined
-from gateway.access.credential import Credential, Kind, Principal, State
+from gateway.access.credential import Credential, Kind, Principal, Validity
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
@@ -37,18 +37,18 @@ def authenticator(*credentials: Credential) -> Authenticator:
 @pytest.mark.parametrize(
     ("changed", "state", "reason"),
     [
-        ({"revoked_s": 5}, State.REVOKED, Reason.CREDENTIAL_REVOKED),
-        ({"revoked_s": 2_000_000}, State.REVOKED, Reason.CREDENTIAL_REVOKED),
-        ({"ends_s": 1_000_000}, State.EXPIRED, Reason.CREDENTIAL_EXPIRED),
-        ({"begins_s": 1_000_001}, State.NOT_YET, Reason.CREDENTIAL_NOT_YET_VALID),
-        ({"begins_s": 1_000_001, "revoked_s": 5}, State.REVOKED, Reason.CREDENTIAL_REVOKED),
+        ({"revoked_s": 5}, Validity.REVOKED, Reason.CREDENTIAL_REVOKED),
+        ({"revoked_s": 2_000_000}, Validity.REVOKED, Reason.CREDENTIAL_REVOKED),
+        ({"ends_s": 1_000_000}, Validity.EXPIRED, Reason.CREDENTIAL_EXPIRED),
+        ({"begins_s": 1_000_001}, Validity.NOT_YET, Reason.CREDENTIAL_NOT_YET_VALID),
+        ({"begins_s": 1_000_001, "revoked_s": 5}, Validity.REVOKED, Reason.CREDENTIAL_REVOKED),
     ],
 )
 def test_an_invalid_credential_is_refused_with_its_reason(
-    changed: dict[str, object], state: State, reason: Reason
+    changed: dict[str, object], state: Validity, reason: Reason
 ) -> None:
     kept = credential(**changed)
-    assert kept.state(NOW_S) is state
+    assert kept.validity(NOW_S) is state
     with pytest.raises(NotAuthenticatedError) as caught:
         authenticator(kept).authenticate_token(SHOWN.text())
     assert caught.value.reason is reason

@@ -7,11 +7,10 @@ from urllib.parse import unquote
 
 from google.protobuf.message import Message
 
-from common import request_id
 from common.interceptors import Call, RpcContext
 from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
-from gateway.rpc.methods import Method
+from gateway.rpc.calls.methods import Method
 
 _LOCAL_SOCKET: Final = "local socket"
 _REMEMBERED_CONNECTIONS: Final = 256
@@ -26,14 +25,14 @@ class Peer:
         address: for people: "10.0.0.5:41234", or "local socket" for a Unix one.
         host: the address without its port.
         ip: IPv4 also where IPv6 carries it (RFC 4291 2.5.5.2); None for a Unix socket.
-        site: what one sender can't change at will, see `address_prefix`.
+        address_prefix: what one sender can't change at will, see `gateway.access.address_prefix`.
     """
 
     connection: str
     address: str
     host: str
     ip: str | None
-    site: str
+    address_prefix: str
 
 
 @lru_cache(maxsize=_REMEMBERED_CONNECTIONS)
@@ -56,14 +55,15 @@ class CallContext(Call):
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
         request: the newest message of the caller; None before the first.
         responded: whether a message has left for the caller.
-        answer: what a control action was answered, for the audit log.
+        response: the newest message to the caller, of control actions alone; serialised or not.
     """
 
-    __slots__ = ("answer", "peer", "principal", "request", "responded")
+    __slots__ = ("peer", "principal", "request", "responded", "response")
 
     method: Method
     principal: Principal | None
     request: Message | None
+    response: Message | bytes | None
 
     def __init__(self, method: Method, rpc: RpcContext) -> None:
         super().__init__(method, rpc)
@@ -71,12 +71,7 @@ class CallContext(Call):
         self.principal = None
         self.request = None
         self.responded = False
-        self.answer = ""
-
-    @property
-    def request_id(self) -> str:
-        """The ID that the caller gave the call in its metadata, or one of our own."""
-        return request_id.current()
+        self.response = None
 
     def remaining_s(self) -> float | None:
         """Returns the time until the caller's deadline; None without one."""

@@ -14,7 +14,7 @@ class SnapshotSource(Protocol):
         """Returns everything at this instant."""
 
 
-class State(SnapshotSource, Protocol):
+class StatusSource(SnapshotSource, Protocol):
     """The same, with what shows that a snapshot is outdated before its time."""
 
     @property
@@ -29,7 +29,7 @@ class EventSink(Protocol):
         """Takes an event of this instant."""
 
 
-class AuditTrail(Protocol):
+class AuditSink(Protocol):
     """Where control actions are kept; events are forgotten after a while."""
 
     def record(self, action: ControlAction) -> None:

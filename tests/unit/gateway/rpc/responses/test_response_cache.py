@@ -1,8 +1,8 @@
 from dataclasses import replace
 
+from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
-from gateway.rpc.recipient import Recipient
-from gateway.rpc.response_cache import REUSE_S, ResponseCache
+from gateway.rpc.responses.response_cache import REUSE_S, ResponseCache
 from gateway.status.board import Board
 from gateway.status.preview import Counters, Listener, PreviewState, PreviewView
 from gateway.status.snapshot import Identity, Rules, Snapshot, take

@@ -1,0 +1,1 @@
+"""Responses that all callers share: computed and serialised once."""
