@@ -69,7 +69,7 @@ async def called(chain: Chain, kind: str, *requests: bytes) -> list[bytes]:
     """What a caller gets over a real connection."""
     make, name = KINDS[kind]
     server = new_server(chain)
-    handlers = {kind: make(BEHAVIORS[kind])}
+    handlers: dict[str, grpc.RpcMethodHandler[bytes, bytes]] = {kind: make(BEHAVIORS[kind])}
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()

@@ -283,8 +283,9 @@ def test_an_invalid_address_is_reported_at_once() -> None:
 def test_a_fault_of_our_own_does_not_look_like_a_robot_that_stands_still() -> None:
     @asynccontextmanager
     async def broken(target: str) -> AsyncIterator[PlayedRobot]:
-        raise ZeroDivisionError("ours")
-        yield
+        if target:
+            raise ZeroDivisionError("ours")
+        yield PlayedRobot()
 
     worker = Worker("robot", lambda: None, broken)
     worker.start()

@@ -55,12 +55,10 @@ def test_a_refused_request_is_not_repeated_to_the_same_process_but_to_the_next()
     reconciler = connected()
     desired = reconciler.request(BRIGHT)
     reconciler.take_refusal(desired, "too bright")
-    assert reconciler.refusal == "too bright"
-    assert reconciler.pending() is None
+    assert (reconciler.refusal, reconciler.pending()) == ("too bright", None)
     assert reconciler.settled(desired)
     reconciler.take_report(LampReport("b"), 1.0)
-    assert reconciler.refusal is None
-    assert reconciler.pending() == desired
+    assert (reconciler.refusal, reconciler.pending()) == (None, desired)
 
 
 def test_a_new_request_follows_a_refused_one() -> None:

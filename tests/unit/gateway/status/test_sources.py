@@ -151,6 +151,7 @@ def test_a_made_up_kind_needs_its_entry_and_a_reader() -> None:
     with gas_reader():
         assert types_of(GAS) == ["my_msgs/msg/Gas"]
         value = registry._readers["my_msgs/msg/Gas", GAS](SimpleNamespace(ppm=12), None)  # type: ignore[arg-type]
+    assert value
     board = Board()
     waiting = snapshot(board, GAS)
     board[GAS] = Received(value, NOW_S)

@@ -102,7 +102,8 @@ def test_a_source_that_does_not_come(
     at_s: float | None, required: bool, up_s: float, expected: dict[str, Severity]
 ) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    if at_s is not None:
+        of[ODOMETRY] = Received(Odometry(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
 
@@ -122,7 +123,8 @@ def test_a_source_that_does_not_come(
 )
 def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, expected: str | None) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Odometry(0, 0, 0), at_s)
+    if at_s is not None:
+        of[ODOMETRY] = Received(Odometry(0, 0, 0), at_s)
     of.publishers[ODOMETRY] = publishers
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
