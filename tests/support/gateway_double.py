@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent import futures
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Never
 
 import grpc
 
@@ -79,7 +79,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             gateway_name="lab-1", gateway_version="1.2.3", configuration_json='{"name": "lab-1"}'
         )
         self.failures: deque[tuple[grpc.StatusCode, str]] = deque()
-        self.preview_becomes: deque[int] = deque()
+        self.preview_becomes: deque[states.PreviewState.ValueType] = deque()
         self.fault = "no encoder works. Type: robot-preview encoders"
         self.accept = True
         self.works = True
@@ -118,6 +118,15 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         return robot_gateway_pb2.SetPreviewModeResponse(
             accepted=self.accept, message=message, preview=self.status.preview
         )
+
+    def Ping(self, request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
+
+    def WatchSystemStatus(self, request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
+
+    def SubscribeEvents(self, request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
 
     def preview_service_dies(self) -> None:
         """From now on nobody makes video; what is wanted stays wanted."""
@@ -166,6 +175,11 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         preview = self.status.preview
         preview.state, preview.last_error = states.PREVIEW_FAULTED, why
         preview.counters.faults += 1
+
+
+def _not_offered(context: grpc.ServicerContext) -> Never:
+    """A gateway of the first release: clients poll the status instead of watching it."""
+    context.abort(grpc.StatusCode.UNIMPLEMENTED, "Method not implemented!")
 
 
 def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:

@@ -90,7 +90,7 @@ def _descriptors() -> Iterator[str]:
         with suppress(OSError):  # That of this very listing.
             path, known = entry.readlink(), sockets.get(int(entry.name))
             if known and known.family in (socket.AF_INET, socket.AF_INET6):
-                yield f"socket {known.type.name} {known.laddr} {known.raddr or known.status}"
+                yield f"socket {known.type.name} {known.laddr} {known.raddr} {known.status}"
             elif path.is_absolute():
                 yield f"file {path}"
             else:

@@ -50,7 +50,7 @@ def let_pass(seconds: float) -> None:
     loop.exec()
 
 
-def until(condition: Callable[[], T], what: str, within_s: float = 20.0) -> T:
+def until(condition: Callable[[], T | None], what: str, within_s: float = 20.0) -> T:
     """Runs the event loop until the condition is true, and gives what it gave; fails after `within_s`."""
     deadline_s = time.monotonic() + within_s
     while not (answer := condition()):

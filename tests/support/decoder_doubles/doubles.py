@@ -34,7 +34,7 @@ _BODIES = {
 }
 
 
-class _Double(Gst.Bin):
+class _Double(Gst.Bin):  # type: ignore[misc]  # gi has no types
     """One decoder."""
 
     element: ClassVar[str]
