@@ -46,7 +46,7 @@ async def running(operator: Operator, profile: int = KEEP) -> Any:
     return await preview_in(operator, states.PREVIEW_RUNNING)
 
 
-async def preview_in(operator: Operator, state: int) -> Any:
+async def preview_in(operator: Operator, state: states.PreviewState.ValueType) -> Any:
     """The preview, when it has come to this state."""
     status = await eventually(
         operator.status, lambda it: it.preview.state == state, states.PreviewState.Name(state)
