@@ -61,7 +61,7 @@ def face(request: pytest.FixtureRequest) -> type[Face]:
     return request.param  # type: ignore[no-any-return]  # pytest's own type
 
 
-@pytest.fixture(params=METHODS.values(), ids=METHODS)
+@pytest.fixture(params=METHODS.values(), ids=list(METHODS))
 def ask(request: pytest.FixtureRequest) -> Ask:
     return request.param  # type: ignore[no-any-return]  # pytest's own type
 

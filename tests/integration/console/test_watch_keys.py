@@ -3,6 +3,7 @@
 import signal
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,10 @@ def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: G
         manners = screen.manners()
         screen.press(f"{ROBOTCTL} watch --interval 0.1 --target {target}\n")
         screen.wait_for("high-quality")
+
+        def called_since(calls: int) -> bool:
+            return len(double.calls) > calls
+
         for _ in range(2):
             wait_until(screen.key_by_key, "keys are read one by one")
             place = screen.wait_for("robot healthy", after=len(screen.drawn))
@@ -195,7 +200,7 @@ def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: G
             calls = len(double.calls)
             screen.press("fg\n")
             screen.wait_for("high-quality", after=place)
-            wait_until(lambda before=calls: len(double.calls) > before, "it polls again")
+            wait_until(partial(called_since, calls), "it polls again")
         wait_until(screen.key_by_key, "keys are read one by one")
         screen.press("p")
         wait_until(lambda: double.wishes, "keys do something again")

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 from PySide6.QtCore import Qt
@@ -73,6 +74,9 @@ def test_a_click_turns_the_preview_on_and_off(desk_work: Desk) -> None:
 
 
 def test_keys_do_the_same(desk_work: Desk) -> None:
+    def requested(profile: preview_pb2.PreviewProfile.ValueType) -> bool:
+        return desk_work.gateway.wishes[-1].profile == profile
+
     desk_work.press(Qt.Key.Key_P)
     desk_work.state_is("RUNNING")
     for key, profile in (
@@ -82,9 +86,7 @@ def test_keys_do_the_same(desk_work: Desk) -> None:
     ):
         desk_work.free()
         desk_work.press(key)
-        until(
-            lambda wanted=profile: desk_work.gateway.wishes[-1].profile == wanted, "the profile is asked for"
-        )
+        until(partial(requested, profile), "the profile is asked for")
     desk_work.free()
     desk_work.press(Qt.Key.Key_P)
     desk_work.state_is("DISABLED")

@@ -115,7 +115,8 @@ def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) ->
     window.resize(smallest)
     let_pass(0.3)
     keep_picture(window, "smallest")
-    for word in (*window.findChildren(QPushButton), *window.findChildren(QLabel)):
+    words: list[QPushButton | QLabel] = [*window.findChildren(QPushButton), *window.findChildren(QLabel)]
+    for word in words:
         gives_way = isinstance(word, ElidedLabel | WrappedLabel)
         if word.isVisible() and word.text() and not gives_way:
             assert word.width() >= word.sizeHint().width(), f"'{word.text()}' is cut off"

@@ -1,5 +1,6 @@
 """The service's life, seen from the gateway's side of the socket."""
 
+from functools import partial
 from pathlib import Path
 
 import grpc
@@ -93,6 +94,9 @@ def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
 
 
 def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
+    def runs_at(fps: int, actual: pb.ActualState) -> bool:
+        return abs(actual.measurement.fps - fps) < fps / 5 and actual.stream.fps == fps
+
     preview.enable(pb.PROFILE_BALANCED)
     preview.running()
     with Watcher(preview.port) as watcher:
@@ -103,10 +107,7 @@ def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
             (pb.PROFILE_BALANCED, 30),
         ):
             preview.enable(profile)
-            state = preview.wait_for(
-                lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5 and a.stream.fps == fps,
-                f"{fps} fps",
-            )
+            state = preview.wait_for(partial(runs_at, fps), f"{fps} fps")
             assert state.state == pb.LIFECYCLE_STATE_RUNNING
             watcher.wait_for_pictures(10)
         assert watcher.reconnects == 0

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -20,6 +21,7 @@ from gateway.ros.intake import intake
 from gateway.status.board import Board
 from gateway.status.sources import DIAGNOSTICS, ODOMETRY
 from gateway.status.values import DiagnosticItem, DiagnosticLevel
+from tests.support.boards import newest
 from tests.support.gateway_program import GatewayProgram, gateway_program
 from tests.support.ros import simulated_robot
 from tests.support.talker import Talker
@@ -56,6 +58,10 @@ def last_words(process: subprocess.Popen[str]) -> str:
     return process.communicate("", timeout=20)[0]
 
 
+def is_healthy(gateway: GatewayProgram) -> bool:
+    return bool(gateway.status().health.ready)
+
+
 def test_a_killed_gateway_costs_the_robots_own_pair_nothing(ros_domain: int, tmp_path: Path) -> None:
     """A reliable publisher and its subscriber, 200 numbers a second, while gateways come and are killed."""
     with (
@@ -66,7 +72,7 @@ def test_a_killed_gateway_costs_the_robots_own_pair_nothing(ros_domain: int, tmp
         assert first_line(talker) == "met\n"
         for _ in range(3):
             with gateway_program(tmp_path) as gateway:
-                wait_until(lambda gateway=gateway: gateway.status().health.ready, "a healthy robot")
+                wait_until(partial(is_healthy, gateway), "a healthy robot")
                 gateway.process.send_signal(signal.SIGKILL)
                 gateway.process.wait(10)
         sent = int(last_words(talker))
@@ -133,18 +139,17 @@ def test_components_of_many_programs_that_speak_at_once_are_all_heard(talker: Ta
         for number in range(40):
             status = DiagnosticStatus(name=f"component {number}", level=DiagnosticStatus.WARN, message="w")
             publisher.publish(DiagnosticArray(status=[status]))
-        wait_until(lambda: board[DIAGNOSTICS] and len(board[DIAGNOSTICS].value.items) == 40, "all forty")
+        wait_until(lambda: (now := board[DIAGNOSTICS]) and len(now.value.items) == 40, "all forty")
         publisher.publish(DiagnosticArray())
         publisher.publish(DiagnosticArray(status=[DiagnosticStatus(name="component 7", message="well")]))
         wait_until(
             lambda: (
-                board[DIAGNOSTICS]
-                and DiagnosticItem("component 7", DiagnosticLevel.OK, "well")
-                in board[DIAGNOSTICS].value.items
+                (now := board[DIAGNOSTICS])
+                and DiagnosticItem("component 7", DiagnosticLevel.OK, "well") in now.value.items
             ),
             "the newest word of one",
         )
-        assert len(board[DIAGNOSTICS].value.items) == 40
+        assert len(newest(board, DIAGNOSTICS).value.items) == 40
 
 
 def test_ten_thousand_components_leave_a_bounded_number(talker: Talker) -> None:
@@ -157,10 +162,10 @@ def test_ten_thousand_components_leave_a_bounded_number(talker: Talker) -> None:
         assert [item.component for item in found.value.items] == [str(number) for number in range(256)]
         talker.say(running, "/diagnostics", DiagnosticArray(status=[DiagnosticStatus(name="new")]))
         wait_until(
-            lambda: board[DIAGNOSTICS] and board[DIAGNOSTICS].value.items[-1].component == "new",
+            lambda: (now := board[DIAGNOSTICS]) and now.value.items[-1].component == "new",
             "the new one",
         )
-        assert len(board[DIAGNOSTICS].value.items) == 256
+        assert len(newest(board, DIAGNOSTICS).value.items) == 256
 
 
 def test_publishers_that_come_and_go_leave_nothing_behind(ros_domain: int, tmp_path: Path) -> None:
@@ -170,9 +175,7 @@ def test_publishers_that_come_and_go_leave_nothing_behind(ros_domain: int, tmp_p
 
         def once() -> None:
             with simulated_robot(tmp_path):
-                wait_until(
-                    lambda: board[ODOMETRY] and time.monotonic() - board[ODOMETRY].at_s < 0.5, "odometry"
-                )
+                wait_until(lambda: (now := board[ODOMETRY]) and time.monotonic() - now.at_s < 0.5, "odometry")
             wait_until(lambda: not any(each.count for each in board.publishers.values()), "an empty graph")
 
         once()  # what the first robot brings stays: ports, shared memory

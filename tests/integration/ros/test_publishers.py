@@ -30,12 +30,13 @@ def watching(source: SourceSettings) -> Iterator[tuple[Board, WaitFor]]:
     """A gateway with this one source, and a function that waits until it has seen what is expected."""
     board = Board()
     with intake([source], board):
-        yield (
-            board,
-            lambda wanted: wait_until(
-                lambda: board.publishers.get(source.spec) == wanted, f"{wanted}, last {board.publishers}"
-            ),
-        )
+
+        def wait_for(expected: Publishers) -> None:
+            wait_until(
+                lambda: board.publishers.get(source.spec) == expected, f"{expected}, last {board.publishers}"
+            )
+
+        yield board, wait_for
 
 
 def test_publishers_come_and_go(talker: Talker) -> None:

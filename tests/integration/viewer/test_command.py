@@ -67,7 +67,7 @@ def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path
 
 def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
-    command = [ROBOTCTL, "--target", running.target, "view", "--headless", "--record", str(file)]
+    command = [str(ROBOTCTL), "--target", running.target, "view", "--headless", "--record", str(file)]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as viewing:
         try:
             wait_until(lambda: file.exists() and file.stat().st_size > 50_000, "something is kept", 30)
@@ -81,7 +81,15 @@ def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> No
 
 
 def test_the_window_shows_and_closes(running: VideoGround, tmp_path: Path) -> None:
-    command = [ROBOTCTL, "--target", running.target, "--json", "view", "--record", str(tmp_path / "kept.ts")]
+    command = [
+        str(ROBOTCTL),
+        "--target",
+        running.target,
+        "--json",
+        "view",
+        "--record",
+        str(tmp_path / "kept.ts"),
+    ]
     offscreen = environment(QT_QPA_PLATFORM="offscreen")
     with subprocess.Popen(
         command, env=offscreen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
