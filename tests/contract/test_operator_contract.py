@@ -106,7 +106,7 @@ async def test_another_profile_is_taken_over_without_a_new_start(ground: Ground,
 @pytest.mark.parametrize("number", [4, 99, -1])
 @pytest.mark.parametrize("is_running", [False, True])
 async def test_a_profile_outside_the_contract_changes_nothing(
-    ground: Ground, operator: Operator, number: int, is_running: bool
+    operator: Operator, number: int, is_running: bool
 ) -> None:
     if is_running:
         await running(operator, LOW_BW)

@@ -90,18 +90,18 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.calls: list[str] = []
         self.wishes: list[robot_gateway_pb2.SetPreviewModeRequest] = []
 
-    def GetSystemStatus(self, request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
+    def GetSystemStatus(self, _request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
         self._begin("GetSystemStatus", context)
         self._preview_moves_on()
         return self.status
 
-    def GetOverlaySnapshot(self, request: Any, context: Any) -> overlay_pb2.OverlaySnapshot:  # noqa: N802
+    def GetOverlaySnapshot(self, _request: Any, context: Any) -> overlay_pb2.OverlaySnapshot:  # noqa: N802
         self._begin("GetOverlaySnapshot", context)
         self.overlay.status.CopyFrom(self.status)
         return self.overlay
 
     def GetGatewayInfo(  # noqa: N802
-        self, request: Any, context: Any
+        self, _request: Any, context: Any
     ) -> robot_gateway_pb2.GetGatewayInfoResponse:
         self._begin("GetGatewayInfo", context)
         return self.info
@@ -119,13 +119,13 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             accepted=self.accept, message=message, preview=self.status.preview
         )
 
-    def Ping(self, request: Any, context: Any) -> Never:  # noqa: N802
+    def Ping(self, _request: Any, context: Any) -> Never:  # noqa: N802
         _not_offered(context)
 
-    def WatchSystemStatus(self, request: Any, context: Any) -> Never:  # noqa: N802
+    def WatchSystemStatus(self, _request: Any, context: Any) -> Never:  # noqa: N802
         _not_offered(context)
 
-    def SubscribeEvents(self, request: Any, context: Any) -> Never:  # noqa: N802
+    def SubscribeEvents(self, _request: Any, context: Any) -> Never:  # noqa: N802
         _not_offered(context)
 
     def preview_service_dies(self) -> None:

@@ -100,7 +100,8 @@ def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
         assert status.preview.profile is PreviewProfile.BALANCED
 
 
-def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path, images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
     """Documented: after timeouts.without_gateway_s, here 2 s, and the port is free again."""
     config = tmp_path / "preview.yaml"
     config.write_text("source: {kind: test}\ntimeouts: {without_gateway_s: 2}\n", encoding="utf-8")

@@ -83,7 +83,10 @@ def added(deployment: Deployment, name: str, role: str) -> Credentials:
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Guarded]:
+def guarded(
+    tmp_path_factory: pytest.TempPathFactory,
+    images: str,  # noqa: ARG001  # for its effect
+) -> Iterator[Guarded]:
     overlays = (demo_overlay(), str(ROOT / "compose.guarded.yaml"))
     with deployed(tmp_path_factory.mktemp("guarded"), *overlays, up=False) as deployment:
         refused = typed(deployment, UP)

@@ -48,8 +48,9 @@ def one_of_the_pair(role: str, env: dict[str, str]) -> Iterator[subprocess.Popen
         process.communicate()
 
 
+@pytest.mark.usefixtures("images")
 def test_a_killed_gateway_costs_the_robots_own_pair_nothing(
-    tmp_path: Path, images: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with on_the_robot(tmp_path) as deployment, deployment.client() as operator:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(deployment.domain))

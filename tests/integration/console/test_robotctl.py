@@ -114,7 +114,7 @@ def test_who_does_not_wait_ends_0_when_the_robot_took_note(target: str, double: 
     assert double.calls == ["SetPreviewMode"]
 
 
-def test_preview_off_is_idempotent(target: str, double: GatewayDouble) -> None:
+def test_preview_off_is_idempotent(target: str) -> None:
     for _ in range(2):
         ended = robotctl("preview", "off", "--target", target)
         assert ended.returncode == 0, ended.stderr

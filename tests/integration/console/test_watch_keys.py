@@ -101,7 +101,7 @@ def test_a_refusal_is_shown_in_place(screen: Terminal, double: GatewayDouble) ->
 class OnlyLook(GatewayDouble):
     """Refuses every preview request."""
 
-    def SetPreviewMode(self, request: Any, context: Any) -> Any:  # noqa: N802  # the contract's name
+    def SetPreviewMode(self, _request: Any, context: Any) -> Any:  # noqa: N802  # the contract's name
         context.abort(grpc.StatusCode.PERMISSION_DENIED, "viewers only watch")
 
 

@@ -28,13 +28,13 @@ MUX = "/mecanum_drive_controller/reference"
 
 
 @pytest.fixture
-def talker(ros_domain: int) -> Iterator[Talker]:
+def talker(ros_domain: int) -> Iterator[Talker]:  # noqa: ARG001  # for its effect
     with talking() as made:
         yield made
 
 
 @pytest.fixture
-async def operator(ros_domain: int, tmp_path: Path) -> AsyncIterator[Operator]:
+async def operator(ros_domain: int, tmp_path: Path) -> AsyncIterator[Operator]:  # noqa: ARG001  # for its effect
     faults = {"startup_grace_ms": 0, "clear_after_ms": 100}
     async with running_gateway(tmp_path / "p.sock", sources=SOURCES, faults=faults) as operator:
         yield operator

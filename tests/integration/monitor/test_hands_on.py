@@ -53,7 +53,7 @@ class Desk:
 
 
 @pytest.fixture
-def desk_work(desk: None) -> Iterator[Desk]:
+def desk_work() -> Iterator[Desk]:
     gateway = GatewayDouble()
     with serving(gateway) as port, monitor(f"127.0.0.1:{port}") as window:
         window.activateWindow()
@@ -191,7 +191,7 @@ def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Des
     assert not desk_work.window.banner.isVisible()
 
 
-def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
+def test_closing_ends_everything_although_the_gateway_hangs() -> None:
     gateway = GatewayDouble()
     with serving(gateway) as port:
         with monitor(f"127.0.0.1:{port}") as window:

@@ -42,7 +42,7 @@ def troubled() -> GatewayDouble:
 
 
 @pytest.fixture
-def window(desk: None) -> Iterator[MonitorWindow]:
+def window() -> Iterator[MonitorWindow]:
     with serving(troubled()) as port, monitor(f"127.0.0.1:{port}") as made:
         until(lambda: len(made.side.faults.shown) == 3, "everything is shown")
         yield made
@@ -98,7 +98,7 @@ def drawn(style: SeverityStyle) -> QImage:
 
 
 @pytest.mark.parametrize(("one", "other"), list(combinations(SeverityStyle, 2)))
-def test_shapes_differ_without_any_colour(desk: None, one: SeverityStyle, other: SeverityStyle) -> None:
+def test_shapes_differ_without_any_colour(one: SeverityStyle, other: SeverityStyle) -> None:
     first, second = drawn(one), drawn(other)
     differing = sum(
         abs(QColor(first.pixel(x, y)).red() - QColor(second.pixel(x, y)).red()) > 60
@@ -132,7 +132,7 @@ def open_and_close(change: tuple[int, int] | None = None) -> tuple[int, int, lis
         return window.width(), window.height(), window.splitter.sizes()
 
 
-def test_it_opens_as_it_was_left(desk: None) -> None:
+def test_it_opens_as_it_was_left() -> None:
     left = open_and_close((1400, 900))
     assert left[:2] == (1400, 900)
     assert open_and_close() == left
@@ -147,7 +147,7 @@ def test_it_opens_as_it_was_left(desk: None) -> None:
         b"",
     ],
 )
-def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, content: bytes) -> None:
+def test_a_broken_settings_file_is_ignored(own_settings: Path, content: bytes) -> None:
     file = Path(WindowSettings().file)
     assert file.is_relative_to(own_settings)
     file.parent.mkdir(parents=True)
@@ -157,7 +157,7 @@ def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, conte
     assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
 
 
-def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path, desk: None) -> None:
+def test_a_settings_file_that_can_not_be_written_is_ignored() -> None:
     file = Path(WindowSettings().file)
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

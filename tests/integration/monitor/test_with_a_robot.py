@@ -82,7 +82,7 @@ class Watch:
 
 
 @pytest.fixture
-def watch(desk: None, ros_domain: int, tmp_path: Path) -> Iterator[Watch]:
+def watch(ros_domain: int, tmp_path: Path) -> Iterator[Watch]:  # noqa: ARG001  # for its effect
     with whole_robot(tmp_path) as robot, monitor(robot.target) as window:
         made = Watch(robot, window)
         made.health_is("OK")
@@ -195,7 +195,7 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     assert time.monotonic() - closed_s < CLOSES_WITHIN_S
 
 
-def test_the_ruler_sees_a_loop_that_is_held_up(desk: None) -> None:
+def test_the_ruler_sees_a_loop_that_is_held_up() -> None:
     delay = LoopDelay()
     delay.start()
     let_pass(0.05)

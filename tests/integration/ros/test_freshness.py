@@ -64,7 +64,8 @@ def test_a_publisher_whose_clock_is_wrong_does_not_change_the_age(talker: Talker
         assert age_s(board) < 10
 
 
-def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry")
@@ -75,7 +76,8 @@ def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(ros_domain: int,
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
 
 
-def test_a_robot_that_is_killed_and_comes_back_is_heard_again(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_robot_that_is_killed_and_comes_back_is_heard_again(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board):
         with simulated_robot(tmp_path) as robot:
@@ -87,7 +89,8 @@ def test_a_robot_that_is_killed_and_comes_back_is_heard_again(ros_domain: int, t
             assert newest(board, specs.ODOMETRY).value.vx_mps == 1.75
 
 
-def test_a_gateway_that_starts_after_the_robot_hears_it(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_gateway_that_starts_after_the_robot_hears_it(tmp_path: Path) -> None:
     board = Board()
     with simulated_robot(tmp_path), intake(DEFAULT_SOURCES, board):
         wait_until(
@@ -95,7 +98,8 @@ def test_a_gateway_that_starts_after_the_robot_hears_it(ros_domain: int, tmp_pat
         )
 
 
-def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(tmp_path: Path) -> None:
     board = Board()
     with intake([ODOMETRY], board) as running, simulated_robot(tmp_path, "--odometry-hz", "1000"):
         source = running.sources["odometry"]
@@ -106,7 +110,8 @@ def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_pa
         wait_until(lambda: age_s(board) < 0.1, "the newest, not one from a queue")
 
 
-def test_a_topic_every_ten_seconds_keeps_its_value_between(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_topic_every_ten_seconds_keeps_its_value_between(tmp_path: Path) -> None:
     board = Board()
     with intake([ODOMETRY], board), simulated_robot(tmp_path, "--odometry-hz", "0.1"):
         first = wait_until(lambda: board[specs.ODOMETRY], "the first message", within_s=40)
@@ -144,7 +149,8 @@ def test_the_board_holds_what_an_ordinary_subscriber_saw_last(talker: Talker) ->
         assert twist.linear.x == 150.0
 
 
-def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_starting_and_stopping_leaves_nothing_behind() -> None:
     process = psutil.Process()
 
     def once() -> None:
@@ -160,7 +166,8 @@ def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
     assert "ros-sampler" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_the_sampler_says_when_it_last_looked(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_the_sampler_says_when_it_last_looked() -> None:
     with intake(DEFAULT_SOURCES, Board()) as running:
         first = wait_until(lambda: running.sampler.last_pass_at_s, "the first pass")
         assert first

@@ -62,7 +62,8 @@ def is_healthy(gateway: GatewayProgram) -> bool:
     return bool(gateway.status().health.ready)
 
 
-def test_a_killed_gateway_costs_the_robots_own_pair_nothing(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_killed_gateway_costs_the_robots_own_pair_nothing(tmp_path: Path) -> None:
     """A reliable publisher and its subscriber, 200 numbers a second, while gateways come and are killed."""
     with (
         simulated_robot(tmp_path),
@@ -100,7 +101,8 @@ def look(gateway: GatewayProgram) -> Look:
     return Look(answered_s, status.health.odom_age_ms, stale)
 
 
-def test_a_flood_of_detections_starves_neither_sources_nor_operators(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_flood_of_detections_starves_neither_sources_nor_operators(tmp_path: Path) -> None:
     """Thirty pictures a second of five thousand objects each: as much as shared memory carries."""
     with simulated_robot(tmp_path, "--detections-hz", "0"), gateway_program(tmp_path) as gateway:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot")
@@ -115,7 +117,8 @@ def test_a_flood_of_detections_starves_neither_sources_nor_operators(ros_domain:
         assert sum(look.detections_stale for look in looks) < len(looks) / 10
 
 
-def test_a_flood_is_read_at_the_samplers_pace(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_flood_is_read_at_the_samplers_pace() -> None:
     """Five thousand objects are counted, a hundred are decoded: the source need not rest."""
     board = Board()
     detections = [source for source in DEFAULT_SOURCES if source.name == "detections"]
@@ -168,7 +171,8 @@ def test_ten_thousand_components_leave_a_bounded_number(talker: Talker) -> None:
         assert len(newest(board, DIAGNOSTICS).value.items) == 256
 
 
-def test_publishers_that_come_and_go_leave_nothing_behind(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_publishers_that_come_and_go_leave_nothing_behind(tmp_path: Path) -> None:
     """A robot of ten publishers restarts again and again; the gateway's threads and files stay as many."""
     board, process = Board(), psutil.Process()
     with intake(DEFAULT_SOURCES, board):

@@ -104,9 +104,10 @@ def test_another_type_is_told_apart(talker: Talker) -> None:
         wait_until(lambda: board[specs.BATTERY], "the value of the one that fits")
 
 
-def test_what_cannot_be_read_is_not_looked_for(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_what_cannot_be_read_is_not_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     missing = "no_such_msgs/msg/Thing"
-    monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda message, source: None)
+    monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda *_: None)
     with watching(BATTERY.model_copy(update={"type": missing})) as (board, _):
         assert "no_such_msgs" in board.unusable[specs.BATTERY]
         assert not board.publishers

@@ -247,7 +247,8 @@ def test_a_mismatch_is_told_in_words_without_ros_names(talker: Talker, tmp_path:
         assert TOPICS["odometry"] in log, "whoever looks after the robot is told the topic"
 
 
-def test_a_stopped_robot_is_stale_and_its_late_burst_is_new(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_stopped_robot_is_stale_and_its_late_burst_is_new(tmp_path: Path) -> None:
     """Stopped as a debugger would: the publishers stay, nothing comes; then everything goes on."""
     with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot")
@@ -270,7 +271,8 @@ def stopped(process: subprocess.Popen[str]) -> Iterator[None]:
         process.send_signal(signal.SIGCONT)
 
 
-def test_ages_grow_with_the_clock_while_nothing_comes(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_ages_grow_with_the_clock_while_nothing_comes(tmp_path: Path) -> None:
     with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot")
         robot.change(silent=["odometry"])

@@ -142,7 +142,7 @@ def test_a_type_that_is_not_installed_leaves_the_others_alone(talker: Talker) ->
         for source in DEFAULT_SOURCES
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(registry._readers, ("no_such_msgs/msg/Thing", VISION), lambda message, source: None)
+        patch.setitem(registry._readers, ("no_such_msgs/msg/Thing", VISION), lambda *_: None)
         with intake(sources, board) as running:
             assert "vision" not in running.sources
             talker.say(running, "/odometry/filtered", driving(0.5))

@@ -48,7 +48,8 @@ def simrobot(*arguments: str, **environment: str) -> subprocess.CompletedProcess
     )
 
 
-def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_its_topics_are_the_gateways_default_sources(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path, "battery_percent=40", "speed_mps=0.75"):
         wait_until(lambda: has_all(board, ODOMETRY, VISION, DETECTIONS, BATTERY), "all sensors")
@@ -60,7 +61,8 @@ def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: 
     assert newest(board, DETECTIONS).value.count == 3
 
 
-def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_faults_come_and_go_while_it_runs(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         robot.change(battery_percent=7, infer_errors_per_s=50, detection_count=250, speed_mps=-1.25)
@@ -87,7 +89,8 @@ def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> No
         wait_until(lambda: not newest(board, DETECTIONS).value.items, "no box to draw")
 
 
-def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_drivers_components_and_modes_change_while_it_runs(tmp_path: Path) -> None:
     board = Board()
     mode = SourceSettings(
         kind="mode",
@@ -124,7 +127,8 @@ def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_
         )
 
 
-def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_it_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
     with simulated_robot(tmp_path) as robot:
         started = time.monotonic()
         robot.process.terminate()
@@ -133,7 +137,8 @@ def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) 
         assert not robot.control.exists()
 
 
-def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_control_speaks_to_a_running_robot(tmp_path: Path) -> None:
     with simulated_robot(tmp_path) as robot:
         at = ("--control", str(robot.control))
         assert '"odometry"' in simrobot("control", *at, "silence", "odometry", "battery").stdout
@@ -148,6 +153,7 @@ def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> N
             robot.change(silent=["sonar"])
 
 
+@pytest.mark.usefixtures("ros_domain")
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
@@ -157,7 +163,7 @@ def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> N
         (("control", "--control", "/nonexistent/robot.sock", "show"), 3, "no simulated robot answers"),
     ],
 )
-def test_a_mistake_is_one_line(ros_domain: int, arguments: tuple[str, ...], code: int, said: str) -> None:
+def test_a_mistake_is_one_line(arguments: tuple[str, ...], code: int, said: str) -> None:
     done = simrobot(*arguments)
     assert done.returncode == code, done.stderr
     assert said in done.stderr
@@ -165,7 +171,8 @@ def test_a_mistake_is_one_line(ros_domain: int, arguments: tuple[str, ...], code
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_without_its_message_packages_it_says_what_to_type(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_without_its_message_packages_it_says_what_to_type(tmp_path: Path) -> None:
     """A package of the same name that has nothing in it stands in the way of the real one."""
     (tmp_path / "omniseer_msgs").mkdir()
     (tmp_path / "omniseer_msgs" / "__init__.py").touch()

@@ -26,17 +26,17 @@ class Recorder(Interceptor[Call]):
     def __init__(self, name: str, steps: list[str]) -> None:
         self.name, self.steps = name, steps
 
-    def on_call(self, call: Call) -> None:
+    def on_call(self, _call: Call) -> None:
         self.steps.append(f"{self.name} call")
 
-    def on_request(self, call: Call, request: Any) -> Any:
+    def on_request(self, _call: Call, request: Any) -> Any:
         self.steps.append(f"{self.name} {request.decode()}")
         return request + self.name.encode()
 
-    def on_response(self, call: Call, response: Any) -> None:
+    def on_response(self, _call: Call, response: Any) -> None:
         self.steps.append(f"{self.name} {response.decode()}")
 
-    def on_end(self, call: Call, error: BaseException | None) -> None:
+    def on_end(self, _call: Call, error: BaseException | None) -> None:
         self.steps.append(f"{self.name} end" + (f" {type(error).__name__}" if error else ""))
 
 
@@ -102,7 +102,7 @@ async def test_every_message_of_a_stream_passes(kind: str) -> None:
 
 
 class Refusing(Interceptor[Call]):
-    def on_call(self, call: Call) -> None:
+    def on_call(self, _call: Call) -> None:
         raise InvalidRequestError("not like this")
 
 
@@ -116,7 +116,7 @@ async def test_a_refusal_ends_what_has_begun_and_nothing_else() -> None:
 
 
 class Failing(Interceptor[Call]):
-    def on_end(self, call: Call, error: BaseException | None) -> None:
+    def on_end(self, _call: Call, _error: BaseException | None) -> None:
         raise ZeroDivisionError("secret")
 
 

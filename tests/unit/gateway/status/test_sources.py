@@ -139,7 +139,7 @@ GAS = SourceSpec("gas", Gas, stale_after_ms=2000)
 @contextmanager
 def gas_reader() -> Iterator[None]:
     key = ("my_msgs/msg/Gas", GAS)
-    reads(*key)(lambda message, source: Gas(float(message.ppm)))
+    reads(*key)(lambda message, _source: Gas(float(message.ppm)))
     try:
         yield
     finally:
