@@ -23,7 +23,10 @@ _ACTUAL: Final = preview_pb.ActualState(
     measurement=preview_pb.Measurement(fps=29.5, viewer_count=2, worst_rtt_ms=4),
 )
 _WISH: Final = preview_pb.DesiredState(
-    revision=8, enabled=True, profile=preview_pb.PROFILE_LOW_BW, passphrase="0123456789"
+    revision=8,
+    enabled=True,
+    profile=preview_pb.PROFILE_LOW_BW,
+    passphrase="0123456789",  # noqa: S106  # made up
 )
 
 

@@ -29,8 +29,8 @@ _MODULES = {
 
 def run(names: list[str]) -> list[Row]:
     rows: list[Row] = []
-    # The camera's pictures and its shared memory: in RAM where there is a place for it.
-    in_ram = Path("/dev/shm")
+    # The camera's frames and its shared memory: in RAM where there is a place for it.
+    in_ram = Path("/dev/shm")  # noqa: S108  # a new directory below it, mode 0700
     with tempfile.TemporaryDirectory(dir=in_ram if in_ram.is_dir() else None) as workdir:
         for module, offered in _MODULES.items():
             wanted = {name for name in offered if not names or name in names}

@@ -12,7 +12,7 @@ _COMMANDS = (EFFECTIVE_COMMAND, *MUX_INPUTS.values())
 
 
 @reads("nav_msgs/msg/Odometry", ODOMETRY)
-def from_odometry(message: Any, source: SourceSettings) -> Odometry | None:
+def from_odometry(message: Any, _source: SourceSettings) -> Odometry | None:
     """Returns the twist, which is in the body frame (child_frame_id); None if it is not finite.
 
     A filter that has diverged publishes NaN.
@@ -28,7 +28,7 @@ def from_twist_stamped(message: Any, source: SourceSettings) -> Velocity | None:
 
 
 @reads("geometry_msgs/msg/Twist", *_COMMANDS)
-def from_twist(message: Any, source: SourceSettings) -> Velocity | None:
+def from_twist(message: Any, _source: SourceSettings) -> Velocity | None:
     """Returns the command; None if it is not finite: no robot can follow it."""
     velocity = _planar(message)
     return Velocity(*velocity) if velocity else None

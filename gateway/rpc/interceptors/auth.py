@@ -26,7 +26,7 @@ CHECK_EVERY_S: Final = 0.5
 """How often the credentials behind open streams are checked."""
 _ABORT_WITHIN_S: Final = 1.0
 """How long a caller has to take the status of a stream that ends; one that doesn't read gets none."""
-TOKEN_HEADER: Final = "authorization"
+TOKEN_HEADER: Final = "authorization"  # noqa: S105  # a name
 """Bearer tokens travel as in HTTP (RFC 6750 2.1)."""
 _SCHEME: Final = "bearer"
 _CERTIFICATE: Final = "x509_pem_cert"
@@ -80,10 +80,10 @@ class Auth(Interceptor[CallContext]):
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:
             task = asyncio.current_task()
-            assert task is not None, "gRPC serves each call in a task of its own"
+            assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
         self._streams.pop(call, None)
 
@@ -137,7 +137,7 @@ class Auth(Interceptor[CallContext]):
         if by_certificate and by_token:
             return combined(by_certificate, by_token)
         found = by_certificate or by_token
-        assert found is not None, "one of them was shown"
+        assert found is not None  # noqa: S101  # one of them was shown
         return found
 
     def _knows(self, token: str | None, fingerprint: str | None) -> bool:

@@ -72,7 +72,7 @@ class RateLimit(Interceptor[CallContext]):
             return self._refuse_later(error)
         return None
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Gives the stream back."""
         if call.method.streaming:
             self._admission.close_stream(call.peer)
