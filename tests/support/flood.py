@@ -1,4 +1,4 @@
-"""A detector gone mad: `python -m tests.support.flood COUNT HZ` publishes pictures of COUNT objects.
+"""A detector gone mad: `python -m tests.support.flood COUNT HZ` publishes frames of COUNT objects.
 
 Encoded once, sent again and again until its standard input closes.
 """

@@ -59,7 +59,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         status: the answer to GetSystemStatus; also part of GetOverlaySnapshot.
         overlay: detections and events of the answer to GetOverlaySnapshot.
         info: the answer to GetGatewayInfo.
-        accept: whether wishes are taken.
+        accept: whether requests are accepted.
         works: whether an enabled preview comes to run; else it ends FAULTED.
         fault: why it is FAULTED, and what to do.
         failures: (code, details) pairs; each call takes one and fails with it, until none is left.
@@ -69,7 +69,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             at most 20 s, and nothing else does so.
         hold: while cleared, calls wait (at most 20 s) before they are answered.
         calls: names of the methods called, in order.
-        wishes: what SetPreviewMode was asked.
+        preview_requests: of SetPreviewMode, in order.
     """
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.hold = threading.Event()
         self.hold.set()
         self.calls: list[str] = []
-        self.wishes: list[robot_gateway_pb2.SetPreviewModeRequest] = []
+        self.preview_requests: list[robot_gateway_pb2.SetPreviewModeRequest] = []
 
     def GetSystemStatus(self, _request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
         self._begin("GetSystemStatus", context)
@@ -110,7 +110,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self, request: robot_gateway_pb2.SetPreviewModeRequest, context: Any
     ) -> robot_gateway_pb2.SetPreviewModeResponse:
         self._begin("SetPreviewMode", context)
-        self.wishes.append(request)
+        self.preview_requests.append(request)
         if request.enabled and request.profile not in preview_pb2.PreviewProfile.values():
             context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"profile {request.profile} does not exist")
         self.preview_answers.wait(_HELD_AT_MOST_S)

@@ -61,9 +61,9 @@ class RealGround(Ground):
     @asynccontextmanager
     async def undisturbed(self) -> AsyncIterator[None]:
         with Watcher(self._preview.port) as viewer:
-            await asyncio.to_thread(viewer.wait_for_pictures, 5)
+            await asyncio.to_thread(viewer.wait_for_frames, 5)
             yield
-            await asyncio.to_thread(viewer.wait_for_pictures, 5)
+            await asyncio.to_thread(viewer.wait_for_frames, 5)
             assert viewer.reconnects == 0
 
     def kill_preview(self) -> None:

@@ -100,7 +100,7 @@ def video_ground(
         directory: for everything both programs write.
         preview: keys of its configuration.
         gateway: keys of its configuration.
-        small: pictures of 320x240 instead of 1280x720.
+        small: frames of 320x240 instead of 1280x720.
     """
     with RunningPreview(directory, preview, small=small) as service:
         ground = VideoGround(service, directory, gateway or {})

@@ -84,7 +84,7 @@ def test_full_disks_stop_neither_status_nor_video(own_demo: Deployment) -> None:
     with own_demo.client() as robot:
         assert robot.enable_preview().preview.state is PreviewState.RUNNING
         with Watcher(own_demo.preview_port) as viewer:
-            viewer.wait_for_pictures(30)
+            viewer.wait_for_frames(30)
         # The volume of the socket stays full, because the gateway holds it.
         own_demo.run("restart", "preview")
         wait_until(lambda: robot.status().preview.state is PreviewState.RUNNING, "the preview is back", 30)

@@ -211,7 +211,7 @@ def test_a_viewer_looks_on_an_operator_switches_and_both_are_in_the_audit_log(gu
         assert stream
         assert stream.encrypted
         with Watcher(robot.preview_port, stream.passphrase) as looking_on:
-            looking_on.wait_for_pictures(30)
+            looking_on.wait_for_frames(30)
         # The door is guarded, and so is the window.
         for passphrase in ("", "x" * len(stream.passphrase)):
             address = StreamAddress("127.0.0.1", robot.preview_port, passphrase=passphrase)

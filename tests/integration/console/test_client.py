@@ -142,7 +142,7 @@ def test_enabling_waits_until_frames_leave(robot: Face, double: GatewayDouble) -
     assert (change.preview.state, change.preview.profile) == (PreviewState.RUNNING, PreviewProfile.LOW_BW)
     assert change.preview.endpoint
     assert change.preview.endpoint.uri == STREAM_URI
-    assert [(wish.enabled, wish.profile) for wish in double.wishes] == [
+    assert [(request.enabled, request.profile) for request in double.preview_requests] == [
         (True, preview_pb2.PREVIEW_PROFILE_LOW_BW)
     ]
 

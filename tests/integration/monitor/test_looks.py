@@ -17,7 +17,7 @@ from console.window.programs import monitor
 from console.window.theme import draw_shape
 from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until
+from tests.support.qt import DARK, LIGHT, in_colours, keep_screenshot, let_pass, until
 from tests.support.snapshots import event
 
 READABLE = 4.5
@@ -72,7 +72,7 @@ def ground_of(widget: QWidget) -> QColor:
 def test_every_text_is_readable(window: MonitorWindow, name: str, ground: QColor) -> None:
     in_colours(ground)
     let_pass(0.3)
-    keep_picture(window, f"colours-{name}")
+    keep_screenshot(window, f"colours-{name}")
     labels = [each for each in window.findChildren(QLabel) if each.text() and each.isVisible()]
     assert len(labels) > 30
     for label in labels:
@@ -114,7 +114,7 @@ def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) ->
     assert smallest.height() <= SMALL_LAPTOP[1]
     window.resize(smallest)
     let_pass(0.3)
-    keep_picture(window, "smallest")
+    keep_screenshot(window, "smallest")
     words: list[QPushButton | QLabel] = [*window.findChildren(QPushButton), *window.findChildren(QLabel)]
     for word in words:
         gives_way = isinstance(word, ElidedLabel | WrappedLabel)
