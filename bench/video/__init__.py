@@ -1,7 +1,7 @@
 """The preview against today's usual pipeline: same camera, same codec, in turns.
 
 Every round measures the reference, then ours, each alone on the machine; the median round speaks. Only CPU
-is measured of both at once. Pictures carry the moment of their capture (stamp.py) from before the encoder to
+is measured of both at once. Frames carry the moment of their capture (stamp.py) from before the encoder to
 behind the decoder.
 """
 
