@@ -92,6 +92,33 @@ def test_a_report_that_a_reply_has_overtaken_is_ignored() -> None:
     assert reconciler.pending() is None
 
 
+def test_an_older_report_counts_after_a_loss() -> None:
+    """The process may have lost what it had applied, without becoming another one."""
+    reconciler = connected()
+    desired = reconciler.request(BRIGHT)
+    reconciler.take_report(LampReport("a", desired.revision, 90), 1.0)
+    reconciler.take_loss("gone")
+    assert reconciler.take_report(LampReport("a", 0, 0), 2.0)
+    assert reconciler.pending() is desired
+
+
+def test_only_a_spec_that_was_applied_before_is_applied_again() -> None:
+    seen: list[bool] = []
+
+    class Recording(LampModel):
+        def take_report(self, _spec: LampSpec, _report: LampReport, *, reapplying: bool) -> None:
+            seen.append(reapplying)
+
+    reconciler = Reconciler(FIRST, Recording())
+    first = reconciler.request(BRIGHT)
+    reconciler.take_report(LampReport("a"), 0.0)
+    reconciler.take_report(LampReport("a", first.revision), 1.0)
+    reconciler.take_report(LampReport("b"), 2.0)
+    reconciler.request(DIM)
+    reconciler.take_report(LampReport("b"), 3.0)
+    assert seen == [False, False, True, False]
+
+
 def test_an_older_request_is_settled_by_a_newer_one() -> None:
     reconciler = connected()
     older, newer = reconciler.request(BRIGHT), reconciler.request(DIM)

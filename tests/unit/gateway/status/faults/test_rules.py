@@ -1,6 +1,7 @@
 """What counts as a fault, rule by rule."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -26,6 +27,7 @@ from gateway.status.sources import (
     ODOMETRY,
     ONBOARD_BATTERY,
     SOURCES,
+    SourceSpec,
 )
 from gateway.status.values import (
     Battery,
@@ -129,6 +131,15 @@ def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, 
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
 
+@pytest.mark.parametrize(("up_s", "expected"), [(4.9, set()), (5.0, {"odometry.silent"})])
+def test_a_publisher_may_be_silent_until_the_startup_grace_has_elapsed(
+    up_s: float, expected: set[str]
+) -> None:
+    of = board()
+    of.publishers[ODOMETRY] = Publishers(1)
+    assert set(found(snapshot(of, odometry=True), up_s=up_s)) == expected
+
+
 def test_two_publishers_of_one_source_are_said_so() -> None:
     of = board()
     of[ODOMETRY], of.publishers[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S), Publishers(2)
@@ -224,9 +235,24 @@ def test_what_is_not_known_neither_raises_nor_ends_a_fault() -> None:
     assert set(found(snapshot(unknown), active)) == active
 
 
+def test_a_stale_charge_neither_raises_nor_clears_a_fault() -> None:
+    for charge_percent, active in ((5.0, frozenset[str]()), (90.0, frozenset({"battery.low"}))):
+        of = board()
+        of[BATTERY] = Received(replace(FULL, charge_percent=charge_percent), NOW_S - 10)
+        # Its staleness is a fault of the source.
+        assert found(snapshot(of, battery=False), active).keys() - {"battery.stale"} == active
+
+
 def test_a_computer_that_is_not_looked_at_any_more_is_a_fault_of_its_own() -> None:
     old = board(compute=replace(COOL, cpu_temperature_c=99.0), at_s=NOW_S - 10)
     assert set(found(snapshot(old))) == {"platform.stale"}
+
+
+@pytest.mark.parametrize("spec", [COMPUTE, NETWORK], ids=lambda spec: spec.name)
+def test_one_stale_part_of_the_computer_is_enough(spec: SourceSpec[Any]) -> None:
+    parts: dict[SourceSpec[Any], Any] = {COMPUTE: COOL, NETWORK: STRONG}
+    of = Board({each: Received(part, NOW_S - 10 * (each is spec)) for each, part in parts.items()})
+    assert set(found(snapshot(of))) == {"platform.stale"}
 
 
 def test_a_preview_that_tries_again_has_not_recovered() -> None:
