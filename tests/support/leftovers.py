@@ -99,6 +99,7 @@ def _status(process: psutil.Process) -> str:
 
 
 def _threads() -> Iterator[str]:
+    # Python's own: pools of foreign libraries keep idle threads, GLib's under the name of their last task.
     for thread in threading.enumerate():
         # gRPC's asyncio side starts one with its first use in a process, and keeps it.
         if "_poll_wrapper" not in thread.name:
@@ -118,5 +119,7 @@ def _descriptors() -> Iterator[str]:
                     yield f"socket {known.type.name} {known.laddr}"
             elif path.is_absolute():
                 yield f"file {path}"
+            elif path.name.startswith("pipe:"):
+                yield "pipe"
             else:
                 yield _UNNAMED

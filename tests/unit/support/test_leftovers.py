@@ -14,7 +14,8 @@ LEAVES = {
     "datagrams": ("socket", "KEPT.append(bound(socket.AF_INET, ('127.0.0.1', 0)))"),
     "unix_socket": ("socket", "KEPT.append(bound(socket.AF_UNIX, 'service.sock'))"),
     "file": ("file", "KEPT.append(open(__file__))"),
-    "pipes": ("unnamed descriptor", "KEPT.extend(os.pipe() for _ in range(30))"),
+    "pipe": ("pipe", "KEPT.append(os.pipe())"),
+    "events": ("unnamed descriptor", "KEPT.extend(os.eventfd(0) for _ in range(30))"),
 }
 """Name of the module -> what is reported, what it does."""
 TIDY = {
