@@ -3,13 +3,16 @@
 #   wheels    Debian 12 and the Python index's wheels, amd64: tests, and machines without a ROS image
 # Everything above rclpy is the same.
 ARG ROS=packages
+# A tag, or better a tag with its digest (scripts/images digests).
+ARG DEBIAN_IMAGE=debian:bookworm-slim
+ARG ROS_IMAGE=ros:jazzy-ros-core
 
-FROM debian:bookworm-slim AS system-wheels
+FROM ${DEBIAN_IMAGE} AS system-wheels
 RUN apt-get update \
  && apt-get install -y --no-install-recommends python3 tini \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 
-FROM ros:jazzy-ros-core AS system-packages
+FROM ${ROS_IMAGE} AS system-packages
 RUN apt-get update \
  && apt-get install -y --no-install-recommends ros-jazzy-vision-msgs tini \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
@@ -45,14 +48,21 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && mkdir ros
 
 FROM tools AS rclpy-packages
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends ca-certificates git \
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 COPY requirements/gateway.txt requirements/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && python3 -m venv --without-pip --system-site-packages .venv \
  && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
       -r requirements/gateway.txt
-COPY interfaces interfaces
-COPY docker/build-interfaces-ros docker/
-RUN docker/build-interfaces-ros
+COPY interfaces/omniseer_msgs interfaces/omniseer_msgs
+COPY docker/build-interfaces-ros docker/refuse-stand-ins docker/
+# Release 4.6.1. A commit names its content, as a checksum does.
+ARG YOLO_ROS_REPOSITORY=https://github.com/mgonzs13/yolo_ros.git
+ARG YOLO_ROS_COMMIT=e712bdee9c5fcffb5e42a17b28792de004224964
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && docker/build-interfaces-ros
 
 FROM rclpy-${ROS} AS built
 COPY pyproject.toml README.md LICENSE ./
@@ -67,6 +77,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-gateway --help > /dev/null
 
 FROM system
+# What is in the image, for a look at advisories: package and version, one line each.
+RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # Volumes take over whose these are; so does a tmpfs on /tmp, whatever mode it is given, before runc 1.1.8.
@@ -76,7 +88,8 @@ ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     GRPC_VERBOSITY=ERROR \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
-    HEALTH_TARGET=127.0.0.1:50051
+    HEALTH_TARGET=127.0.0.1:50051 \
+    HEALTH_SERVICE=omniseer.gateway.v1.RobotGateway
 # The group is shared with the preview: it owns the socket between the two.
 USER 10001:10000
 STOPSIGNAL SIGTERM

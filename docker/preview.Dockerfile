@@ -1,6 +1,9 @@
 # The preview, on Debian 12: the system whose GStreamer the boards' makers build their encoder plugins for.
 # EXTRA_PACKAGES adds Debian packages (drivers), docker/vendor/ packages of the board's maker.
-FROM debian:bookworm-slim AS system
+# A tag, or better a tag with its digest (scripts/images digests).
+ARG DEBIAN_IMAGE=debian:bookworm-slim
+
+FROM ${DEBIAN_IMAGE} AS system
 ARG EXTRA_PACKAGES=""
 RUN apt-get update \
  && apt-get install -y --no-install-recommends \
@@ -14,7 +17,7 @@ RUN if ls /tmp/vendor/*.deb > /dev/null 2>&1; then \
     fi; \
     rm -rf /tmp/vendor
 
-FROM debian:bookworm-slim AS built
+FROM ${DEBIAN_IMAGE} AS built
 RUN apt-get update \
  && apt-get install -y --no-install-recommends python3-venv \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
@@ -39,6 +42,8 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .venv/bin/robot-preview --help > /dev/null
 
 FROM system
+# What is in the image, for a look at advisories: package and version, one line each.
+RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # A tmpfs on it takes over these rights, whatever mode it is given, before runc 1.1.8.
 RUN install -d -m 0700 -o 10002 -g 10000 /tmp

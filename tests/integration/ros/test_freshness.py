@@ -167,8 +167,10 @@ def test_starting_and_stopping_leaves_nothing_behind() -> None:
 
 
 @pytest.mark.usefixtures("ros_domain")
-def test_the_sampler_says_when_it_last_looked() -> None:
-    with intake(DEFAULT_SOURCES, Board()) as running:
-        first = wait_until(lambda: running.sampler.last_pass_at_s, "the first pass")
+def test_the_board_says_when_ros_was_last_read() -> None:
+    board = Board()
+    assert board.ros_passed_s is None
+    with intake(DEFAULT_SOURCES, board):
+        first = wait_until(lambda: board.ros_passed_s, "the first pass")
         assert first
-        wait_until(lambda: (running.sampler.last_pass_at_s or 0) > first, "another pass")
+        wait_until(lambda: (board.ros_passed_s or 0) > first, "another pass")

@@ -1,0 +1,83 @@
+"""scripts/images on built images: what is in them, and the way to a robot that reaches no registry."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.support.engine import ROOT, TAG
+
+pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
+
+IMAGES = ("robot-gateway", "robot-preview")
+CARRIED = "e2e-carried"
+
+
+def scripts_images(*arguments: str, tag: str = TAG) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [ROOT / "scripts/images", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+        env={**os.environ, "TAG": tag},
+    )
+
+
+def docker(*arguments: str) -> str:
+    return subprocess.run(
+        ["docker", *arguments], capture_output=True, text=True, timeout=60, check=True
+    ).stdout
+
+
+def layers_of(image: str) -> object:
+    """What the image is made of; its ID changes with the engine's way of storing it."""
+    return json.loads(docker("image", "inspect", "--format", "{{json .RootFS.Layers}}", image))
+
+
+@pytest.mark.usefixtures("images")
+def test_each_package_is_listed_with_its_version() -> None:
+    listed = [line.split() for line in scripts_images("packages").stdout.splitlines()]
+    versions = {(image, package): version for image, package, version in listed}
+    assert {image for image, _ in versions} == set(IMAGES)
+    inside = docker(
+        "run", "--rm", "--network=none", "--entrypoint=dpkg-query", f"robot-preview:{TAG}",
+        "--show", "--showformat=${Version}", "gstreamer1.0-plugins-bad",
+    )  # fmt: skip
+    assert versions["robot-preview", "gstreamer1.0-plugins-bad"] == inside
+
+
+@pytest.mark.usefixtures("images")
+def test_images_that_were_saved_and_loaded_are_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "images.tar.gz"
+    for image in IMAGES:
+        docker("tag", f"{image}:{TAG}", f"{image}:{CARRIED}")
+    before = {image: layers_of(f"{image}:{CARRIED}") for image in IMAGES}
+    try:
+        saved = scripts_images("save", str(file), tag=CARRIED)
+        assert saved.returncode == 0, saved.stderr
+        assert file.stat().st_size > 10_000_000
+        docker("image", "rm", *(f"{image}:{CARRIED}" for image in IMAGES))
+        loaded = scripts_images("load", str(file), tag=CARRIED)
+        assert loaded.returncode == 0, loaded.stderr
+        assert {image: layers_of(f"{image}:{CARRIED}") for image in IMAGES} == before
+    finally:
+        docker("image", "rm", "--force", *(f"{image}:{CARRIED}" for image in IMAGES))
+
+
+@pytest.mark.usefixtures("images")
+def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "images.tar.gz"
+    file.write_bytes(b"no archive")
+    assert scripts_images("load", str(file)).returncode != 0
+
+
+@pytest.mark.usefixtures("images")
+def test_saving_what_was_not_built_leaves_no_file(tmp_path: Path) -> None:
+    file = tmp_path / "images.tar.gz"
+    ended = scripts_images("save", str(file), tag="never-built")
+    assert ended.returncode == 1
+    assert "scripts/images build" in ended.stderr
+    assert not list(tmp_path.iterdir())
