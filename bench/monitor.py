@@ -47,10 +47,10 @@ def _row(found: Robot, name: str, what: str, width: int, height: int) -> Row:
     )
     answer = json.loads(ended.stdout)
     if not answer:
-        raise RuntimeError("no picture was painted")
-    painted_fps = answer["pictures"] / MEASURE_S
+        raise RuntimeError("no frame was painted")
+    painted_fps = answer["frames"] / MEASURE_S
     if painted_fps < 0.9 * FPS:
-        raise RuntimeError(f"only {painted_fps:.1f} pictures a second were painted: nothing was measured")
+        raise RuntimeError(f"only {painted_fps:.1f} frames a second were painted: nothing was measured")
     return Row(
         name=name,
         what=f"wait for the window's event loop, 99th percentile, {painted_fps:.1f} fps painted, {what}",

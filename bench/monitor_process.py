@@ -1,7 +1,7 @@
 """The monitor window, to be measured: `python -m bench.monitor_process TARGET SECONDS WIDTH HEIGHT`.
 
 Without a screen, as Qt's "offscreen" platform paints it: into memory, with the CPU, as on a laptop without a
-graphics card. Prints one JSON object: the waits of the event loop and the pictures painted meanwhile.
+graphics card. Prints one JSON object: the waits of the event loop and the frames painted meanwhile.
 """
 
 import json
@@ -19,8 +19,8 @@ from PySide6.QtWidgets import QApplication
 from bench.loop_delay import LoopDelay
 from console.window.programs import monitor
 
-_PICTURES_FIRST = 60
-"""Pictures painted before it counts: the window is laid out, the decoder has settled."""
+_FRAMES_FIRST = 60
+"""Frames painted before it counts: the window is laid out, the decoder has settled."""
 _GIVE_UP_AFTER_S = 60
 
 
@@ -34,12 +34,12 @@ def main() -> None:
     def on_painted() -> None:
         nonlocal painted
         painted += 1
-        if painted == _PICTURES_FIRST:
+        if painted == _FRAMES_FIRST:
             delay.start()
             QTimer.singleShot(round(seconds * 1000), finish)
 
     def finish() -> None:
-        found.update(delays_ms=delay.stop(), pictures=painted - _PICTURES_FIRST)
+        found.update(delays_ms=delay.stop(), frames=painted - _FRAMES_FIRST)
         app.quit()
 
     with monitor(target) as window:

@@ -92,7 +92,7 @@ def _gateway_row() -> Row:
         name="ros.gateway_cpu",
         what=(
             f"the whole gateway beside 4 x {ros_gateway.FAST_HZ} Hz, commands, and detections of "
-            f"{ros_gateway.BOXES} boxes at {ros_gateway.PICTURES_HZ} Hz"
+            f"{ros_gateway.BOXES} boxes at {ros_gateway.FRAMES_HZ} Hz"
         ),
         unit="% of a core",
         value=percent,

@@ -10,7 +10,7 @@ from tests.support.gateway_program import gateway_program
 from tests.support.ros import simulated_robot
 
 FAST_HZ = 200
-PICTURES_HZ = 30
+FRAMES_HZ = 30
 BOXES = 100
 SETTLE_S = 3.0
 """After the start: discovery, and what happens only once."""
@@ -25,7 +25,7 @@ def cpu_percent() -> float:
     with (
         tempfile.TemporaryDirectory() as directory,
         simulated_robot(Path(directory), *rates, "--detections-hz", "0"),
-        program("tests.support.flood", str(BOXES), str(PICTURES_HZ)),
+        program("tests.support.flood", str(BOXES), str(FRAMES_HZ)),
         gateway_program(Path(directory)) as gateway,
     ):
         deadline_s = time.monotonic() + _HEARD_WITHIN_S

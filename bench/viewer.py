@@ -1,6 +1,6 @@
-"""What the window adds to the latency: capture to the painted picture, against capture to decoded.
+"""What the window adds to the latency: capture to the painted frame, against capture to decoded.
 
-The preview's pictures carry the moment of their capture (bench/video/stamp.py). The bare receiver reads it
+The preview's frames carry the moment of their capture (bench/video/stamp.py). The bare receiver reads it
 behind the decoder; the viewer's is read back from the pixels of its window, after they were painted. Both
 watch the same robot in turns.
 """
@@ -61,7 +61,7 @@ def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]
 
 
 def _painted_ms(robot: product.Robot) -> list[float]:
-    """Capture to painted, of each picture that the window showed."""
+    """Capture to painted, of each frame that the window showed."""
     found: list[float] = []
     with _window(robot) as view:
 
@@ -85,9 +85,9 @@ def on_screen(widget: QWidget) -> QImage:
     return whole.copy(QRect(widget.mapTo(window, QPoint(0, 0)), widget.size()))
 
 
-def read_stamp(picture: QImage) -> float | None:
-    """The moment that is drawn into a picture shown in its own size, from its upper left corner on."""
-    grey = picture.convertToFormat(QImage.Format.Format_Grayscale8)
+def read_stamp(frame: QImage) -> float | None:
+    """The moment that is drawn into a frame shown in its own size, from its upper left corner on."""
+    grey = frame.convertToFormat(QImage.Format.Format_Grayscale8)
     first = grey.bytesPerLine() * (stamp.BLOCK_PX // 2)
     row = bytes(grey.constBits()[first : first + min(stamp.WIDTH_PX, grey.width())])
     return stamp.read(row) if len(row) == stamp.WIDTH_PX else None

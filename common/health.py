@@ -44,7 +44,7 @@ class Health(HealthServicer):
             self._changes.notify_all()
 
     async def Check(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: RpcContext
+        self, request: HealthCheckRequest, _context: RpcContext
     ) -> HealthCheckResponse:
         """Returns the current status.
 
@@ -57,7 +57,7 @@ class Health(HealthServicer):
         return HealthCheckResponse(status=status)
 
     async def Watch(  # noqa: N802  # the schema names it
-        self, request: HealthCheckRequest, context: RpcContext
+        self, request: HealthCheckRequest, _context: RpcContext
     ) -> AsyncIterator[HealthCheckResponse]:
         """Yields the current status, then each change; SERVICE_UNKNOWN until the first `set_serving`."""
         sent: _Status | None = None

@@ -85,14 +85,14 @@ CallT_contra = TypeVar("CallT_contra", bound=Call, contravariant=True)
 class Interceptor(Generic[CallT_contra]):
     """One aspect of calls; overrides the hooks it needs. Used on the server's event loop alone."""
 
-    def applies_to(self, method: Any) -> bool:
+    def applies_to(self, method: Any) -> bool:  # noqa: ARG002  # for overriders
         """Returns whether calls of this method pass here."""
         return True
 
     def on_call(self, call: CallT_contra) -> Awaitable[None] | None:
         """Called when a call arrives; raises to refuse it. Returns an awaitable only if it must wait."""
 
-    def on_request(self, call: CallT_contra, request: Any) -> Any:
+    def on_request(self, call: CallT_contra, request: Any) -> Any:  # noqa: ARG002  # for overriders
         """Called for each message of the caller; returns it or another in its place, or raises."""
         return request
 
@@ -278,7 +278,7 @@ _KINDS: Final[Mapping[tuple[bool, bool], Callable[..., Handler]]] = {
 
 def _behavior_of(handler: Handler) -> Behavior:
     behavior = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
-    assert behavior is not None, "a handler has one of four kinds"
+    assert behavior is not None, "a handler has one of four kinds"  # noqa: S101  # grpc's own
     return behavior
 
 

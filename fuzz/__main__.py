@@ -16,8 +16,8 @@ from rich.table import Table
 _SHORT: Final = 20_000
 NAMES: Final = (
     "operators_request",
-    "gateways_wish",
-    "previews_truth",
+    "gateways_request",
+    "previews_report",
     "robots_answer",
     "configuration",
     "metrics_request",

@@ -22,8 +22,11 @@ _ACTUAL: Final = preview_pb.ActualState(
     stream=preview_pb.Stream(width_px=1280, height_px=720, fps=30, codec=preview_pb.CODEC_H265),
     measurement=preview_pb.Measurement(fps=29.5, viewer_count=2, worst_rtt_ms=4),
 )
-_WISH: Final = preview_pb.DesiredState(
-    revision=8, enabled=True, profile=preview_pb.PROFILE_LOW_BW, passphrase="0123456789"
+_DESIRED_STATE: Final = preview_pb.DesiredState(
+    revision=8,
+    enabled=True,
+    profile=preview_pb.PROFILE_LOW_BW,
+    passphrase="0123456789",  # noqa: S106  # made up
 )
 
 
@@ -40,8 +43,8 @@ _SEEDS: Final = {
         ).SerializeToString(),
         robot_gateway_pb2.WatchSystemStatusRequest(min_interval_ms=100).SerializeToString(),
     ],
-    "gateways_wish": [preview_pb.ApplyDesiredStateRequest(desired=_WISH).SerializeToString()],
-    "previews_truth": [_ACTUAL.SerializeToString()],
+    "gateways_request": [preview_pb.ApplyDesiredStateRequest(desired=_DESIRED_STATE).SerializeToString()],
+    "previews_report": [_ACTUAL.SerializeToString()],
     "robots_answer": [_STATUS.SerializeToString(), _OVERLAY.SerializeToString()],
     "configuration": [
         b"name: lab\ngrpc: {host: 127.0.0.1, port: 50051}\nsources: []\n",

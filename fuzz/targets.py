@@ -46,7 +46,7 @@ def operators_request(data: bytes) -> None:
             _VALIDATION.on_request(call, data)
 
 
-def gateways_wish(data: bytes) -> None:
+def gateways_request(data: bytes) -> None:
     """ApplyDesiredState, as the preview service takes it in."""
     request = preview_pb.ApplyDesiredStateRequest()
     if _parses(request, data):
@@ -54,7 +54,7 @@ def gateways_wish(data: bytes) -> None:
             desired_state(request.desired)
 
 
-def previews_truth(data: bytes) -> None:
+def previews_report(data: bytes) -> None:
     """What the preview service reports, as the gateway takes it in."""
     state = preview_pb.ActualState()
     if _parses(state, data):
@@ -135,8 +135,8 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
         target.__name__: target
         for target in (
             operators_request,
-            gateways_wish,
-            previews_truth,
+            gateways_request,
+            previews_report,
             robots_answer,
             configuration,
             metrics_request,

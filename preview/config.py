@@ -98,7 +98,7 @@ class ProfilesSettings(Section):
 class SrtSettings(Section):
     """SRT listener."""
 
-    bind: str = "0.0.0.0"
+    bind: str = "0.0.0.0"  # noqa: S104  # viewers are on other machines; the gateway decides on encryption
     port: int = Field(default=7100, ge=1, le=65535)
     latency_ms: int = Field(default=125, ge=0, le=8000)
     """SRTO_LATENCY: how long a receiver waits for a lost packet; the larger one of both sides applies."""

@@ -151,12 +151,12 @@ def _actual_state(robot: Robot, component: Component, now_s: float) -> tuple[Lev
     return Level.OK, _TEXTS[Level.OK]
 
 
-def mode(robot: Robot, now_s: float) -> Any:
+def mode(robot: Robot, _now_s: float) -> Any:
     """Builds std_msgs/String after a change of the mode."""
     return String(data=robot.behaviour.mode) if robot.mode_changed() else None
 
 
-def effective_command(robot: Robot, now_s: float) -> Any:
+def effective_command(robot: Robot, _now_s: float) -> Any:
     """Builds geometry_msgs/TwistStamped of the mux's output."""
     return None if robot.behaviour.commander is Commander.NOBODY else _command(robot)
 
@@ -183,7 +183,7 @@ class Publication:
 def _mux_input(topic: str, commander: Commander) -> Publication:
     """Returns a publication of geometry_msgs/TwistStamped on one input, silent unless the mux selects it."""
 
-    def build(robot: Robot, now_s: float) -> Any:
+    def build(robot: Robot, _now_s: float) -> Any:
         return _command(robot) if robot.behaviour.commander is commander else None
 
     return Publication(topic, TwistStamped, build)

@@ -1,7 +1,7 @@
 """The preview against today's usual pipeline: same camera, same codec, in turns.
 
 Every round measures the reference, then ours, each alone on the machine; the median round speaks. Only CPU
-is measured of both at once. Pictures carry the moment of their capture (stamp.py) from before the encoder to
+is measured of both at once. Frames carry the moment of their capture (stamp.py) from before the encoder to
 behind the decoder.
 """
 
@@ -29,8 +29,8 @@ _MODULES = {
 
 def run(names: list[str]) -> list[Row]:
     rows: list[Row] = []
-    # The camera's pictures and its shared memory: in RAM where there is a place for it.
-    in_ram = Path("/dev/shm")
+    # The camera's frames and its shared memory: in RAM where there is a place for it.
+    in_ram = Path("/dev/shm")  # noqa: S108  # a new directory below it, mode 0700
     with tempfile.TemporaryDirectory(dir=in_ram if in_ram.is_dir() else None) as workdir:
         for module, offered in _MODULES.items():
             wanted = {name for name in offered if not names or name in names}

@@ -31,9 +31,9 @@ class Outcome:
     """What came through a link."""
 
     delivered_percent: float
-    """Whole pictures decoded, of those the camera took."""
+    """Whole frames decoded, of those the camera took."""
     freeze_ms: float
-    """Longest time without a whole picture."""
+    """Longest time without a whole frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +41,15 @@ class _Link:
     """A link, and what is promised of it.
 
     Args:
-        name: of the row for pictures; the one for freezes adds "_freeze_ms".
+        name: of the row for frames; the one for freezes adds "_freeze_ms".
         what: the link, for a person.
-        least_pictures: adaptive against fixed.
+        least_frames: adaptive against fixed.
         longest_freeze: the same.
     """
 
     name: str
     what: str
-    least_pictures: float
+    least_frames: float
     longest_freeze: float
     rate_kbps: int | None = None
     loss_percent: int = 0
@@ -93,16 +93,16 @@ def _rows(workdir: Path, bad: _Link) -> list[Row]:
     return [
         Row(
             name=bad.name,
-            what=f"{bad.what}: pictures delivered, adaptive against fixed",
+            what=f"{bad.what}: frames delivered, adaptive against fixed",
             unit="%",
             value=outcomes[True].delivered_percent,
             reference=outcomes[False].delivered_percent,
-            bar=bad.least_pictures,
+            bar=bad.least_frames,
             better="higher",
         ),
         Row(
             name=bad.freeze_name,
-            what=f"{bad.what}: longest time without a whole picture, adaptive against fixed",
+            what=f"{bad.what}: longest time without a whole frame, adaptive against fixed",
             unit="ms",
             value=outcomes[True].freeze_ms,
             reference=outcomes[False].freeze_ms,

@@ -1,8 +1,8 @@
 """A camera for benchmarks: footage with a stamp, 1280x720 NV12, offered through shared memory.
 
 Both senders read it by the same GStreamer description, so the way from the camera is the same for both. The
-pictures are made ahead by ffmpeg (a moving test picture with noise as a sensor makes it), so that the camera
-itself needs next to no CPU: it draws the stamp and hands a picture over.
+frames are made ahead by ffmpeg (a moving test pattern with noise as a sensor makes it), so that the camera
+itself needs next to no CPU: it draws the stamp and hands a frame over.
 """
 
 import subprocess
@@ -26,7 +26,7 @@ class Camera:
 
     Args:
         socket: where its shared memory is announced.
-        fps: pictures per second.
+        fps: frames per second.
     """
 
     socket: Path
@@ -69,7 +69,7 @@ def caps(fps: int) -> str:
 
 
 def _make(footage: Path) -> None:
-    picture = f"testsrc2=size={WIDTH_PX}x{HEIGHT_PX}:rate=30,noise=alls=6:allf=t+u"
-    command = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", picture, "-frames:v", str(_FRAMES)]
+    pattern = f"testsrc2=size={WIDTH_PX}x{HEIGHT_PX}:rate=30,noise=alls=6:allf=t+u"
+    command = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", pattern, "-frames:v", str(_FRAMES)]
     command += ["-pix_fmt", "nv12", "-f", "rawvideo", str(footage)]
     subprocess.run(command, env=foreign.environment(), check=True)

@@ -15,7 +15,7 @@ from common.gst import GLib, Gst
 
 
 def serve(footage: Path, socket: Path, fps: int) -> None:
-    """Offers pictures until SIGTERM; says "ready" on standard output when a reader may come."""
+    """Offers frames until SIGTERM; says "ready" on standard output when a reader may come."""
     pipeline = Gst.parse_launch(
         "appsrc name=in is-live=true format=time max-bytes=0"
         f" caps={caps(fps)}"
@@ -33,7 +33,7 @@ def serve(footage: Path, socket: Path, fps: int) -> None:
 
 
 def _frames(footage: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
-    """Stamped pictures at their time; forth and back through the footage, so that nothing ever jumps."""
+    """Stamped frames at their time; forth and back through the footage, so that nothing ever jumps."""
     with footage.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         available = len(content) // FRAME_BYTES
         order = [*range(available), *range(available - 2, 0, -1)]
@@ -42,9 +42,9 @@ def _frames(footage: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
             due_s = begun_s + number / fps
             if stop.wait(max(0.0, due_s - time.monotonic())):
                 return
-            picture = bytearray(content[index * FRAME_BYTES : (index + 1) * FRAME_BYTES])
-            stamp.draw(picture, WIDTH_PX, time.monotonic())
-            yield bytes(picture)
+            frame = bytearray(content[index * FRAME_BYTES : (index + 1) * FRAME_BYTES])
+            stamp.draw(frame, WIDTH_PX, time.monotonic())
+            yield bytes(frame)
 
 
 if __name__ == "__main__":

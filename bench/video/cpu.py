@@ -1,7 +1,7 @@
 """CPU of the preview service against gst-launch-1.0 with the same encoder, told the same.
 
-Both send at once, the same pictures to one viewer each, and are measured in the same window: what else the
-machine does, and how warm its caches are, is the same for both. Whoever sends fewer pictures needs less, so
+Both send at once, the same frames to one viewer each, and are measured in the same window: what else the
+machine does, and how warm its caches are, is the same for both. Whoever sends fewer frames needs less, so
 a window in which too many are missing on either side does not count.
 """
 
@@ -24,7 +24,7 @@ ROUNDS = 7
 TRIES = 12
 """At most, to get so many rounds."""
 WINDOW_S = 8.0
-LEAST_PICTURES = int(0.95 * 30 * WINDOW_S)
+LEAST_FRAMES = int(0.95 * 30 * WINDOW_S)
 SETTLE_S = 1.5
 LATENCY_MS = 125
 BITRATE_KBPS = 2500
@@ -48,9 +48,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
             if len(rounds) == ROUNDS:
                 break
         else:
-            raise RuntimeError(
-                f"pictures were missing in too many of {TRIES} rounds: the machine is too busy"
-            )
+            raise RuntimeError(f"frames were missing in too many of {TRIES} rounds: the machine is too busy")
     return [
         Row(
             name="video.cpu",
@@ -64,7 +62,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
 
 
 def _round(source: Camera, robot: product.Robot) -> _Round | None:
-    """None when pictures were missing."""
+    """None when frames were missing."""
     port = free_udp_port()
     with (
         reference.sender(source, port, LATENCY_MS, _same_encoder()) as process,
@@ -76,11 +74,11 @@ def _round(source: Camera, robot: product.Robot) -> _Round | None:
         viewers: tuple[Viewer, ...] = (their_viewer, our_viewer)
         list(measuring.map(lambda viewer: watch(viewer, SETTLE_S), viewers))
         shares = [measuring.submit(cpu_share, pid, WINDOW_S) for pid in (process.pid, robot.service.pid)]
-        pictures = list(measuring.map(lambda viewer: len(watch(viewer, WINDOW_S)), viewers))
+        frames = list(measuring.map(lambda viewer: len(watch(viewer, WINDOW_S)), viewers))
         found = _Round(*(share.result().whole for share in shares))
     told = f"gst-launch-1.0 {found.theirs:.1f} %, ours {found.ours:.1f} % of a core"
-    if min(pictures) < LEAST_PICTURES:
-        tell(f"CPU with a viewer: {told}, but {min(pictures)} pictures in {WINDOW_S:g} s are too few")
+    if min(frames) < LEAST_FRAMES:
+        tell(f"CPU with a viewer: {told}, but {min(frames)} frames in {WINDOW_S:g} s are too few")
         return None
     tell(f"CPU with a viewer: {told}")
     return found

@@ -1,4 +1,4 @@
-"""An operator switches the preview on and watches: how long until the first picture."""
+"""An operator switches the preview on and watches: how long until the first frame."""
 
 import statistics
 import time
@@ -20,7 +20,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     return [
         Row(
             name="video.enable_to_frame_ms",
-            what=f"SetPreviewMode sent, to the first decoded picture (SRT {LATENCY_MS} ms)",
+            what=f"SetPreviewMode sent, to the first decoded frame (SRT {LATENCY_MS} ms)",
             unit="ms",
             value=statistics.median(times_ms),
             reference=None,
@@ -30,7 +30,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
 
 
 def _once(robot: product.Robot) -> float:
-    """One enable, in ms; the way of the picture step by step on standard error."""
+    """One enable, in ms; the way of the frame step by step on standard error."""
     sent_s = time.monotonic()
     with robot.preview():
         answered_s = time.monotonic()
@@ -39,7 +39,7 @@ def _once(robot: product.Robot) -> float:
     captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
     steps = [
         ("SetPreviewMode answered, preview RUNNING, viewer calls", answered_s),
-        ("first picture captured", captured_s),
+        ("first frame captured", captured_s),
         ("decoded", frame.arrival_s),
     ]
     told = "; ".join(f"{at_s - sent_s:.3f} s {what}" for what, at_s in steps if at_s is not None)

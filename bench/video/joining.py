@@ -1,4 +1,4 @@
-"""How long a viewer of a running stream waits for its first picture.
+"""How long a viewer of a running stream waits for its first frame.
 
 The reference's viewer waits for the next key frame, so its figure depends on when it calls. All moments
 between two key frames are equally likely: here the calls are spread evenly over them, from a random first.
@@ -23,7 +23,7 @@ JOINS = 8
 LATENCY_MS = 125
 SETTLE_S = 1.0
 APART_S = reference.KEY_FRAMES_APART_S * (2 + 1 / JOINS)
-"""From one call to the next: two distances of key frames, so that a picture came meanwhile, and a share."""
+"""From one call to the next: two distances of key frames, so that a frame came meanwhile, and a share."""
 
 
 def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
@@ -41,7 +41,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     return [
         Row(
             name="video.first_frame",
-            what=f"viewer connects to a running stream, to its first picture (SRT {LATENCY_MS} ms)",
+            what=f"viewer connects to a running stream, to its first frame (SRT {LATENCY_MS} ms)",
             unit="ms",
             value=statistics.median(ours),
             reference=statistics.median(theirs),
@@ -60,5 +60,5 @@ def _joins(sending: AbstractContextManager[Any], connect: Connect, name: str) ->
         for number in range(JOINS):
             time.sleep(max(0.0, begin_s + number * APART_S - time.monotonic()))
             waits.append(first_frame_ms(connect))
-    tell(f"{name}: first pictures after {', '.join(f'{one:.0f}' for one in waits)} ms")
+    tell(f"{name}: first frames after {', '.join(f'{one:.0f}' for one in waits)} ms")
     return waits

@@ -16,7 +16,7 @@ from console.receiver.frame_queue import FrameQueue
 
 PLAIN_X264 = "x264enc tune=zerolatency speed-preset=veryfast bitrate=2500 key-int-max=30"
 KEY_FRAMES_APART_S = 1.0
-"""What that makes of 30 pictures per second."""
+"""What that makes of 30 frames per second."""
 
 
 @contextmanager
@@ -56,7 +56,7 @@ class PlainViewer:
         self._out.disconnect(self._handler)
 
     def next_frame(self, timeout_s: float) -> Frame:
-        """The next decoded picture."""
+        """The next decoded frame."""
         taken = self._queue.take(time.monotonic() + timeout_s)
         if not isinstance(taken, Frame):
             raise StreamEndedError("the reference sends nothing", "See what gst-launch-1.0 printed")

@@ -1,8 +1,8 @@
-"""The moment of capture, drawn into the picture itself, so that it survives every step up to the decoder.
+"""The moment of capture, drawn into the frame itself, so that it survives every step up to the decoder.
 
 A number of 32 bits in blocks of 16 x 16 pixels, black or white, in the top left corner, then 8 check bits.
 The number counts ticks of 0.1 ms on `time.monotonic()`, which all processes of a machine share. Blocks of
-that size come through any bit rate that shows a picture at all.
+that size come through any bit rate that shows a frame at all.
 """
 
 import time
@@ -57,5 +57,5 @@ def read(row: bytes) -> float | None:
 
 
 def _check(value: int) -> int:
-    """Eight bits that a picture without a stamp, or a torn one, is unlikely to have."""
+    """Eight bits that a frame without a stamp, or a torn one, is unlikely to have."""
     return (value * 0x9E3779B1 >> 24 & 0xFF) ^ 0x5A

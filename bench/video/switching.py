@@ -24,7 +24,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     return [
         Row(
             name="video.switch_gap_ms",
-            what="longest time without a picture over the switches of profile, one SRT connection",
+            what="longest time without a frame over the switches of profile, one SRT connection",
             unit="ms",
             value=statistics.median(longest_ms),
             reference=None,

@@ -1,4 +1,4 @@
-"""Watching a stream and noting when each picture was taken and when it was decoded."""
+"""Watching a stream and noting when each frame was taken and when it was decoded."""
 
 import time
 from collections.abc import Callable
@@ -17,7 +17,7 @@ class Viewer(Protocol):
     """Who watches."""
 
     def next_frame(self, timeout_s: float) -> Frame:
-        """The next decoded picture."""
+        """The next decoded frame."""
 
 
 Connect = Callable[[], AbstractContextManager[Viewer]]
@@ -26,7 +26,7 @@ Connect = Callable[[], AbstractContextManager[Viewer]]
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """A picture's way, on `time.monotonic()`."""
+    """A frame's way, on `time.monotonic()`."""
 
     captured_s: float
     decoded_s: float
@@ -40,7 +40,7 @@ class Glance:
 
 
 def watch(viewer: Viewer, seconds: float) -> list[Glance]:
-    """What comes in the next `seconds`; pictures whose stamp can't be read are left out."""
+    """What comes in the next `seconds`; frames whose stamp can't be read are left out."""
     until_s = time.monotonic() + seconds
     glances = []
     while time.monotonic() < until_s:
@@ -52,12 +52,12 @@ def watch(viewer: Viewer, seconds: float) -> list[Glance]:
 
 
 def longest_gap_ms(glances: list[Glance]) -> float:
-    """The longest time between two decoded pictures."""
+    """The longest time between two decoded frames."""
     return max(later.decoded_s - earlier.decoded_s for earlier, later in pairwise(glances)) * 1000
 
 
 def first_frame_ms(connect: Connect) -> float:
-    """From beginning to connect to the first decoded picture."""
+    """From beginning to connect to the first decoded frame."""
     begun_s = time.monotonic()
     with connect() as viewer:
         return (viewer.next_frame(PATIENCE_S).arrival_s - begun_s) * 1000

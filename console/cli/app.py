@@ -41,7 +41,7 @@ def robotctl(
     target: TargetOption = None,
     robot: RobotOption = None,
     as_json: JsonOption = False,
-    version: Annotated[
+    version: Annotated[  # noqa: ARG001  # its callback prints it
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version.")
     ] = False,
 ) -> None:

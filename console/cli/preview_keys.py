@@ -59,7 +59,7 @@ class PreviewKeys:
     def done(self, outcome: PreviewChange | GatewayError) -> None:
         """Takes the outcome of the pending request."""
         request, self._pending = self._pending, None
-        assert request
+        assert request  # noqa: S101  # callers send one at a time
         if isinstance(outcome, GatewayError):
             self._show(f"{_title(request)} failed: {outcome}", SeverityStyle.BAD, _FAILURE_FOR_S)
         elif not outcome.accepted:

@@ -8,7 +8,7 @@ import grpc
 
 from common.errors import ExitCode, UserError
 
-_TOKEN_HEADER: Final = "authorization"
+_TOKEN_HEADER: Final = "authorization"  # noqa: S105  # a name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -82,7 +82,7 @@ class UnaryCalls:
         received_s = self._clock()
         clock.note(sent_s, robot_time, received_s)
         offset = clock.offset(received_s)
-        assert offset is not None, "it has a reading now"
+        assert offset is not None, "it has a reading now"  # noqa: S101  # just noted
         return offset
 
     async def set_preview(self, request: PreviewRequest, settle_within_s: float) -> PreviewChange:

@@ -164,7 +164,7 @@ class Conversation:
             await self._requested.wait()
             self._requested.clear()
             request = self._latest.get().request
-            assert request is not None
+            assert request is not None  # noqa: S101  # set before the event is
             try:
                 outcome: PreviewChange | GatewayError = await self._set_preview(request.desired)
             except GatewayError as error:

@@ -52,7 +52,7 @@ class Plot(QWidget):
         line = self.fontMetrics().height()
         return QSize(7 * line, 6 * line)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paints title, value and curve."""
         painter = QPainter(self)
         palette = self.palette()

@@ -91,7 +91,7 @@ class Marker(QWidget):
             self.severity, self._blank = style, blank
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paints the shape."""
         if self._blank:
             return

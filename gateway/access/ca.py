@@ -137,7 +137,8 @@ def _issue(ca: KeyPair | None, name: str, days: float, *extensions: x509.Extensi
     if ca is not None:
         certificate = x509.load_pem_x509_certificate(ca.certificate)
         signing_key = serialization.load_pem_private_key(ca.key, password=None)
-        assert isinstance(signing_key, ec.EllipticCurvePrivateKey), "the robot's own CA has no other keys"
+        # The robot's own CA has no other keys.
+        assert isinstance(signing_key, ec.EllipticCurvePrivateKey)  # noqa: S101  # narrows cryptography's union
         issuer, issuer_key = certificate.subject, signing_key
         not_after = min(not_after, certificate.not_valid_after_utc)
     builder = (

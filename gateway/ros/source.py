@@ -62,6 +62,11 @@ class Source:
         self.counts = SourceCounts()
 
     @property
+    def topic(self) -> str:
+        """The topic as configured."""
+        return self._settings.topic
+
+    @property
     def publisher_count(self) -> int:
         """Number of publishers that this source is connected with."""
         return int(self._subscription.get_publisher_count())

@@ -60,5 +60,5 @@ def qos_of(source: SourceSettings) -> Any:
     )
 
 
-def _never_called(message: Any) -> None:
+def _never_called(_message: Any) -> None:
     raise AssertionError("no executor spins these subscriptions")

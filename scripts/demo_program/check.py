@@ -146,7 +146,7 @@ def _preview_in_words(preview: PreviewStatus) -> str:
 
 
 def _video(preview: PreviewStatus) -> str:
-    assert preview.endpoint
+    assert preview.endpoint  # noqa: S101  # a running preview has one
     address = StreamAddress(
         preview.endpoint.host, preview.endpoint.port, preview.endpoint.latency_ms, preview.endpoint.passphrase
     )

@@ -123,7 +123,7 @@ class Programs:
         # Should this process be killed outright, the kernel ends the programs for it.
         command = ["setpriv", "--pdeathsig", "TERM", str(_BIN / name), *arguments]
         with self._ground.log_of(name).open("wb") as log:
-            process = subprocess.Popen(
+            process = subprocess.Popen(  # noqa: S603  # our own programs and arguments
                 command,
                 stdin=subprocess.DEVNULL,
                 stdout=log,

@@ -116,5 +116,5 @@ def test_the_rule_bites(fields: list[str], expected: list[str]) -> None:
             label=descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL,
         )
     pool = descriptor_pool.DescriptorPool()
-    pool.Add(file)  # type: ignore[no-untyped-call]
+    pool.Add(file)
     assert list(values_without_freshness(pool.FindMessageTypeByName(f"{PACKAGE}Sonar"))) == expected

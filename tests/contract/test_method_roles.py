@@ -9,7 +9,6 @@ from grpc_health.v1.health import SERVICE_NAME as HEALTH
 from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION
 
 from gateway.access.role import Role
-from gateway.rpc.calls import methods
 from gateway.rpc.calls.methods import ROLES, STANDARD, Method, Open
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_UNSPECIFIED
@@ -37,7 +36,7 @@ def forgetful(monkeypatch: pytest.MonkeyPatch) -> str:
     service.method.add(name="Anything", input_type=".forgetful.Empty", output_type=".forgetful.Empty")
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
-    monkeypatch.setattr(methods.descriptor_pool, "Default", lambda: pool)
+    monkeypatch.setattr(descriptor_pool, "Default", lambda: pool)
     return "forgetful.Forgetful"
 
 

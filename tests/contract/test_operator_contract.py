@@ -46,7 +46,7 @@ async def running(operator: Operator, profile: int = KEEP) -> Any:
     return await preview_in(operator, states.PREVIEW_RUNNING)
 
 
-async def preview_in(operator: Operator, state: int) -> Any:
+async def preview_in(operator: Operator, state: states.PreviewState.ValueType) -> Any:
     """The preview, when it has come to this state."""
     status = await eventually(
         operator.status, lambda it: it.preview.state == state, states.PreviewState.Name(state)
@@ -106,7 +106,7 @@ async def test_another_profile_is_taken_over_without_a_new_start(ground: Ground,
 @pytest.mark.parametrize("number", [4, 99, -1])
 @pytest.mark.parametrize("is_running", [False, True])
 async def test_a_profile_outside_the_contract_changes_nothing(
-    ground: Ground, operator: Operator, number: int, is_running: bool
+    operator: Operator, number: int, is_running: bool
 ) -> None:
     if is_running:
         await running(operator, LOW_BW)

@@ -100,10 +100,10 @@ CASES = [
         {
             "gateway_name": "lab",
             "gateway_version": "1.2.3",
-            "preview": preview_pb2.PreviewStatus(state="PREVIEW_RUNNING"),
+            "preview": preview_pb2.PreviewStatus(state=states_pb2.PREVIEW_RUNNING),
             "vision": system_status_pb2.VisionStatus(available=True),
-            "health": system_status_pb2.RobotHealth(state="ROBOT_HEALTH_OK"),
-            "teleop": system_status_pb2.TeleopStatus(state="TELEOP_DISABLED"),
+            "health": system_status_pb2.RobotHealth(state=states_pb2.ROBOT_HEALTH_OK),
+            "teleop": system_status_pb2.TeleopStatus(state=states_pb2.TELEOP_DISABLED),
             "platform": platform_pb2.PlatformStatus(compute=platform_pb2.ComputeStatus(available=True)),
             "effective_command": system_status_pb2.EffectiveCommand(available=True),
         },
@@ -119,7 +119,7 @@ CASES = [
         {
             "accepted": True,
             "message": "running",
-            "preview": preview_pb2.PreviewStatus(profile="PREVIEW_PROFILE_LOW_BW"),
+            "preview": preview_pb2.PreviewStatus(profile=preview_pb2.PREVIEW_PROFILE_LOW_BW),
         },
     ),
     Case(

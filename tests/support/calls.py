@@ -33,7 +33,7 @@ class RpcDouble:
     def code(self) -> grpc.StatusCode | None:
         return self.aborted_with
 
-    async def abort(self, code: grpc.StatusCode, details: str = "", trailing_metadata: Any = ()) -> None:
+    async def abort(self, code: grpc.StatusCode, details: str = "", _trailing_metadata: Any = ()) -> None:
         self.aborted_with = code
         raise grpc.aio.AbortError(details)
 

@@ -68,7 +68,7 @@ class EventServer:
             after = position_from(request.after) if request.HasField("after") else None
             return stream.responses(after, Severity.INFO)
 
-        handler = grpc.unary_stream_rpc_method_handler(
+        handler: grpc.RpcMethodHandler[SubscribeEventsRequest, bytes] = grpc.unary_stream_rpc_method_handler(
             _as_generator(subscribe), SubscribeEventsRequest.FromString, None
         )
         self._server = new_server()

@@ -1,4 +1,4 @@
-"""A detector gone mad: `python -m tests.support.flood COUNT HZ` publishes pictures of COUNT objects.
+"""A detector gone mad: `python -m tests.support.flood COUNT HZ` publishes frames of COUNT objects.
 
 Encoded once, sent again and again until its standard input closes.
 """
@@ -17,7 +17,12 @@ TOPIC = "/yolo/detections"
 
 def main(count: int, rate_hz: float) -> None:
     over = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+
+    def wait_for_the_end() -> None:
+        sys.stdin.read()
+        over.set()
+
+    threading.Thread(target=wait_for_the_end, daemon=True).start()
     raw = serialize_message(
         DetectionArray(detections=[Detection(id=str(number), class_name="car") for number in range(count)])
     )

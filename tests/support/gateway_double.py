@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent import futures
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Never
 
 import grpc
 
@@ -59,7 +59,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         status: the answer to GetSystemStatus; also part of GetOverlaySnapshot.
         overlay: detections and events of the answer to GetOverlaySnapshot.
         info: the answer to GetGatewayInfo.
-        accept: whether wishes are taken.
+        accept: whether requests are accepted.
         works: whether an enabled preview comes to run; else it ends FAULTED.
         fault: why it is FAULTED, and what to do.
         failures: (code, details) pairs; each call takes one and fails with it, until none is left.
@@ -69,7 +69,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             at most 20 s, and nothing else does so.
         hold: while cleared, calls wait (at most 20 s) before they are answered.
         calls: names of the methods called, in order.
-        wishes: what SetPreviewMode was asked.
+        preview_requests: of SetPreviewMode, in order.
     """
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             gateway_name="lab-1", gateway_version="1.2.3", configuration_json='{"name": "lab-1"}'
         )
         self.failures: deque[tuple[grpc.StatusCode, str]] = deque()
-        self.preview_becomes: deque[int] = deque()
+        self.preview_becomes: deque[states.PreviewState.ValueType] = deque()
         self.fault = "no encoder works. Type: robot-preview encoders"
         self.accept = True
         self.works = True
@@ -88,20 +88,20 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self.hold = threading.Event()
         self.hold.set()
         self.calls: list[str] = []
-        self.wishes: list[robot_gateway_pb2.SetPreviewModeRequest] = []
+        self.preview_requests: list[robot_gateway_pb2.SetPreviewModeRequest] = []
 
-    def GetSystemStatus(self, request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
+    def GetSystemStatus(self, _request: Any, context: Any) -> system_status_pb2.SystemStatus:  # noqa: N802
         self._begin("GetSystemStatus", context)
         self._preview_moves_on()
         return self.status
 
-    def GetOverlaySnapshot(self, request: Any, context: Any) -> overlay_pb2.OverlaySnapshot:  # noqa: N802
+    def GetOverlaySnapshot(self, _request: Any, context: Any) -> overlay_pb2.OverlaySnapshot:  # noqa: N802
         self._begin("GetOverlaySnapshot", context)
         self.overlay.status.CopyFrom(self.status)
         return self.overlay
 
     def GetGatewayInfo(  # noqa: N802
-        self, request: Any, context: Any
+        self, _request: Any, context: Any
     ) -> robot_gateway_pb2.GetGatewayInfoResponse:
         self._begin("GetGatewayInfo", context)
         return self.info
@@ -110,7 +110,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         self, request: robot_gateway_pb2.SetPreviewModeRequest, context: Any
     ) -> robot_gateway_pb2.SetPreviewModeResponse:
         self._begin("SetPreviewMode", context)
-        self.wishes.append(request)
+        self.preview_requests.append(request)
         if request.enabled and request.profile not in preview_pb2.PreviewProfile.values():
             context.abort(grpc.StatusCode.INVALID_ARGUMENT, f"profile {request.profile} does not exist")
         self.preview_answers.wait(_HELD_AT_MOST_S)
@@ -118,6 +118,15 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         return robot_gateway_pb2.SetPreviewModeResponse(
             accepted=self.accept, message=message, preview=self.status.preview
         )
+
+    def Ping(self, _request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
+
+    def WatchSystemStatus(self, _request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
+
+    def SubscribeEvents(self, _request: Any, context: Any) -> Never:  # noqa: N802
+        _not_offered(context)
 
     def preview_service_dies(self) -> None:
         """From now on nobody makes video; what is wanted stays wanted."""
@@ -166,6 +175,11 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
         preview = self.status.preview
         preview.state, preview.last_error = states.PREVIEW_FAULTED, why
         preview.counters.faults += 1
+
+
+def _not_offered(context: grpc.ServicerContext) -> Never:
+    """A gateway of the first release: clients poll the status instead of watching it."""
+    context.abort(grpc.StatusCode.UNIMPLEMENTED, "Method not implemented!")
 
 
 def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 
 
 def complaints(recording: Path) -> str:
-    """What ffmpeg says while it decodes every picture; empty when it has nothing to say."""
+    """What ffmpeg says while it decodes every frame; empty when it has nothing to say."""
     command = ["ffmpeg", "-v", "warning", "-xerror", "-err_detect", "explode", "-i", str(recording)]
     return _run(*command, "-f", "null", "-").stderr.strip()
 
 
-def decoded_pictures(recording: Path) -> int:
-    """How many pictures ffprobe decodes."""
+def decoded_frames(recording: Path) -> int:
+    """How many frames ffprobe decodes."""
     entries = "stream=nb_read_frames"
     command = ["ffprobe", "-v", "error", "-count_frames", "-select_streams", "v:0", "-show_entries", entries]
     found: dict[str, Any] = json.loads(_run(*command, "-of", "json", str(recording)).stdout)

@@ -36,7 +36,7 @@ class LampModel:
 
     initial = LampSpec()
 
-    def adopt(self, spec: LampSpec, report: LampReport) -> tuple[LampSpec, bool]:
+    def adopt(self, spec: LampSpec, report: LampReport) -> tuple[LampSpec, bool]:  # noqa: ARG002  # the protocol's
         return LampSpec(report.percent), False
 
     def take_report(self, spec: LampSpec, report: LampReport, *, reapplying: bool) -> None:

@@ -1,5 +1,7 @@
 """Each module of tests ends with what it began with, or fails: processes, threads, sockets, descriptors.
 
+So does the whole run, because fixtures of the session end after the last module.
+
 A process that outlives its parent can't be found among the children of the test's own process: what a test
 starts carries a mark in its environment instead, and so does what that starts.
 """
@@ -22,10 +24,15 @@ import pytest
 
 _MARK: Final = "ROBOT_GATEWAY_TEST_RUN"
 GONE_WITHIN_S = 10.0
+_PORTS_OF_THE_PROCESS: Final = "@robot-gateway-ports-"
+"""The claim of a process on its block of free ports, which it keeps (tests/support/free.py)."""
+_GONE: Final = "gone"
 _UNNAMED: Final = "unnamed descriptor"
 _MAY_STAY: Final = Counter({_UNNAMED: 16})
 """gRPC's pollers and the buses of GStreamer pipelines go when Python's collector or Qt gets to it. Tests
 that leave one with each stream or connection are beyond this at the end of their module."""
+_MAY_STAY_OF_ALL: Final = Counter({_UNNAMED: 1024})
+"""What every module may leave adds up."""
 
 
 def pytest_configure() -> None:
@@ -33,13 +40,23 @@ def pytest_configure() -> None:
     os.environ[_MARK] = uuid.uuid4().hex
 
 
+@pytest.fixture(scope="session", autouse=True)
+def nothing_left_of_the_session() -> Iterator[None]:
+    """Fails the last test when a fixture of the session leaves something behind."""
+    yield from _nothing_left(_MAY_STAY_OF_ALL)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def nothing_left() -> Iterator[None]:
     """Fails the module's last test when the module leaves something behind."""
+    yield from _nothing_left(_MAY_STAY)
+
+
+def _nothing_left(may_stay: Counter[str]) -> Iterator[None]:
     before = _belongings()
     yield
     deadline_s = time.monotonic() + GONE_WITHIN_S
-    while left := _belongings() - before - _MAY_STAY:
+    while left := _belongings() - before - may_stay:
         if time.monotonic() > deadline_s:
             pytest.fail(f"left behind: {', '.join(sorted(left.elements()))}", pytrace=False)
         _collect()
@@ -60,8 +77,12 @@ def _belongings() -> Counter[str]:
 
 def _processes() -> Iterator[str]:
     mark = f"{_MARK}={os.environ[_MARK]}".encode()
+    statuses = {each.pid: _status(each) for each in psutil.Process().children(recursive=True)}
+    for pid, status in statuses.items():
+        if status == psutil.STATUS_ZOMBIE:
+            yield f"process {pid} (it has ended and was not waited for)"
     # A child that was started this instant may still be in execve(2), where its environment reads as empty.
-    children = {str(each.pid) for each in psutil.Process().children(recursive=True) if _runs(each)}
+    children = {str(pid) for pid, status in statuses.items() if status not in {psutil.STATUS_ZOMBIE, _GONE}}
     for directory in Path("/proc").glob("[0-9]*"):
         if directory.name == str(os.getpid()):
             continue
@@ -71,13 +92,14 @@ def _processes() -> Iterator[str]:
                 yield f"process {directory.name} ({b' '.join(words).decode(errors='replace')})"
 
 
-def _runs(process: psutil.Process) -> bool:
+def _status(process: psutil.Process) -> str:
     with suppress(psutil.NoSuchProcess):
-        return bool(process.status() != psutil.STATUS_ZOMBIE)
-    return False
+        return process.status()
+    return _GONE
 
 
 def _threads() -> Iterator[str]:
+    # Python's own: pools of foreign libraries keep idle threads, GLib's under the name of their last task.
     for thread in threading.enumerate():
         # gRPC's asyncio side starts one with its first use in a process, and keeps it.
         if "_poll_wrapper" not in thread.name:
@@ -90,8 +112,14 @@ def _descriptors() -> Iterator[str]:
         with suppress(OSError):  # That of this very listing.
             path, known = entry.readlink(), sockets.get(int(entry.name))
             if known and known.family in (socket.AF_INET, socket.AF_INET6):
-                yield f"socket {known.type.name} {known.laddr} {known.raddr or known.status}"
+                yield f"socket {known.type.name} {known.laddr} {known.raddr} {known.status}"
+            elif known and known.laddr:
+                # Unix sockets with an address: listeners, and what they have accepted.
+                if not str(known.laddr).startswith(_PORTS_OF_THE_PROCESS):
+                    yield f"socket {known.type.name} {known.laddr}"
             elif path.is_absolute():
                 yield f"file {path}"
+            elif path.name.startswith("pipe:"):
+                yield "pipe"
             else:
                 yield _UNNAMED

@@ -14,7 +14,7 @@ HEAVY = {"rclpy", "gi", "PySide6"}
 
 class _OutOfReach(MetaPathFinder):
     def find_spec(
-        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+        self, fullname: str, _path: Sequence[str] | None, _target: ModuleType | None = None
     ) -> ModuleSpec | None:
         if fullname.partition(".")[0] in HEAVY:
             raise ModuleNotFoundError(f"{fullname} is out of reach in unit tests", name=fullname)

@@ -16,13 +16,13 @@ _CODECS = {0x1B: "h264", 0x24: "h265"}
 
 
 @dataclass(frozen=True)
-class Picture:
+class AccessUnit:
     """One access unit of video.
 
     Args:
         pts: presentation time on the 90 kHz clock.
         nal_types: of its NAL units, in order.
-        key: whether it is an IDR picture.
+        key: whether it is an key frame (IDR).
         headed: whether its parameter sets come with it, before the first slice.
         sized: whether its PES packet says how long it is.
     """
@@ -47,9 +47,9 @@ class Stream:
     table_times_ms: dict[str, list[float]] = field(default_factory=lambda: {"PAT": [], "PMT": []})
     clock_times_ms: list[float] = field(default_factory=list)
     """The clock references (PCR), by their own word."""
-    pictures: list[Picture] = field(default_factory=list)
+    access_units: list[AccessUnit] = field(default_factory=list)
     whole_bytes: int = 0
-    """Up to where the stream holds whole pictures: a recording rarely ends with one."""
+    """Up to where the stream holds whole access units: a recording rarely ends with one."""
 
     @property
     def longest_without_pat_ms(self) -> float:
@@ -162,7 +162,7 @@ class _Analysis:
         if _crc32(section):
             self._found.broken_tables += 1
             return
-        # A table belongs to the picture that follows it, so to the next clock reference.
+        # A table belongs to the access unit that follows it, so to the next clock reference.
         self._tables_before_clock.append(name)
         if name == "PAT":
             self._pmt_pid = (section[10] & 0x1F) << 8 | section[11]
@@ -189,8 +189,8 @@ class _Analysis:
         kinds = tuple(_nal_types(stream, self._found.codec))
         slices, idr, parameters = _KINDS[self._found.codec]
         first_slice = next((at for at, kind in enumerate(kinds) if kind in slices), len(kinds))
-        self._found.pictures.append(
-            Picture(
+        self._found.access_units.append(
+            AccessUnit(
                 pts=pts,
                 nal_types=kinds,
                 key=any(kind in idr for kind in kinds),

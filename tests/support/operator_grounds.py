@@ -30,10 +30,10 @@ class Ground(ABC):
     def nothing_starts(self) -> Iterator[None]:
         """While the block lasts no pipeline can start."""
 
+    @abstractmethod
     @asynccontextmanager
-    async def undisturbed(self) -> AsyncIterator[None]:
-        """Somebody watches; afterwards they have noticed nothing. The double has nobody to disturb."""
-        yield
+    def undisturbed(self) -> AsyncIterator[None]:
+        """Fails if viewers of the running preview lose the stream in the block."""
 
     @abstractmethod
     def kill_preview(self) -> None:
@@ -61,9 +61,9 @@ class RealGround(Ground):
     @asynccontextmanager
     async def undisturbed(self) -> AsyncIterator[None]:
         with Watcher(self._preview.port) as viewer:
-            await asyncio.to_thread(viewer.wait_for_pictures, 5)
+            await asyncio.to_thread(viewer.wait_for_frames, 5)
             yield
-            await asyncio.to_thread(viewer.wait_for_pictures, 5)
+            await asyncio.to_thread(viewer.wait_for_frames, 5)
             assert viewer.reconnects == 0
 
     def kill_preview(self) -> None:
@@ -86,6 +86,17 @@ class DoubleGround(Ground):
         self._double.works = False
         yield
         self._double.works = True
+
+    @asynccontextmanager
+    async def undisturbed(self) -> AsyncIterator[None]:
+        before = self._stream()
+        yield
+        assert self._stream() == before
+
+    def _stream(self) -> tuple[int, int, int, str]:
+        """Returns what changes when the stream is lost: each start begins another one."""
+        preview = self._double.status.preview
+        return preview.state, preview.counters.starts, preview.counters.faults, preview.endpoint.uri
 
     def kill_preview(self) -> None:
         self._double.preview_service_dies()

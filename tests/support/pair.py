@@ -23,7 +23,12 @@ _QOS = QoSProfile(depth=1000)
 
 def main() -> None:
     over = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+
+    def wait_for_the_end() -> None:
+        sys.stdin.read()
+        over.set()
+
+    threading.Thread(target=wait_for_the_end, daemon=True).start()
     context = Context()
     context.init(args=[], initialize_logging=False)
     node = Node("pair_" + sys.argv[1], context=context, use_global_arguments=False, enable_rosout=False)

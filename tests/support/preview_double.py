@@ -95,7 +95,7 @@ class PreviewDouble(PreviewServiceServicer):
             self.actual.counters.faults += 1
             self.actual.last_error = "no camera found; plug one in"
 
-    async def WatchActualState(self, request: Any, context: Any) -> AsyncIterator[Any]:  # type: ignore[override]  # noqa: N802
+    async def WatchActualState(self, _request: Any, _context: Any) -> AsyncIterator[Any]:  # noqa: N802
         while True:
             await self.thawed.wait()
             self._changed.clear()
@@ -109,7 +109,7 @@ class PreviewDouble(PreviewServiceServicer):
             except TimeoutError:
                 pass  # time for a heartbeat
 
-    async def ListEncoders(self, request: Any, context: Any) -> Any:  # noqa: N802  # grpc's name
+    async def ListEncoders(self, _request: Any, _context: Any) -> Any:  # noqa: N802  # grpc's name
         return pb.ListEncodersResponse()
 
 

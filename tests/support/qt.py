@@ -1,4 +1,4 @@
-"""Qt without a screen: one application for all tests of a run, waiting in its event loop, pictures kept."""
+"""Qt without a screen: one application for all tests of a run, waiting in its event loop, screenshots."""
 
 import os
 import time
@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 T = TypeVar("T")
 KEPT_IN = Path(__file__).parents[2] / "artifacts" / "monitor"
-"""Pictures of windows; git does not look there."""
+"""Screenshots of windows; git does not look there."""
 _LAID_OUT_AFTER_S = 0.3
 """Texts that have just changed have found their place."""
 LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
@@ -50,7 +50,7 @@ def let_pass(seconds: float) -> None:
     loop.exec()
 
 
-def until(condition: Callable[[], T], what: str, within_s: float = 20.0) -> T:
+def until(condition: Callable[[], T | None], what: str, within_s: float = 20.0) -> T:
     """Runs the event loop until the condition is true, and gives what it gave; fails after `within_s`."""
     deadline_s = time.monotonic() + within_s
     while not (answer := condition()):
@@ -69,7 +69,7 @@ def press(
     QTest.keyClick(widget, key, *modifier)
 
 
-def keep_picture(widget: QWidget, name: str) -> Path:
+def keep_screenshot(widget: QWidget, name: str) -> Path:
     """A screenshot, as an artefact; in lossless PNG."""
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"

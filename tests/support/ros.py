@@ -32,9 +32,9 @@ class SimulatedRobot:
     process: subprocess.Popen[str]
     control: Path
 
-    def change(self, **wish: Any) -> dict[str, Any]:
+    def change(self, **desired: Any) -> dict[str, Any]:
         """Changes its behaviour."""
-        return ask(self.control, wish)
+        return ask(self.control, desired)
 
 
 @contextmanager

@@ -22,6 +22,11 @@ from tests.support.free import free_tcp_port
 UP_WITHIN_S = 10.0
 
 
+def raw_unary(channel: grpc.aio.Channel, path: str) -> "grpc.aio.UnaryUnaryMultiCallable[bytes, bytes]":
+    """Returns a method that takes and gives bytes as they are on the wire."""
+    return channel.unary_unary(path)
+
+
 @dataclass
 class Operator:
     """Calls a gateway over a real connection."""

@@ -66,7 +66,7 @@ class RunningPreview:
         self._config.write_text(yaml.safe_dump(_merged(own, settings or {})), encoding="utf-8")
         self.process = self._spawn()
         self.channel = grpc.insecure_channel(f"unix:{self.socket}")
-        self.stub = pb_grpc.PreviewServiceStub(self.channel)  # type: ignore[no-untyped-call]
+        self.stub = pb_grpc.PreviewServiceStub(self.channel)
 
     def __enter__(self) -> Self:
         wait_until(

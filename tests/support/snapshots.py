@@ -22,7 +22,7 @@ def snapshot_of(made: overlay_pb2.OverlaySnapshot) -> OverlaySnapshot:
     return GET_OVERLAY_SNAPSHOT.decode(made.SerializeToString())
 
 
-def snapshot(change: Callable[[overlay_pb2.OverlaySnapshot], object] = lambda made: None) -> OverlaySnapshot:
+def snapshot(change: Callable[[overlay_pb2.OverlaySnapshot], object] = lambda _: None) -> OverlaySnapshot:
     """A healthy robot but for a change."""
     made = message()
     change(made)

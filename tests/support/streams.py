@@ -21,7 +21,7 @@ _ENCODERS = {
 def encode(
     codec: str, frames: int, *, gop: int = 30, size: str = "320x240", fps: int = 30, kbps: int = 1000
 ) -> list[bytes]:
-    """A moving test picture in an MPEG transport stream, cut into one piece per picture.
+    """A moving test pattern in an MPEG transport stream, cut into one piece per frame.
 
     Every piece ends with the end of its access unit; key frames carry their parameter sets.
     """
@@ -41,7 +41,7 @@ def encode(
             units = sample.get_buffer_list()
             buffers = [units.get(i) for i in range(units.length())] if units else [sample.get_buffer()]
             pieces.append(b"".join(one.extract_dup(0, one.get_size()) for one in buffers))
-        assert len(pieces) == frames, f"{codec}: {len(pieces)} of {frames} pictures encoded"
+        assert len(pieces) == frames, f"{codec}: {len(pieces)} of {frames} frames encoded"
     finally:
         pipeline.set_state(Gst.State.NULL)
     return pieces

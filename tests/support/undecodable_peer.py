@@ -22,7 +22,12 @@ _PUBLISH_EVERY_S: Final = 0.1
 
 def main(topic: str) -> None:
     ended = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+
+    def wait_for_the_end() -> None:
+        sys.stdin.read()
+        ended.set()
+
+    threading.Thread(target=wait_for_the_end, daemon=True).start()
     context = Context()
     context.init(args=[], initialize_logging=False)
     node = Node(_NAME.decode(), context=context, use_global_arguments=False, enable_rosout=False)

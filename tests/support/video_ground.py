@@ -50,7 +50,8 @@ class VideoGround:
         }
         config = self.directory / "gateway.yaml"
         config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-        command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", config]
+        program = [sys.executable, "-c", "from gateway.cli import main; main()"]
+        command = [*program, "serve", "--config", str(config)]
         with (self.directory / "gateway.log").open("ab") as log:
             self.gateway = subprocess.Popen(command, cwd=_ROOT, stderr=log)
         wait_until(self._knows_the_preview, "the gateway is up", _UP_WITHIN_S)
@@ -99,7 +100,7 @@ def video_ground(
         directory: for everything both programs write.
         preview: keys of its configuration.
         gateway: keys of its configuration.
-        small: pictures of 320x240 instead of 1280x720.
+        small: frames of 320x240 instead of 1280x720.
     """
     with RunningPreview(directory, preview, small=small) as service:
         ground = VideoGround(service, directory, gateway or {})

@@ -7,7 +7,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def wait_until(condition: Callable[[], T], what: str, within_s: float = 15.0) -> T:
+def wait_until(condition: Callable[[], T | None], what: str, within_s: float = 15.0) -> T:
     """Asks again and again until the answer is true, and gives it; fails the test after `within_s`."""
     deadline = time.monotonic() + within_s
     while not (answer := condition()):

@@ -44,7 +44,7 @@ class Watcher:
         arrivals = list(self.arrivals_s)
         return max((after - before for before, after in pairwise(arrivals)), default=0.0)
 
-    def wait_for_pictures(self, count: int) -> None:
+    def wait_for_frames(self, count: int) -> None:
         """Waits for `count` more frames."""
         expected = len(self.arrivals_s) + count
         wait_until(lambda: len(self.arrivals_s) >= expected, f"{count} more frames", 20)

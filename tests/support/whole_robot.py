@@ -48,7 +48,8 @@ class WholeRobot:
             "preview": {"socket": str(self.preview.socket)},
         }
         config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-        command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", config]
+        program = [sys.executable, "-c", "from gateway.cli import main; main()"]
+        command = [*program, "serve", "--config", str(config)]
         with (self.directory / "gateway.log").open("ab") as log:
             self.gateway = subprocess.Popen(command, cwd=_ROOT, stderr=log)
         wait_until(self._listens, "the gateway listens", _UP_WITHIN_S)

@@ -26,7 +26,7 @@ _MAX_MESSAGE_LENGTH: Final = 300
 
 
 @reads("omniseer_msgs/msg/VisionPerfSummary", VISION)
-def from_vision_perf(message: Any, source: SourceSettings) -> Vision:
+def from_vision_perf(message: Any, _source: SourceSettings) -> Vision:
     """Returns rates, latest inference time and error counts. A rate that is not finite counts as 0."""
     return Vision(
         producer_fps=finite_or_zero(message.producer_fps),
@@ -38,7 +38,7 @@ def from_vision_perf(message: Any, source: SourceSettings) -> Vision:
 
 
 @reads("sensor_msgs/msg/BatteryState", BATTERY)
-def from_battery_state(message: Any, source: SourceSettings) -> Battery:
+def from_battery_state(message: Any, _source: SourceSettings) -> Battery:
     """Returns the state of one battery. NaN means unknown in every field of this message."""
     return Battery(
         present=bool(message.present),
@@ -49,14 +49,14 @@ def from_battery_state(message: Any, source: SourceSettings) -> Battery:
 
 
 @reads("std_msgs/msg/String", MODE)
-def from_string(message: Any, source: SourceSettings) -> Mode | None:
+def from_string(message: Any, _source: SourceSettings) -> Mode | None:
     """Returns the mode; None if the text is empty."""
     mode = one_line(message.data).strip()
     return Mode(mode) if mode else None
 
 
 @reads("diagnostic_msgs/msg/DiagnosticArray", DIAGNOSTICS, header_and_list=True)
-def from_diagnostic_array(message: Any, source: SourceSettings) -> Diagnostics:
+def from_diagnostic_array(message: Any, _source: SourceSettings) -> Diagnostics:
     """Returns the components of this message, without their key-value pairs."""
     return Diagnostics(tuple(_item(status) for status in message.status[:MAX_COMPONENTS]))
 

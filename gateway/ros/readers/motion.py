@@ -27,7 +27,7 @@ def from_twist_stamped(message: Any, source: SourceSettings) -> Velocity | None:
 
 
 @reads("geometry_msgs/msg/Twist", *_COMMANDS)
-def from_twist(message: Any, source: SourceSettings) -> Velocity | None:
+def from_twist(message: Any, _source: SourceSettings) -> Velocity | None:
     """Returns the command; None if it is not finite: no robot can follow it."""
     velocity = all_finite(message.linear.x, message.linear.y, message.angular.z)
     return Velocity(*velocity) if velocity else None

@@ -113,7 +113,7 @@ class AuditStart(Interceptor[CallContext]):
             self._audit.record_start(call)
         return request
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets the call."""
         self._started.discard(call)
 

@@ -26,7 +26,7 @@ CHECK_EVERY_S: Final = 0.25
 """How often credentials are checked for expiry; changes of their list are applied at once."""
 _ABORT_WITHIN_S: Final = 0.25
 """How long a caller has to take the status of a stream that ends; one that doesn't read gets none."""
-TOKEN_HEADER: Final = "authorization"
+TOKEN_HEADER: Final = "authorization"  # noqa: S105  # a name
 """Bearer tokens travel as in HTTP (RFC 6750 2.1)."""
 _SCHEME: Final = "bearer"
 _CERTIFICATE: Final = "x509_pem_cert"
@@ -81,24 +81,24 @@ class Auth(Interceptor[CallContext]):
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:
             task = asyncio.current_task()
-            assert task is not None, "gRPC serves each call in a task of its own"
+            assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
 
-    def on_response(self, call: CallContext, response: Any) -> None:
+    def on_response(self, call: CallContext, _response: Any) -> None:
         """Withholds the response of a caller that lost access while it waited: it may hold a new secret.
 
         Raises:
             NotAuthenticatedError: the credential is no longer valid.
         """
         principal = call.principal
-        assert principal is not None, "on_call has set it"
+        assert principal is not None  # noqa: S101  # on_call has set it
         # Its own principal is there unless another call has replaced it, or the caller has lost access.
         if self._admitted.get(principal.credential_ids) is principal:
             return
         if not self._authenticator.still_valid(principal):
             raise _access_lost()
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
         self._streams.pop(call, None)
 
@@ -161,7 +161,7 @@ class Auth(Interceptor[CallContext]):
         if by_certificate and by_token:
             return combined(by_certificate, by_token)
         found = by_certificate or by_token
-        assert found is not None, "one of them was shown"
+        assert found is not None  # noqa: S101  # one of them was shown
         return found
 
     def _knows(self, token: str | None, fingerprint: str | None) -> bool:

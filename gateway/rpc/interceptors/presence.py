@@ -47,7 +47,7 @@ class Presence(Interceptor[CallContext]):
         client = self._clients.setdefault(call.peer.address, _Client(self._clock()))
         client.streams += 1
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Reports a client that had joined and closes its last stream."""
         address = call.peer.address
         client = self._clients[address]

@@ -85,7 +85,7 @@ class RateLimit(Interceptor[CallContext]):
             self._admission.take_token(call.peer)
         return request
 
-    def on_end(self, call: CallContext, error: BaseException | None) -> None:
+    def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Gives the stream back."""
         if call.method.streaming:
             self._admission.close_stream(call.peer)

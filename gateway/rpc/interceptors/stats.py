@@ -98,7 +98,7 @@ class Stats(Interceptor[CallContext]):
             self._note_active(call.peer.connection)
         return request
 
-    def on_response(self, call: CallContext, response: Any) -> None:
+    def on_response(self, call: CallContext, _response: Any) -> None:
         """Counts the first response, and notes the connection of a stream as active."""
         if not call.responded:
             call.responded = True

@@ -37,7 +37,7 @@ class Validation(Interceptor[CallContext]):
             InvalidRequestError: it can't be parsed, or breaks rules; each broken rule is named.
         """
         message_type = call.method.request_type
-        assert message_type is not None, "the contract's methods have one"
+        assert message_type is not None  # noqa: S101  # the contract's methods have one
         if len(request) > self._max_request_bytes:
             raise TooMuchError(
                 f"a request of {len(request)} bytes is too long; the limit is {self._max_request_bytes}",

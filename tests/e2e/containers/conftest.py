@@ -9,7 +9,10 @@ from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed
 
 
 @pytest.fixture(scope="session")
-def _shared_demo(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Deployment]:
+def _shared_demo(
+    tmp_path_factory: pytest.TempPathFactory,
+    images: str,  # noqa: ARG001  # for its effect
+) -> Iterator[Deployment]:
     with deployed(tmp_path_factory.mktemp("demo"), demo_overlay()) as deployment:
         yield deployment
 
@@ -22,7 +25,7 @@ def demo(_shared_demo: Deployment) -> Deployment:
 
 
 @pytest.fixture
-def own_demo(tmp_path: Path, images: str) -> Iterator[Deployment]:
+def own_demo(tmp_path: Path, images: str) -> Iterator[Deployment]:  # noqa: ARG001  # for its effect
     """The same for this test alone, which leaves traces that a reset does not remove."""
     with deployed(tmp_path, demo_overlay()) as deployment, deployment.client() as robot:
         deployment.wait_for_status(robot)

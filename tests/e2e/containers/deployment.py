@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -117,12 +118,12 @@ class Deployment:
 
     def wait_healthy(self, *services: str) -> None:
         """Waits for the containers' own health checks."""
+
+        def healthy(service: str) -> bool:
+            return bool(self.inspect(service)["State"]["Health"]["Status"] == "healthy")
+
         for service in services:
-            wait_until(
-                lambda service=service: self.inspect(service)["State"]["Health"]["Status"] == "healthy",
-                f"{service} is healthy",
-                60,
-            )
+            wait_until(partial(healthy, service), f"{service} is healthy", 60)
 
     def wait_for_status(self, robot: GatewayClient) -> SystemStatus:
         """Waits until the robot's graph is seen and the preview is there."""

@@ -15,7 +15,8 @@ WRONG = "grpc: {prot: 50051}\n"
 THE_LINE = "unknown key 'grpc.prot'"
 
 
-def test_a_wrong_configuration_ends_the_start_with_one_line(tmp_path: Path, images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_a_wrong_configuration_ends_the_start_with_one_line(tmp_path: Path) -> None:
     config = tmp_path / "gateway.yaml"
     config.write_text(WRONG, encoding="utf-8")
     with deployed(tmp_path, demo_overlay(), up=False, GATEWAY_CONFIG=str(config)) as deployment:
@@ -31,7 +32,8 @@ def test_a_wrong_configuration_ends_the_start_with_one_line(tmp_path: Path, imag
         )
 
 
-def test_a_configuration_broken_later_is_told_at_every_attempt(tmp_path: Path, images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_a_configuration_broken_later_is_told_at_every_attempt(tmp_path: Path) -> None:
     config = tmp_path / "gateway.yaml"
     config.write_text("name: good\n", encoding="utf-8")
     with (
@@ -54,7 +56,8 @@ def test_a_configuration_broken_later_is_told_at_every_attempt(tmp_path: Path, i
         deployment.wait_for_status(robot)
 
 
-def test_a_socket_that_cannot_be_made_is_one_line(tmp_path: Path, images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_a_socket_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     with deployed(tmp_path, up=False) as deployment:
         done = deployment.run(
             "run", "--rm", "--no-deps", "-e", "PREVIEW__SOCKET=/etc/robot-gateway/preview.sock", "preview",
@@ -81,7 +84,7 @@ def test_full_disks_stop_neither_status_nor_video(own_demo: Deployment) -> None:
     with own_demo.client() as robot:
         assert robot.enable_preview().preview.state is PreviewState.RUNNING
         with Watcher(own_demo.preview_port) as viewer:
-            viewer.wait_for_pictures(30)
+            viewer.wait_for_frames(30)
         # The volume of the socket stays full, because the gateway holds it.
         own_demo.run("restart", "preview")
         wait_until(lambda: robot.status().preview.state is PreviewState.RUNNING, "the preview is back", 30)

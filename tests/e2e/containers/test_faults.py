@@ -43,7 +43,7 @@ def first_picture_s(viewer: Watcher, since_s: float) -> float:
 def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
-        viewer.wait_for_pictures(30)
+        viewer.wait_for_frames(30)
         killed_s = time.time()
         demo.signal_all("preview", signal.SIGKILL)
 
@@ -63,7 +63,7 @@ def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> 
 def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.LOW_BW)
-        viewer.wait_for_pictures(15)
+        viewer.wait_for_frames(15)
         stopped_s = time.time()
         demo.signal_all("preview", signal.SIGSTOP)
         try:
@@ -84,12 +84,12 @@ def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
     """Viewers keep their picture: the preview goes on for timeouts.without_gateway_s, 30 s here."""
     with demo.client() as robot, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
-        viewer.wait_for_pictures(30)
+        viewer.wait_for_frames(30)
         calls = viewer.reconnects
         demo.signal_all("gateway", signal.SIGKILL)
         back_s = restarted_s(demo, "gateway", 0)
         status = demo.wait_for_status(robot)
-        viewer.wait_for_pictures(30)
+        viewer.wait_for_frames(30)
 
         assert time.time() - back_s < 30
         assert viewer.reconnects == calls
@@ -100,7 +100,8 @@ def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
         assert status.preview.profile is PreviewProfile.BALANCED
 
 
-def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path, images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
     """Documented: after timeouts.without_gateway_s, here 2 s, and the port is free again."""
     config = tmp_path / "preview.yaml"
     config.write_text("source: {kind: test}\ntimeouts: {without_gateway_s: 2}\n", encoding="utf-8")
@@ -120,4 +121,4 @@ def test_both_restarted_in_either_order_find_each_other(demo: Deployment, order:
         demo.wait_for_status(robot)
         assert robot.enable_preview(PreviewProfile.BALANCED).preview.state is PreviewState.RUNNING
         with Watcher(demo.preview_port) as viewer:
-            viewer.wait_for_pictures(30)
+            viewer.wait_for_frames(30)

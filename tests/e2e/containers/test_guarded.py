@@ -83,7 +83,10 @@ def added(deployment: Deployment, name: str, role: str) -> Credentials:
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Guarded]:
+def guarded(
+    tmp_path_factory: pytest.TempPathFactory,
+    images: str,  # noqa: ARG001  # for its effect
+) -> Iterator[Guarded]:
     overlays = (demo_overlay(), str(ROOT / "compose.guarded.yaml"))
     with deployed(tmp_path_factory.mktemp("guarded"), *overlays, up=False) as deployment:
         refused = typed(deployment, UP)
@@ -208,7 +211,7 @@ def test_a_viewer_looks_on_an_operator_switches_and_both_are_in_the_audit_log(gu
         assert stream
         assert stream.encrypted
         with Watcher(robot.preview_port, stream.passphrase) as looking_on:
-            looking_on.wait_for_pictures(30)
+            looking_on.wait_for_frames(30)
         # The door is guarded, and so is the window.
         for passphrase in ("", "x" * len(stream.passphrase)):
             address = StreamAddress("127.0.0.1", robot.preview_port, passphrase=passphrase)

@@ -37,7 +37,8 @@ def layers_of(image: str) -> object:
     return json.loads(docker("image", "inspect", "--format", "{{json .RootFS.Layers}}", image))
 
 
-def test_each_package_is_listed_with_its_version(images: str) -> None:
+@pytest.mark.usefixtures("images")
+def test_each_package_is_listed_with_its_version() -> None:
     listed = [line.split() for line in scripts_images("packages").stdout.splitlines()]
     versions = {(image, package): version for image, package, version in listed}
     assert {image for image, _ in versions} == set(IMAGES)
@@ -48,7 +49,8 @@ def test_each_package_is_listed_with_its_version(images: str) -> None:
     assert versions["robot-preview", "gstreamer1.0-plugins-bad"] == inside
 
 
-def test_images_that_were_saved_and_loaded_are_the_same(images: str, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("images")
+def test_images_that_were_saved_and_loaded_are_the_same(tmp_path: Path) -> None:
     file = tmp_path / "images.tar.gz"
     for image in IMAGES:
         docker("tag", f"{image}:{TAG}", f"{image}:{CARRIED}")
@@ -65,13 +67,15 @@ def test_images_that_were_saved_and_loaded_are_the_same(images: str, tmp_path: P
         docker("image", "rm", "--force", *(f"{image}:{CARRIED}" for image in IMAGES))
 
 
-def test_a_damaged_file_is_refused(images: str, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("images")
+def test_a_damaged_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "images.tar.gz"
     file.write_bytes(b"no archive")
     assert scripts_images("load", str(file)).returncode != 0
 
 
-def test_saving_what_was_not_built_leaves_no_file(images: str, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("images")
+def test_saving_what_was_not_built_leaves_no_file(tmp_path: Path) -> None:
     file = tmp_path / "images.tar.gz"
     ended = scripts_images("save", str(file), tag="never-built")
     assert ended.returncode == 1

@@ -28,7 +28,7 @@ def test_status_then_video_then_quiet(demo: Deployment) -> None:
             demo.preview_port,
         )
         with Watcher(demo.preview_port) as viewer:
-            viewer.wait_for_pictures(60)
+            viewer.wait_for_frames(60)
             assert demo.preview_port in udp_ports(demo, "preview")
 
         assert robot.disable_preview().preview.state is PreviewState.DISABLED

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -47,8 +48,9 @@ def one_of_the_pair(role: str, env: dict[str, str]) -> Iterator[subprocess.Popen
         process.communicate()
 
 
+@pytest.mark.usefixtures("images")
 def test_a_killed_gateway_costs_the_robots_own_pair_nothing(
-    tmp_path: Path, images: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with on_the_robot(tmp_path) as deployment, deployment.client() as operator:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(deployment.domain))
@@ -62,11 +64,13 @@ def test_a_killed_gateway_costs_the_robots_own_pair_nothing(
             assert talker.stdout.readline() == "met\n"
             deployment.compose.start()
             deployment.wait_for_status(operator)
+
+            def restarted(more_than: int) -> bool:
+                return deployment.restarts("gateway") > more_than
+
             for kill in range(3):
                 deployment.signal_all("gateway", signal.SIGKILL)
-                wait_until(
-                    lambda kill=kill: deployment.restarts("gateway") > kill, "the engine starts it again", 30
-                )
+                wait_until(partial(restarted, kill), "the engine starts it again", 30)
                 deployment.wait_for_status(operator)
             sent = int(talker.communicate("", timeout=20)[0])
             got = json.loads(listener.communicate("", timeout=20)[0])

@@ -19,6 +19,7 @@ from gateway.rpc.calls.methods import ROLES
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot
+from tests.support.running_gateway import raw_unary
 
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
 REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
@@ -39,18 +40,19 @@ async def called(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[gr
     metadata = login.metadata()
     try:
         if path == REFLECTION:
-            both_ways = channel.stream_stream(path)(metadata=metadata, timeout=10)
+            both_ways: Any = channel.stream_stream(path)(metadata=metadata, timeout=10)
             await both_ways.write(
                 reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString()
             )
             await both_ways.read()
             both_ways.cancel()
         elif PATHS[path][1]:
-            stream: Any = channel.unary_stream(path)(b"", metadata=metadata, timeout=10)
+            method: grpc.aio.UnaryStreamMultiCallable[bytes, bytes] = channel.unary_stream(path)
+            stream: Any = method(b"", metadata=metadata, timeout=10)
             await stream.read()
             stream.cancel()
         else:
-            await channel.unary_unary(path)(b"", metadata=metadata, timeout=10)
+            await raw_unary(channel, path)(b"", metadata=metadata, timeout=10)
     except grpc.aio.AioRpcError as error:
         return error.code(), refusal_in(error.trailing_metadata()).reason
     return OK, ""
@@ -156,11 +158,11 @@ async def test_a_token_beside_a_certificate_never_gives_more_than_either(tmp_pat
 
 async def test_health_is_for_everybody_and_nothing_else_is(tmp_path: Path) -> None:
     async with guarded_gateway(new_robot(tmp_path / "a")) as robot:
-        check = robot.channel().unary_unary("/grpc.health.v1.Health/Check")
+        check = raw_unary(robot.channel(), "/grpc.health.v1.Health/Check")
         answer = health_pb2.HealthCheckResponse.FromString(await check(b"", timeout=5))
         assert answer.status == health_pb2.HealthCheckResponse.SERVING
         with pytest.raises(grpc.aio.AioRpcError) as caught:
-            await robot.channel().unary_unary("/omniseer.gateway.v1.RobotGateway/Nothing")(b"", timeout=5)
+            await raw_unary(robot.channel(), f"/{SERVICE.full_name}/Nothing")(b"", timeout=5)
         assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
 

@@ -304,7 +304,7 @@ async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path:
                     )
         expected = ["ben", *["a stranger"] * BURST, "ben"]
 
-        seen = []
+        seen: list[str] = []
         async with asyncio.timeout(20):
             while len(seen) < len(expected):
                 answer = await events.read()

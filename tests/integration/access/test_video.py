@@ -47,7 +47,7 @@ async def test_whoever_is_known_gets_the_passphrase_in_every_answer(tmp_path: Pa
     shown = robot.add(Role.OPERATOR)[1].metadata()
     server = await serve_double(robot.directory.path / "preview.sock", double)
     try:
-        async with guarded_gateway(robot, grpc={"host": "0.0.0.0"}):
+        async with guarded_gateway(robot, grpc={"host": "0.0.0.0"}):  # noqa: S104  # what this test is about
             calls: Any = RobotGatewayStub(robot.channel())
 
             async def switched() -> Any:
@@ -142,7 +142,7 @@ async def test_where_nobody_is_asked_only_this_machine_gets_it(tmp_path: Path, o
             running_gateway(
                 tmp_path / "p.sock",
                 port=port,
-                grpc={"host": "0.0.0.0", "port": port},
+                grpc={"host": "0.0.0.0", "port": port},  # noqa: S104  # what this test is about
                 preview={"encrypted": True},
                 security={"insecure": True},
             ) as near,

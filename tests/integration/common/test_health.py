@@ -6,6 +6,7 @@ import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import grpc
 import pytest
@@ -57,8 +58,9 @@ async def test_the_whole_serves_whatever_its_parts_do() -> None:
 
 async def test_an_unknown_service_is_not_found_with_the_reason_for_programs() -> None:
     async with serving(Health()) as target, grpc.aio.insecure_channel(target) as channel:
+        stub: Any = HealthStub(channel)  # its type has no methods
         with pytest.raises(grpc.aio.AioRpcError) as caught:
-            await HealthStub(channel).Check(HealthCheckRequest(service="nothing"))
+            await stub.Check(HealthCheckRequest(service="nothing"))
     assert caught.value.code() is grpc.StatusCode.NOT_FOUND
     assert refusal_in(caught.value.trailing_metadata()).reason == Reason.UNKNOWN_SERVICE
 
@@ -66,7 +68,7 @@ async def test_an_unknown_service_is_not_found_with_the_reason_for_programs() ->
 async def test_watchers_learn_every_change_and_unknown_names_once_they_are_known() -> None:
     health = Health()
     async with serving(health) as target, grpc.aio.insecure_channel(target) as channel:
-        watch = channel.unary_stream(
+        watch: Any = channel.unary_stream(
             "/grpc.health.v1.Health/Watch",
             HealthCheckRequest.SerializeToString,
             HealthCheckResponse.FromString,

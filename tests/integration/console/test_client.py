@@ -61,7 +61,7 @@ def face(request: pytest.FixtureRequest) -> type[Face]:
     return request.param  # type: ignore[no-any-return]  # pytest's own type
 
 
-@pytest.fixture(params=METHODS.values(), ids=METHODS)
+@pytest.fixture(params=METHODS.values(), ids=list(METHODS))
 def ask(request: pytest.FixtureRequest) -> Ask:
     return request.param  # type: ignore[no-any-return]  # pytest's own type
 
@@ -142,7 +142,7 @@ def test_enabling_waits_until_frames_leave(robot: Face, double: GatewayDouble) -
     assert (change.preview.state, change.preview.profile) == (PreviewState.RUNNING, PreviewProfile.LOW_BW)
     assert change.preview.endpoint
     assert change.preview.endpoint.uri == STREAM_URI
-    assert [(wish.enabled, wish.profile) for wish in double.wishes] == [
+    assert [(request.enabled, request.profile) for request in double.preview_requests] == [
         (True, preview_pb2.PREVIEW_PROFILE_LOW_BW)
     ]
 

@@ -66,7 +66,7 @@ def test_since_resumes_exactly_after_its_position(ground: Path) -> None:
 
 def test_follow_tells_what_happens_an_outage_and_the_gap_behind_it(ground: Path) -> None:
     said, port = documented("events --json"), free_tcp_port()
-    command = [ROBOTCTL, "--target", f"127.0.0.1:{port}", "--json", "events", "--follow"]
+    command = [str(ROBOTCTL), "--target", f"127.0.0.1:{port}", "--json", "events", "--follow"]
     with gateway_program(ground, port, sources=[]) as gateway:
         following = subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True)
         try:

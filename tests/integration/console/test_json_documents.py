@@ -69,7 +69,7 @@ def test_json_has_exactly_the_documented_keys(
 def test_json_of_a_lost_robot_has_exactly_the_documented_keys(
     target: str, double: GatewayDouble, code: grpc.StatusCode
 ) -> None:
-    command = [ROBOTCTL, "--target", target, "--json", "watch", "--interval", "0.1"]
+    command = [str(ROBOTCTL), "--target", target, "--json", "watch", "--interval", "0.1"]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as watching:
         try:
             assert watching.stdout

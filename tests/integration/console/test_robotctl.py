@@ -75,13 +75,13 @@ def test_preview_on_waits_until_it_runs(target: str, double: GatewayDouble) -> N
     assert ended.returncode == 0, ended.stderr
     assert "RUNNING" in ended.stdout
     assert "srt://" in ended.stdout
-    assert double.wishes[0].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
+    assert double.preview_requests[0].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
 
 
 def test_preview_on_without_a_profile_leaves_it_to_the_robot(target: str, double: GatewayDouble) -> None:
     double.preview_becomes.append(states.PREVIEW_RUNNING)
     assert robotctl("preview", "on", "--target", target).returncode == 0
-    assert double.wishes[0].profile == preview_pb2.PREVIEW_PROFILE_UNSPECIFIED
+    assert double.preview_requests[0].profile == preview_pb2.PREVIEW_PROFILE_UNSPECIFIED
 
 
 @pytest.mark.parametrize("as_json", [False, True])
@@ -114,7 +114,7 @@ def test_who_does_not_wait_ends_0_when_the_robot_took_note(target: str, double: 
     assert double.calls == ["SetPreviewMode"]
 
 
-def test_preview_off_is_idempotent(target: str, double: GatewayDouble) -> None:
+def test_preview_off_is_idempotent(target: str) -> None:
     for _ in range(2):
         ended = robotctl("preview", "off", "--target", target)
         assert ended.returncode == 0, ended.stderr

@@ -4,7 +4,6 @@ import asyncio
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -140,7 +139,7 @@ async def test_the_robots_clock_is_known_within_its_bound(gateway: GatewayProgra
     assert abs(best.seconds) <= best.error_s + 1e-6
 
 
-def test_an_older_gateway_is_polled(tmp_path: Path) -> None:
+def test_an_older_gateway_is_polled() -> None:
     double = GatewayDouble()
     with serving(double) as port, GatewayClient(f"127.0.0.1:{port}") as client:
         stream = client.watch_status(0.05)

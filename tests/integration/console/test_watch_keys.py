@@ -3,6 +3,7 @@
 import signal
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,10 +81,10 @@ def test_a_profile_chosen_while_it_is_off_is_for_the_next_start(
 ) -> None:
     screen.press("3")
     screen.wait_to_see("high-quality: p turns the preview on with it")
-    assert not double.wishes
+    assert not double.preview_requests
     screen.press("p")
     screen.wait_to_see("RUNNING")
-    assert double.wishes[0].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
+    assert double.preview_requests[0].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
 
 
 def test_a_refusal_is_shown_in_place(screen: Terminal, double: GatewayDouble) -> None:
@@ -100,7 +101,7 @@ def test_a_refusal_is_shown_in_place(screen: Terminal, double: GatewayDouble) ->
 class OnlyLook(GatewayDouble):
     """Refuses every preview request."""
 
-    def SetPreviewMode(self, request: Any, context: Any) -> Any:  # noqa: N802  # the contract's name
+    def SetPreviewMode(self, _request: Any, context: Any) -> Any:  # noqa: N802  # the contract's name
         context.abort(grpc.StatusCode.PERMISSION_DENIED, "viewers only watch")
 
 
@@ -146,7 +147,7 @@ def test_a_key_never_holds_up_the_redraw_nor_the_next_key() -> None:
             screen.wait_to_see("request sent ...")
             screen.press("q")
             left_in_order(screen)
-            assert not slow.wishes, "it did not wait for the answer"
+            assert not slow.preview_requests, "it did not wait for the answer"
         finally:
             slow.go_on.set()
 
@@ -183,6 +184,10 @@ def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: G
         manners = screen.manners()
         screen.press(f"{ROBOTCTL} watch --interval 0.1 --target {target}\n")
         screen.wait_for("high-quality")
+
+        def called_since(calls: int) -> bool:
+            return len(double.calls) > calls
+
         for _ in range(2):
             wait_until(screen.key_by_key, "keys are read one by one")
             place = screen.wait_for("robot healthy", after=len(screen.drawn))
@@ -195,10 +200,10 @@ def test_it_is_suspended_and_continued_as_a_shell_does_it(target: str, double: G
             calls = len(double.calls)
             screen.press("fg\n")
             screen.wait_for("high-quality", after=place)
-            wait_until(lambda before=calls: len(double.calls) > before, "it polls again")
+            wait_until(partial(called_since, calls), "it polls again")
         wait_until(screen.key_by_key, "keys are read one by one")
         screen.press("p")
-        wait_until(lambda: double.wishes, "keys do something again")
+        wait_until(lambda: double.preview_requests, "keys do something again")
         screen.press("q")
         wait_until(lambda: screen.manners() == manners, "the terminal is as it was")
         screen.press("echo ended $?\n")
@@ -237,4 +242,4 @@ def test_arrows_and_function_keys_mean_nothing(screen: Terminal, double: Gateway
     screen.press("\x1b[A\x1b[1~\x1bOP\x1b[1;5C")
     screen.press("3")
     screen.wait_to_see("high-quality: p turns the preview on with it")
-    assert not double.wishes
+    assert not double.preview_requests

@@ -1,6 +1,7 @@
 """A gateway among callers that mean no good: it stays up, stays small, and others notice nothing."""
 
 import select
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -81,8 +82,8 @@ def unary(gateway: GatewayProgram, method: str, request: bytes, **options: Any) 
     """One call with a body as it is, over a connection of its own."""
     no_limit = (("grpc.max_send_message_length", -1), ("grpc.use_local_subchannel_pool", 1))
     with grpc.insecure_channel(f"127.0.0.1:{gateway.port}", options=no_limit) as channel:
-        call = channel.unary_unary(method)
-        return bytes(call(request, timeout=PATIENCE_S, **options))
+        call: grpc.UnaryUnaryMultiCallable[bytes, bytes] = channel.unary_unary(method)
+        return call(request, timeout=PATIENCE_S, **options)
 
 
 @pytest.mark.parametrize("said", CONVERSATIONS.values(), ids=CONVERSATIONS)
@@ -132,7 +133,7 @@ def test_callers_that_never_finish_their_first_word(gateway: GatewayProgram, goo
     good.still_served()
 
 
-def _hung_up(caller: Any) -> bool:
+def _hung_up(caller: socket.socket) -> bool:
     try:
         return caller.recv(65_536) == b""
     except ConnectionError:

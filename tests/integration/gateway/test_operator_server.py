@@ -13,7 +13,7 @@ from common.errors import UserError
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.eventually import eventually
 from tests.support.free import free_tcp_port
-from tests.support.running_gateway import Operator, running_gateway
+from tests.support.running_gateway import Operator, raw_unary, running_gateway
 
 STATUS = "/omniseer.gateway.v1.RobotGateway/GetSystemStatus"
 SWITCH = "/omniseer.gateway.v1.RobotGateway/SetPreviewMode"
@@ -100,25 +100,25 @@ async def test_a_flood_is_refused_as_such_and_leaves_nothing_behind(operator: Op
 @pytest.mark.parametrize("method", [STATUS, SWITCH])
 async def test_bytes_that_are_no_message_end_that_call_only(operator: Operator, method: str) -> None:
     with pytest.raises(grpc.aio.AioRpcError):
-        await operator.channel.unary_unary(method)(b"\x08")
+        await raw_unary(operator.channel, method)(b"\x08")
     assert (await operator.status()).gateway_name == "lab"
 
 
 async def test_fields_of_a_later_contract_are_ignored(operator: Operator) -> None:
     # Field 2047, a string of three bytes.
-    assert await operator.channel.unary_unary(STATUS)(b"\xfa\x7f\x03new")
+    assert await raw_unary(operator.channel, STATUS)(b"\xfa\x7f\x03new")
 
 
 async def test_a_request_beyond_all_measure_is_refused(operator: Operator) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as seen:
-        await operator.channel.unary_unary(STATUS)(b"\xfa\x7f" + b"\x80\x80\x20" + b"x" * (512 * 1024))
+        await raw_unary(operator.channel, STATUS)(b"\xfa\x7f" + b"\x80\x80\x20" + b"x" * (512 * 1024))
     assert seen.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
     assert (await operator.status()).gateway_name == "lab"
 
 
 async def test_teleoperation_is_not_there_yet(operator: Operator) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as seen:
-        await operator.channel.unary_unary("/omniseer.gateway.v1.RobotGateway/SetTeleopEnabled")(b"")
+        await raw_unary(operator.channel, "/omniseer.gateway.v1.RobotGateway/SetTeleopEnabled")(b"")
     assert seen.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
 

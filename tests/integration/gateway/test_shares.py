@@ -17,7 +17,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     SubscribeEventsRequest,
     WatchSystemStatusRequest,
 )
-from tests.support.running_gateway import Operator, running_gateway
+from tests.support.running_gateway import Operator, raw_unary, running_gateway
 
 STATUS = "/omniseer.gateway.v1.RobotGateway/GetSystemStatus"
 HEALTH = "/grpc.health.v1.Health/Check"
@@ -141,9 +141,9 @@ async def test_connections_beyond_the_bound_are_refused_until_one_is_free(tmp_pa
 async def test_a_long_request_is_refused_with_a_reason(tmp_path: Path) -> None:
     async with running_gateway(tmp_path / "p.sock", limits={"request_bytes": 2000}) as operator:
         # An unknown field of a later contract: as long as it is short, nobody minds.
-        assert await operator.channel.unary_unary(STATUS)(b"\xfa\x01\xe8\x07" + bytes(1000))
+        assert await raw_unary(operator.channel, STATUS)(b"\xfa\x01\xe8\x07" + bytes(1000))
         with pytest.raises(grpc.aio.AioRpcError) as seen:
-            await operator.channel.unary_unary(STATUS)(b"\xfa\x01\xb8\x17" + bytes(3000))
+            await raw_unary(operator.channel, STATUS)(b"\xfa\x01\xb8\x17" + bytes(3000))
         assert reason_of(seen.value) == (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.MESSAGE_TOO_LARGE)
 
 
@@ -159,7 +159,7 @@ async def test_refusals_tell_programs_why(
 ) -> None:
     async with running_gateway(tmp_path / "p.sock") as operator:
         with pytest.raises(grpc.aio.AioRpcError) as seen:
-            await operator.channel.unary_unary(method)(request_bytes)
+            await raw_unary(operator.channel, method)(request_bytes)
     assert reason_of(seen.value) == (code, reason)
 
 

@@ -28,7 +28,8 @@ async def operator(tmp_path: Path) -> AsyncIterator[Operator]:
 
 
 async def state_of(operator: Operator, service: str) -> int:
-    answer = await HealthStub(operator.channel).Check(HealthCheckRequest(service=service), timeout=5)
+    stub: Any = HealthStub(operator.channel)  # its type has no methods
+    answer = await stub.Check(HealthCheckRequest(service=service), timeout=5)
     return int(answer.status)
 
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from std_msgs.msg import String
 
 from gateway.config import DEFAULT_SOURCES, SourceSettings
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
+from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.eventually import eventually
 from tests.support.running_gateway import Operator, running_gateway
 from tests.support.talker import Talker, talking
@@ -25,13 +28,13 @@ MUX = "/mecanum_drive_controller/reference"
 
 
 @pytest.fixture
-def talker(ros_domain: int) -> Iterator[Talker]:
+def talker(ros_domain: int) -> Iterator[Talker]:  # noqa: ARG001  # for its effect
     with talking() as made:
         yield made
 
 
 @pytest.fixture
-async def operator(ros_domain: int, tmp_path: Path) -> AsyncIterator[Operator]:
+async def operator(ros_domain: int, tmp_path: Path) -> AsyncIterator[Operator]:  # noqa: ARG001  # for its effect
     faults = {"startup_grace_ms": 0, "clear_after_ms": 100}
     async with running_gateway(tmp_path / "p.sock", sources=SOURCES, faults=faults) as operator:
         yield operator
@@ -124,11 +127,13 @@ async def test_a_component_in_trouble_is_a_fault_until_it_says_it_is_well(
 
 
 async def test_the_mode_arrives_and_its_change_is_an_event(talker: Talker, operator: Operator) -> None:
+    def has_mode(mode: str, status: SystemStatus) -> bool:
+        return status.mission.mode == mode
+
+    def has_event_of(mode: str, overlay: OverlaySnapshot) -> bool:
+        return f"robot mode: {mode}" in [event.message for event in overlay.events]
+
     for mode in ("idle", "exploring"):
         async with saying(talker, {MODE.topic: String(data=mode)}):
-            await eventually(operator.status, lambda it, mode=mode: it.mission.mode == mode, mode)
-            await eventually(
-                operator.overlay,
-                lambda it, mode=mode: f"robot mode: {mode}" in [event.message for event in it.events],
-                f"the event of {mode}",
-            )
+            await eventually(operator.status, partial(has_mode, mode), mode)
+            await eventually(operator.overlay, partial(has_event_of, mode), f"the event of {mode}")

@@ -11,6 +11,6 @@ __all__ = ["application", "own_settings"]
 
 
 @pytest.fixture(autouse=True)
-def desk(application: QApplication, own_settings: Path) -> None:
+def desk(application: QApplication, own_settings: Path) -> None:  # noqa: ARG001  # for their effects
     """A light desktop without saved settings."""
     in_colours(LIGHT)

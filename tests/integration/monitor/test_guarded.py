@@ -15,7 +15,7 @@ from console.window.programs import monitor
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from tests.support.guarded_program import Guarded, guarded_program, guarded_video
-from tests.support.qt import keep_picture, let_pass, press, until
+from tests.support.qt import keep_screenshot, let_pass, press, until
 
 pytestmark = pytest.mark.gst
 
@@ -94,7 +94,7 @@ def test_a_viewer_sees_which_role_is_missing_and_goes_on_watching(robot: Guarded
         ben.video_moves()
         ben.link_is("connected")
         ben.preview_is("RUNNING")
-        keep_picture(ben.window, "viewer-only")
+        keep_screenshot(ben.window, "viewer-only")
 
 
 def test_a_revoked_login_is_reported_without_hammering_and_a_new_one_taken_over(robot: Guarded) -> None:
@@ -111,7 +111,7 @@ def test_a_revoked_login_is_reported_without_hammering_and_a_new_one_taken_over(
         next_try = re.search(r"No access for .* Attempt (\d+) ", banner.next_try.text())
         assert next_try
         assert 1 < int(next_try[1]) <= MOST_ATTEMPTS + 1
-        keep_picture(carla.window, "not-allowed")
+        keep_screenshot(carla.window, "not-allowed")
 
         robot.log_in("carla", Role.OPERATOR)
         carla.link_is("connected")

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 from PySide6.QtCore import Qt
@@ -16,7 +17,7 @@ from console.window.programs import monitor
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import keep_picture, let_pass, press, until
+from tests.support.qt import keep_screenshot, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
 CLOSES_WITHIN_S = 6.0
@@ -52,7 +53,7 @@ class Desk:
 
 
 @pytest.fixture
-def desk_work(desk: None) -> Iterator[Desk]:
+def desk_work() -> Iterator[Desk]:
     gateway = GatewayDouble()
     with serving(gateway) as port, monitor(f"127.0.0.1:{port}") as window:
         window.activateWindow()
@@ -69,10 +70,13 @@ def test_a_click_turns_the_preview_on_and_off(desk_work: Desk) -> None:
     desk_work.free()
     desk_work.click(desk_work.preview.switch)
     desk_work.state_is("DISABLED")
-    assert [wish.enabled for wish in desk_work.gateway.wishes] == [True, False]
+    assert [request.enabled for request in desk_work.gateway.preview_requests] == [True, False]
 
 
 def test_keys_do_the_same(desk_work: Desk) -> None:
+    def requested(profile: preview_pb2.PreviewProfile.ValueType) -> bool:
+        return desk_work.gateway.preview_requests[-1].profile == profile
+
     desk_work.press(Qt.Key.Key_P)
     desk_work.state_is("RUNNING")
     for key, profile in (
@@ -82,9 +86,7 @@ def test_keys_do_the_same(desk_work: Desk) -> None:
     ):
         desk_work.free()
         desk_work.press(key)
-        until(
-            lambda wanted=profile: desk_work.gateway.wishes[-1].profile == wanted, "the profile is asked for"
-        )
+        until(partial(requested, profile), "the profile is asked for")
     desk_work.free()
     desk_work.press(Qt.Key.Key_P)
     desk_work.state_is("DISABLED")
@@ -95,10 +97,10 @@ def test_while_it_is_off_a_profile_is_marked_and_taken_by_the_next_start(desk_wo
     until(desk_work.preview.profiles[HIGH].isChecked, "the mark is shown")
     let_pass(0.5)
     assert desk_work.preview.profiles[HIGH].isChecked(), "the robot's next answer takes the mark away"
-    assert not desk_work.gateway.wishes
+    assert not desk_work.gateway.preview_requests
     desk_work.press(Qt.Key.Key_P)
     desk_work.state_is("RUNNING")
-    assert desk_work.gateway.wishes[-1].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
+    assert desk_work.gateway.preview_requests[-1].profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
 
 
 def test_a_refusal_is_shown_in_the_robots_words(desk_work: Desk) -> None:
@@ -106,7 +108,7 @@ def test_a_refusal_is_shown_in_the_robots_words(desk_work: Desk) -> None:
     desk_work.click(desk_work.preview.switch)
     until(lambda: desk_work.notes() == ["The robot refused: the robot is being serviced"], "the refusal")
     assert desk_work.preview.switch.isEnabled()
-    keep_picture(desk_work.window, "refused")
+    keep_screenshot(desk_work.window, "refused")
 
 
 def test_a_fault_is_shown_with_what_to_do(desk_work: Desk) -> None:
@@ -126,12 +128,12 @@ def test_while_the_robot_thinks_nothing_can_be_pressed_and_the_focus_comes_back(
     desk_work.press(Qt.Key.Key_Space)
     until(lambda: not desk_work.preview.switch.isEnabled(), "the controls are locked")
     assert not any(each.isEnabled() for each in desk_work.preview.profiles.values())
-    asked = len(desk_work.gateway.wishes)
+    asked = len(desk_work.gateway.preview_requests)
     press(desk_work.window, Qt.Key.Key_P)
     desk_work.gateway.hold.set()
     desk_work.free()
     assert button.hasFocus()
-    assert len(desk_work.gateway.wishes) <= asked + 1, "a key pressed meanwhile asks for nothing"
+    assert len(desk_work.gateway.preview_requests) <= asked + 1, "a key pressed meanwhile asks for nothing"
 
 
 def test_everything_is_reached_by_the_keyboard(desk_work: Desk) -> None:
@@ -155,7 +157,7 @@ def test_mnemonics_press_the_buttons(desk_work: Desk) -> None:
     desk_work.free()
     desk_work.press(Qt.Key.Key_L, Qt.KeyboardModifier.AltModifier)
     until(
-        lambda: desk_work.gateway.wishes[-1].profile == preview_pb2.PREVIEW_PROFILE_LOW_BW,
+        lambda: desk_work.gateway.preview_requests[-1].profile == preview_pb2.PREVIEW_PROFILE_LOW_BW,
         "low bandwidth is asked",
     )
 
@@ -189,7 +191,7 @@ def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Des
     assert not desk_work.window.banner.isVisible()
 
 
-def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
+def test_closing_ends_everything_although_the_gateway_hangs() -> None:
     gateway = GatewayDouble()
     with serving(gateway) as port:
         with monitor(f"127.0.0.1:{port}") as window:
@@ -230,6 +232,6 @@ def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:
     let_pass(0.3)
     assert desk_work.window.size() == before
     assert desk_work.window.video.height() >= 180
-    keep_picture(desk_work.window, "hundred-faults")
+    keep_screenshot(desk_work.window, "hundred-faults")
     del desk_work.gateway.status.faults[:]
     until(lambda: len(desk_work.window.side.faults.shown) == 1, "they are over")

@@ -17,7 +17,7 @@ from console.window.programs import monitor
 from console.window.theme import draw_shape
 from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.qt import DARK, LIGHT, in_colours, keep_picture, let_pass, until
+from tests.support.qt import DARK, LIGHT, in_colours, keep_screenshot, let_pass, until
 from tests.support.snapshots import event
 
 READABLE = 4.5
@@ -42,7 +42,7 @@ def troubled() -> GatewayDouble:
 
 
 @pytest.fixture
-def window(desk: None) -> Iterator[MonitorWindow]:
+def window() -> Iterator[MonitorWindow]:
     with serving(troubled()) as port, monitor(f"127.0.0.1:{port}") as made:
         until(lambda: len(made.side.faults.shown) == 3, "everything is shown")
         yield made
@@ -72,7 +72,7 @@ def ground_of(widget: QWidget) -> QColor:
 def test_every_text_is_readable(window: MonitorWindow, name: str, ground: QColor) -> None:
     in_colours(ground)
     let_pass(0.3)
-    keep_picture(window, f"colours-{name}")
+    keep_screenshot(window, f"colours-{name}")
     labels = [each for each in window.findChildren(QLabel) if each.text() and each.isVisible()]
     assert len(labels) > 30
     for label in labels:
@@ -98,7 +98,7 @@ def drawn(style: SeverityStyle) -> QImage:
 
 
 @pytest.mark.parametrize(("one", "other"), list(combinations(SeverityStyle, 2)))
-def test_shapes_differ_without_any_colour(desk: None, one: SeverityStyle, other: SeverityStyle) -> None:
+def test_shapes_differ_without_any_colour(one: SeverityStyle, other: SeverityStyle) -> None:
     first, second = drawn(one), drawn(other)
     differing = sum(
         abs(QColor(first.pixel(x, y)).red() - QColor(second.pixel(x, y)).red()) > 60
@@ -114,8 +114,9 @@ def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) ->
     assert smallest.height() <= SMALL_LAPTOP[1]
     window.resize(smallest)
     let_pass(0.3)
-    keep_picture(window, "smallest")
-    for word in (*window.findChildren(QPushButton), *window.findChildren(QLabel)):
+    keep_screenshot(window, "smallest")
+    words: list[QPushButton | QLabel] = [*window.findChildren(QPushButton), *window.findChildren(QLabel)]
+    for word in words:
         gives_way = isinstance(word, ElidedLabel | WrappedLabel)
         if word.isVisible() and word.text() and not gives_way:
             assert word.width() >= word.sizeHint().width(), f"'{word.text()}' is cut off"
@@ -131,7 +132,7 @@ def open_and_close(change: tuple[int, int] | None = None) -> tuple[int, int, lis
         return window.width(), window.height(), window.splitter.sizes()
 
 
-def test_it_opens_as_it_was_left(desk: None) -> None:
+def test_it_opens_as_it_was_left() -> None:
     left = open_and_close((1400, 900))
     assert left[:2] == (1400, 900)
     assert open_and_close() == left
@@ -146,7 +147,7 @@ def test_it_opens_as_it_was_left(desk: None) -> None:
         b"",
     ],
 )
-def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, content: bytes) -> None:
+def test_a_broken_settings_file_is_ignored(own_settings: Path, content: bytes) -> None:
     file = Path(WindowSettings().file)
     assert file.is_relative_to(own_settings)
     file.parent.mkdir(parents=True)
@@ -156,7 +157,7 @@ def test_a_broken_settings_file_is_ignored(own_settings: Path, desk: None, conte
     assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
 
 
-def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path, desk: None) -> None:
+def test_a_settings_file_that_can_not_be_written_is_ignored() -> None:
     file = Path(WindowSettings().file)
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

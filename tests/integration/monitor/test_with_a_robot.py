@@ -18,7 +18,7 @@ from bench.loop_delay import LoopDelay
 from console.window.lines import ComponentLine, FaultWidget
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
-from tests.support.qt import keep_picture, let_pass, press, until
+from tests.support.qt import keep_screenshot, let_pass, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
@@ -82,7 +82,7 @@ class Watch:
 
 
 @pytest.fixture
-def watch(desk: None, ros_domain: int, tmp_path: Path) -> Iterator[Watch]:
+def watch(ros_domain: int, tmp_path: Path) -> Iterator[Watch]:  # noqa: ARG001  # for its effect
     with whole_robot(tmp_path) as robot, monitor(robot.target) as window:
         made = Watch(robot, window)
         made.health_is("OK")
@@ -103,7 +103,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     for name in ("Motion", "Vision", "Objects", "Battery", "Command"):
         watch.mark_is(name, "fresh")
     until(lambda: watch.window.plots.all[3].value_text != "no data", "the load of the computer is plotted")
-    keep_picture(watch.window, "healthy")
+    keep_screenshot(watch.window, "healthy")
 
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
@@ -111,14 +111,14 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     boxes_are_drawn(watch)
     until(lambda: watch.window.plots.all[0].value_text.endswith(" fps"), "the video's rate is plotted")
     let_pass(8)  # what the plots show shall be worth a picture
-    keep_picture(watch.window, "preview-running")
+    keep_screenshot(watch.window, "preview-running")
 
     watch.robot.sensors.change(silent=["odometry"])
     watch.mark_is("Motion", "STALE")
     watch.health_is("DEGRADED")
     assert watch.fault_says("odometry").remedy.text()
     watch.mark_is("Vision", "fresh")
-    keep_picture(watch.window, "stale-odometry")
+    keep_screenshot(watch.window, "stale-odometry")
     watch.robot.sensors.change(silent=[])
     watch.mark_is("Motion", "fresh")
 
@@ -128,7 +128,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     reason = watch.window.preview.notes.shown[0]
     until(reason.text.text, "the reason is shown")
     watch.mark_is("Video", "STALE")
-    keep_picture(watch.window, "preview-faulted")
+    keep_screenshot(watch.window, "preview-faulted")
     watch.robot.preview.start_again()
     watch.preview_is("RUNNING")
     watch.video_moves()
@@ -144,7 +144,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     watch.mark_is("Motion", "STALE")
     watch.video_moves()  # the stream does not need the gateway
     let_pass(3)
-    keep_picture(watch.window, "unreachable")
+    keep_screenshot(watch.window, "unreachable")
 
     watch.robot.start_gateway()
     QTest.mouseClick(watch.window.banner.button, Qt.MouseButton.LeftButton)
@@ -158,7 +158,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     )
     watch.video_moves()
     let_pass(2)
-    keep_picture(watch.window, "reconnected")
+    keep_screenshot(watch.window, "reconnected")
 
 
 def boxes_are_drawn(watch: Watch) -> None:
@@ -195,7 +195,7 @@ def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -
     assert time.monotonic() - closed_s < CLOSES_WITHIN_S
 
 
-def test_the_ruler_sees_a_loop_that_is_held_up(desk: None) -> None:
+def test_the_ruler_sees_a_loop_that_is_held_up() -> None:
     delay = LoopDelay()
     delay.start()
     let_pass(0.05)

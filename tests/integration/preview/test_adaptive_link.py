@@ -19,7 +19,7 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
     ):
         preview.enable()
         preview.running()
-        watcher.wait_for_pictures(30)
+        watcher.wait_for_frames(30)
         relay.loss = 0.4
         state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 600, "a lower rate")
         assert "% loss" in state.stream.bitrate_reason
@@ -41,6 +41,6 @@ def test_unless_it_is_asked_to_the_bit_rate_stays(tmp_path: Path) -> None:
     ):
         preview.enable()
         preview.running()
-        watcher.wait_for_pictures(30)
+        watcher.wait_for_frames(30)
         state = preview.wait_for(lambda a: a.measurement.worst_loss_percent > 8, "loss is reported")
         assert (state.stream.target_bitrate_kbps, state.stream.bitrate_reason) == (600, "")

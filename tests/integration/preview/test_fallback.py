@@ -99,11 +99,11 @@ def test_a_viewer_gets_frames_again(tmp_path: Path, fault: str, words: str) -> N
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(10)
+            watcher.wait_for_frames(10)
             state = preview.wait_for(
                 lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
             )
-            watcher.wait_for_pictures(30)
+            watcher.wait_for_frames(30)
         passed_over(state, "va-h265", words)
         # Another connection: the pipeline is rebuilt whole, its listener included.
         assert watcher.reconnects >= 1
@@ -133,7 +133,7 @@ def test_a_driver_that_hangs_in_a_profile_change_blocks_nothing(tmp_path: Path) 
         preview.enable(pb.PROFILE_BALANCED)
         preview.running()
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(10)
+            watcher.wait_for_frames(10)
             preview.enable(pb.PROFILE_LOW_BW)
             # The loop answers while the driver does not.
             assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
@@ -152,10 +152,10 @@ def test_a_driver_that_hangs_when_a_viewer_joins_blocks_nothing(tmp_path: Path) 
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(90)
+            watcher.wait_for_frames(90)
             with Watcher(preview.port) as other:
                 state = fallen_back(preview, watcher, "deaf")
-                other.wait_for_pictures(10)
+                other.wait_for_frames(10)
         passed_over(state, "va-h265", "hung when it was asked for a key frame")
 
 
@@ -166,7 +166,7 @@ def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_blocks_nothing(t
         preview.enable()
         preview.running()
         with Watcher(relay.port, latency_ms=120) as watcher:
-            watcher.wait_for_pictures(10)
+            watcher.wait_for_frames(10)
             relay.loss = 0.4
             state = fallen_back(preview, watcher, "stuck, adaptive")
         passed_over(state, "va-h265", "hung when its bit rate was changed")
@@ -181,7 +181,7 @@ def fallen_back(preview: RunningPreview, watcher: Watcher, fault: str) -> pb.Act
     state = preview.wait_for(
         lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
     )
-    watcher.wait_for_pictures(10)
+    watcher.wait_for_frames(10)
     assert watcher.longest_pause_s < MAX_OUTAGE_S * SLOW_MACHINE
     print(f"{fault}: {watcher.longest_pause_s:.2f} s without a frame")
     return state
@@ -200,7 +200,7 @@ def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: P
         # A new viewer: one that was connected does not notice the crash, and reconnects only when its own
         # side of SRT gives up after 5 s.
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(1)
+            watcher.wait_for_frames(1)
         outage_s = watcher.arrivals_s[0] - died_at
         assert state.encoder.name == "va-h265"
         assert "crashed while it was in use (Segmentation fault)" in state.encoder.fallback_reason

@@ -57,7 +57,7 @@ def test_a_viewer_that_joins_does_not_wait_for_the_next_key_frame(tmp_path: Path
         for _ in range(3):
             with Watcher(preview.port) as watcher:
                 # Without a key frame of its own it would wait for half a minute.
-                watcher.wait_for_pictures(10)
+                watcher.wait_for_frames(10)
 
 
 def test_ten_viewers_at_once(preview: RunningPreview) -> None:
@@ -68,7 +68,7 @@ def test_ten_viewers_at_once(preview: RunningPreview) -> None:
             stack.enter_context(player(preview.port))
         watcher = stack.enter_context(Watcher(preview.port))
         viewers(preview, 10)
-        watcher.wait_for_pictures(30)
+        watcher.wait_for_frames(30)
     assert watcher.reconnects == 0
     state = viewers(preview, 0)
     assert state.counters.faults == 0
@@ -79,10 +79,10 @@ def test_a_viewer_that_freezes_or_dies_does_not_disturb_the_others(preview: Runn
     preview.running()
     with player(preview.port) as freezing, player(preview.port) as dying, Watcher(preview.port) as watcher:
         viewers(preview, 3)
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         freezing.send_signal(signal.SIGSTOP)
         dying.kill()
-        watcher.wait_for_pictures(60)
+        watcher.wait_for_frames(60)
         # Both are given up after SRT's own 5 s.
         viewers(preview, 1)
         assert watcher.reconnects == 0
@@ -94,11 +94,11 @@ def test_comers_and_goers(preview: RunningPreview) -> None:
     preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher:
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         for _ in range(20):
             with Receiver(StreamAddress("127.0.0.1", preview.port, latency_ms=20)) as guest:
                 guest.next_frame(timeout_s=10)
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         assert watcher.reconnects == 0
     assert preview.running().counters == pb.Counters(starts=1)
 
@@ -107,13 +107,13 @@ def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> N
     preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher:
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         # SRT keeps a closed connection, some hundred KiB, for a few seconds: this is the level of that.
         visit(preview.port, 200)
         viewers(preview, 1)
         descriptors, resident = preview.descriptors(), preview.resident_mib()
         visit(preview.port, 200)
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         assert watcher.reconnects == 0
         assert watcher.longest_pause_s < 1.0
         viewers(preview, 1)
@@ -131,14 +131,14 @@ def test_garbage_on_the_port_is_ignored(preview: RunningPreview) -> None:
     preview.enable()
     preview.running()
     with Watcher(preview.port) as watcher, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
         for size in range(1400):
             stranger.sendto(bytes([size % 256]) * size, ("127.0.0.1", preview.port))
         # A handshake that is cut short.
         stranger.sendto(
             b"\x80\x00" + bytes(14) + b"\x00\x00\x00\x05" + bytes(12), ("127.0.0.1", preview.port)
         )
-        watcher.wait_for_pictures(30)
+        watcher.wait_for_frames(30)
         assert watcher.reconnects == 0
     assert preview.running().counters.faults == 0
 
@@ -154,7 +154,7 @@ def test_a_passphrase_admits_only_viewers_that_know_it(tmp_path: Path, key_lengt
             with Receiver(address) as stranger, pytest.raises(StreamError):
                 stranger.next_frame(timeout_s=8)
         with Watcher(preview.port, PASSPHRASE) as watcher:
-            watcher.wait_for_pictures(10)
+            watcher.wait_for_frames(10)
         assert preview.running().counters.faults == 0
         assert PASSPHRASE not in preview.log.read_text(encoding="utf-8")
 
@@ -169,7 +169,7 @@ def test_another_passphrase_disconnects_viewers_with_the_old_one(preview: Runnin
         with pytest.raises(StreamError):
             watch_for_ever(old)
     with Watcher(preview.port, "another horse battery") as watcher:
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
     assert state.stream.encrypted
 
 

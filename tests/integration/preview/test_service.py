@@ -1,5 +1,6 @@
 """The service's life, seen from the gateway's side of the socket."""
 
+from functools import partial
 from pathlib import Path
 
 import grpc
@@ -37,7 +38,7 @@ def test_enable_serves_frames_and_disable_frees_the_port(preview: RunningPreview
     assert state.stream.codec == pb.CODEC_H264
     assert (state.encoder.name, state.encoder.wanted, state.encoder.fallback_reason) == ("x264", "x264", "")
     with Watcher(preview.port) as watcher:
-        watcher.wait_for_pictures(10)
+        watcher.wait_for_frames(10)
         measured = preview.wait_for(lambda a: a.measurement.viewer_count == 1, "one viewer").measurement
         assert measured.HasField("worst_rtt_ms")
         assert measured.HasField("worst_loss_percent")
@@ -89,26 +90,26 @@ def test_on_off_on_in_one_breath_ends_on(preview: RunningPreview) -> None:
     assert state.applied_revision == 5
     assert state.counters.faults == 0
     with Watcher(preview.port) as watcher:
-        watcher.wait_for_pictures(5)
+        watcher.wait_for_frames(5)
 
 
 def test_a_profile_switch_keeps_every_viewer(preview: RunningPreview) -> None:
+    def runs_at(fps: int, actual: pb.ActualState) -> bool:
+        return abs(actual.measurement.fps - fps) < fps / 5 and actual.stream.fps == fps
+
     preview.enable(pb.PROFILE_BALANCED)
     preview.running()
     with Watcher(preview.port) as watcher:
-        watcher.wait_for_pictures(10)
+        watcher.wait_for_frames(10)
         for profile, fps in (
             (pb.PROFILE_HIGH_QUALITY, 60),
             (pb.PROFILE_LOW_BW, 15),
             (pb.PROFILE_BALANCED, 30),
         ):
             preview.enable(profile)
-            state = preview.wait_for(
-                lambda a, fps=fps: abs(a.measurement.fps - fps) < fps / 5 and a.stream.fps == fps,
-                f"{fps} fps",
-            )
+            state = preview.wait_for(partial(runs_at, fps), f"{fps} fps")
             assert state.state == pb.LIFECYCLE_STATE_RUNNING
-            watcher.wait_for_pictures(10)
+            watcher.wait_for_frames(10)
         assert watcher.reconnects == 0
         assert watcher.longest_pause_s < 0.5
         print(f"longest gap {watcher.longest_pause_s * 1000:.0f} ms")
@@ -151,7 +152,7 @@ def test_h265_in_software_from_end_to_end(tmp_path: Path) -> None:
         assert state.stream.codec == pb.CODEC_H265
         assert (state.encoder.name, state.encoder.wanted) == ("x265", "x265")
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(30)
+            watcher.wait_for_frames(30)
         assert set(watcher.codecs) == {"h265"}
 
 

@@ -70,7 +70,7 @@ def test_a_file_is_played_again_and_again_at_its_own_speed(tmp_path: Path, conta
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(100)
+            watcher.wait_for_frames(100)
             state = preview.wait_for(lambda a: a.measurement.fps > 0, "figures")
         assert state.counters == pb.Counters(starts=1)
         assert watcher.reconnects == 0
@@ -85,7 +85,7 @@ def test_real_footage_of_another_size_is_scaled(tmp_path: Path) -> None:
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
-            watcher.wait_for_pictures(30)
+            watcher.wait_for_frames(30)
 
 
 def test_any_description_will_do(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_shared_memory_needs_no_more_caps_than_for_gst_launch(tmp_path: Path, de
             preview.enable()
             preview.running()
             with Watcher(preview.port) as watcher:
-                watcher.wait_for_pictures(10)
+                watcher.wait_for_frames(10)
             assert preview.running().counters == pb.Counters(starts=1)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
-from tests.support.judges import complaints, decoded_pictures
+from tests.support.judges import complaints, decoded_frames
 from tests.support.mpegts import analyse, share_beyond
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
@@ -41,12 +41,12 @@ def test_the_judges_have_nothing_to_say(
     assert share_beyond(stream.table_times_ms["PAT"], 100) <= RARELY
     assert share_beyond(stream.table_times_ms["PMT"], 100) <= RARELY
     assert share_beyond(stream.clock_times_ms, 40) <= RARELY
-    assert stream.pictures[0].key, "a viewer that joins begins with a key frame"
-    keys = [frame for frame in stream.pictures if frame.key]
+    assert stream.access_units[0].key, "a viewer that joins begins with a key frame"
+    keys = [frame for frame in stream.access_units if frame.key]
     assert len(keys) >= SECONDS - 1
     assert all(frame.headed for frame in keys)
-    assert all(frame.sized for frame in stream.pictures)
+    assert all(frame.sized for frame in stream.access_units)
     file = tmp_path / "recording.ts"
     file.write_bytes(recording[: stream.whole_bytes])
     assert complaints(file) == ""
-    assert decoded_pictures(file) == len(stream.pictures) - 1
+    assert decoded_frames(file) == len(stream.access_units) - 1

@@ -8,6 +8,6 @@ from tests.support.talker import Talker, talking
 
 
 @pytest.fixture
-def talker(ros_domain: int) -> Iterator[Talker]:
+def talker(ros_domain: int) -> Iterator[Talker]:  # noqa: ARG001  # for its effect
     with talking() as made:
         yield made

@@ -27,7 +27,8 @@ def active_faults(gateway: GatewayProgram) -> set[str]:
     return {fault.id for fault in gateway.status().faults if fault.active}
 
 
-def test_a_peer_whose_name_is_no_text_ends_nothing(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_peer_whose_name_is_no_text_ends_nothing(tmp_path: Path) -> None:
     """Listing the publishers of its topic raises in rclpy; values, the other topics and health go on."""
     log = tmp_path / "gateway.log"
     with simulated_robot(tmp_path), gateway_program(tmp_path) as gateway:
@@ -46,9 +47,8 @@ def test_a_peer_whose_name_is_no_text_ends_nothing(ros_domain: int, tmp_path: Pa
             assert "can't be listed" in findings["topic.odometry"].what
 
 
-def test_messages_of_another_version_are_a_fault_that_says_so(
-    ros_domain: int, tmp_path: Path, talker: Talker
-) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_messages_of_another_version_are_a_fault_that_says_so(tmp_path: Path, talker: Talker) -> None:
     """A package of the same name with other fields: the middleware connects both, and decoding fails."""
     topic = SOURCES["detections"].topic
     publisher: Any = talker.node.create_publisher(DetectionArray, topic, QoSProfile(depth=1))

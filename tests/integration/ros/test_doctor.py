@@ -42,21 +42,24 @@ def test_guarantees_that_exclude_each_other(talker: Talker) -> None:
     assert examined(BATTERY)["topic.battery"].verdict is Verdict.GOOD
 
 
-def test_nobody_publishes(talker: Talker, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("talker")
+def test_nobody_publishes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "DISCOVERY_S", 0.5)
     findings = examined(ODOMETRY, BATTERY)
     assert findings["topic.odometry"].verdict is Verdict.WRONG, "it is required"
     assert findings["topic.battery"].verdict is Verdict.NOTE, "it is not"
 
 
-def test_a_type_that_is_not_installed_says_what_to_install(talker: Talker) -> None:
+@pytest.mark.usefixtures("talker")
+def test_a_type_that_is_not_installed_says_what_to_install() -> None:
     missing = SourceSettings(kind="vision", topic="/x", type="no_such_msgs/msg/Thing", stale_after_ms=1000)
     finding = examined(missing)["type.vision"]
     assert finding.verdict is Verdict.WRONG
     assert "topic.vision" not in examined(missing)
 
 
-def test_a_stand_in_is_named_and_its_topic_is_examined_all_the_same(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_stand_in_is_named_and_its_topic_is_examined_all_the_same() -> None:
     findings = examined(DETECTIONS)
     finding = findings["type.detections"]
     assert finding.verdict is Verdict.NOTE

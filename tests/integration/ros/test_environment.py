@@ -28,7 +28,8 @@ def test_an_impossible_domain_is_refused(monkeypatch: pytest.MonkeyPatch, domain
         pass
 
 
-def test_reading_ros_touches_nothing_of_the_process(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_reading_ros_touches_nothing_of_the_process() -> None:
     """Signal handlers, rclpy's global context, log files: all as before."""
     program = """
 import os, signal, tempfile
@@ -59,6 +60,7 @@ print("untouched")
     assert done.stdout == "untouched\n", done.stderr
 
 
+@pytest.mark.usefixtures("ros_domain")
 @pytest.mark.parametrize(
     "command",
     [
@@ -68,7 +70,7 @@ print("untouched")
 )
 @pytest.mark.parametrize("middleware", ["rmw_that_is_not_there", "../etc"])
 def test_a_middleware_that_is_not_installed_is_refused_in_one_line(
-    ros_domain: int, tmp_path: Path, command: str, middleware: str
+    tmp_path: Path, command: str, middleware: str
 ) -> None:
     """Left to itself, rclpy would end the process with a status of its own, in the middle of an import."""
     done = subprocess.run(
@@ -92,9 +94,8 @@ def test_a_middleware_that_is_not_installed_is_refused_in_one_line(
     assert "Unset it" in lines[0]
 
 
-def test_the_middleware_can_be_named(
-    ros_domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_the_middleware_can_be_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The one that is installed, in this process and in the robot's."""
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     board = Board()

@@ -3,6 +3,7 @@
 import statistics
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -14,6 +15,8 @@ from gateway.config import DEFAULT_SOURCES
 from gateway.ros.intake import intake
 from gateway.status import sources as specs
 from gateway.status.board import Board
+from gateway.status.values import Received, Velocity
+from tests.support.boards import has_all, newest
 from tests.support.ros import simulated_robot
 from tests.support.talker import Talker
 from tests.support.waiting import wait_until
@@ -32,15 +35,19 @@ def age_s(board: Board) -> float:
 @pytest.mark.timed
 def test_an_age_is_counted_from_the_reception(talker: Talker) -> None:
     """Not from the moment of sampling, which comes 25 ms later on average."""
-    board, late_s = Board(), []
+    board = Board()
+    late_s: list[float] = []
+
+    def another_than(before: Received[Velocity] | None) -> Received[Velocity] | None:
+        now = board[specs.ODOMETRY]
+        return None if now is before else now
+
     with intake([ODOMETRY], board) as running:
         publisher = talker.meet(running, ODOMETRY.topic, OdometryMessage)
         for _ in range(21):
             before, sent_s = board[specs.ODOMETRY], time.monotonic()
             publisher.publish(OdometryMessage())
-            wait_until(lambda before=before: board[specs.ODOMETRY] is not before, "the next message")
-            assert board[specs.ODOMETRY]
-            late_s.append(board[specs.ODOMETRY].at_s - sent_s)
+            late_s.append(wait_until(partial(another_than, before), "the next message").at_s - sent_s)
             # Somewhere else in the sampler's period each time.
             threading.Event().wait(0.0073 * (len(late_s) % 7))
     assert min(late_s) >= 0, "no message is received before it is sent"
@@ -57,19 +64,20 @@ def test_a_publisher_whose_clock_is_wrong_does_not_change_the_age(talker: Talker
         assert age_s(board) < 10
 
 
-def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_silent_topic_ages_and_is_fresh_again_when_it_returns(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry")
         robot.change(silent=["odometry"])
         wait_until(lambda: age_s(board) > 1.0, "odometry to become stale")
-        assert board[specs.VISION]
-        assert time.monotonic() - board[specs.VISION].at_s < 1.0, "only the silenced topic is silent"
+        assert time.monotonic() - newest(board, specs.VISION).at_s < 1.0, "only the silenced topic is silent"
         robot.change(silent=[])
         wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
 
 
-def test_a_robot_that_is_killed_and_comes_back_is_heard_again(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_robot_that_is_killed_and_comes_back_is_heard_again(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board):
         with simulated_robot(tmp_path) as robot:
@@ -78,19 +86,20 @@ def test_a_robot_that_is_killed_and_comes_back_is_heard_again(ros_domain: int, t
         wait_until(lambda: age_s(board) > 1.0, "odometry to become stale")
         with simulated_robot(tmp_path, "speed_mps=1.75"):
             wait_until(lambda: age_s(board) < 0.2, "fresh odometry again")
-            assert board[specs.ODOMETRY]
-            assert board[specs.ODOMETRY].value.vx_mps == 1.75
+            assert newest(board, specs.ODOMETRY).value.vx_mps == 1.75
 
 
-def test_a_gateway_that_starts_after_the_robot_hears_it(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_gateway_that_starts_after_the_robot_hears_it(tmp_path: Path) -> None:
     board = Board()
     with simulated_robot(tmp_path), intake(DEFAULT_SOURCES, board):
         wait_until(
-            lambda: age_s(board) < 0.2 and board[specs.BATTERY] and board[specs.DETECTIONS], "all sources"
+            lambda: age_s(board) < 0.2 and has_all(board, specs.BATTERY, specs.DETECTIONS), "all sources"
         )
 
 
-def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(tmp_path: Path) -> None:
     board = Board()
     with intake([ODOMETRY], board) as running, simulated_robot(tmp_path, "--odometry-hz", "1000"):
         source = running.sources["odometry"]
@@ -101,12 +110,13 @@ def test_a_topic_at_1000_hz_is_read_at_the_samplers_pace(ros_domain: int, tmp_pa
         wait_until(lambda: age_s(board) < 0.1, "the newest, not one from a queue")
 
 
-def test_a_topic_every_ten_seconds_keeps_its_value_between(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_topic_every_ten_seconds_keeps_its_value_between(tmp_path: Path) -> None:
     board = Board()
     with intake([ODOMETRY], board), simulated_robot(tmp_path, "--odometry-hz", "0.1"):
         first = wait_until(lambda: board[specs.ODOMETRY], "the first message", within_s=40)
         second = wait_until(
-            lambda: board[specs.ODOMETRY] if board[specs.ODOMETRY] is not first else None,
+            lambda: now if (now := board[specs.ODOMETRY]) is not first else None,
             "the second",
             within_s=40,
         )
@@ -115,7 +125,8 @@ def test_a_topic_every_ten_seconds_keeps_its_value_between(ros_domain: int, tmp_
 
 def test_the_board_holds_what_an_ordinary_subscriber_saw_last(talker: Talker) -> None:
     """Differential: the same messages through rclpy's own way and through ours."""
-    board, seen = Board(), []
+    board = Board()
+    seen: list[OdometryMessage] = []
     with intake([ODOMETRY], board) as running:
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         plain = talker.node.create_subscription(OdometryMessage, ODOMETRY.topic, seen.append, qos)
@@ -130,16 +141,16 @@ def test_the_board_holds_what_an_ordinary_subscriber_saw_last(talker: Talker) ->
         twist = last.twist.twist
         wait_until(
             lambda: (
-                board[specs.ODOMETRY]
-                and (board[specs.ODOMETRY].value.vx_mps, board[specs.ODOMETRY].value.wz_rad_s)
-                == (twist.linear.x, twist.angular.z)
+                (now := board[specs.ODOMETRY])
+                and (now.value.vx_mps, now.value.wz_rad_s) == (twist.linear.x, twist.angular.z)
             ),
             f"{twist.linear.x} on the board",
         )
         assert twist.linear.x == 150.0
 
 
-def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_starting_and_stopping_leaves_nothing_behind() -> None:
     process = psutil.Process()
 
     def once() -> None:
@@ -155,9 +166,11 @@ def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
     assert "ros-sampler" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_the_board_says_when_ros_was_last_read(ros_domain: int) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_the_board_says_when_ros_was_last_read() -> None:
     board = Board()
     assert board.ros_passed_s is None
     with intake(DEFAULT_SOURCES, board):
         first = wait_until(lambda: board.ros_passed_s, "the first pass")
+        assert first
         wait_until(lambda: (board.ros_passed_s or 0) > first, "another pass")

@@ -30,12 +30,13 @@ def watching(source: SourceSettings) -> Iterator[tuple[Board, WaitFor]]:
     """A gateway with this one source, and a function that waits until it has seen what is expected."""
     board = Board()
     with intake([source], board):
-        yield (
-            board,
-            lambda wanted: wait_until(
-                lambda: board.publishers.get(source.spec) == wanted, f"{wanted}, last {board.publishers}"
-            ),
-        )
+
+        def wait_for(expected: Publishers) -> None:
+            wait_until(
+                lambda: board.publishers.get(source.spec) == expected, f"{expected}, last {board.publishers}"
+            )
+
+        yield board, wait_for
 
 
 def test_publishers_come_and_go(talker: Talker) -> None:
@@ -103,9 +104,10 @@ def test_another_type_is_told_apart(talker: Talker) -> None:
         wait_until(lambda: board[specs.BATTERY], "the value of the one that fits")
 
 
-def test_what_cannot_be_read_is_not_looked_for(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_what_cannot_be_read_is_not_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     missing = "no_such_msgs/msg/Thing"
-    monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda message, source: None)
+    monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda *_: None)
     with watching(BATTERY.model_copy(update={"type": missing})) as (board, _):
         assert "no_such_msgs" in board.unusable[specs.BATTERY]
         assert not board.publishers

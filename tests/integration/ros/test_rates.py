@@ -17,7 +17,8 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
 PATIENCE_S = 20
 
 
-def test_a_thousand_values_a_second_are_one_fresh_value(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_thousand_values_a_second_are_one_fresh_value(tmp_path: Path) -> None:
     with simulated_robot(tmp_path, "--odometry-hz", "1000"), gateway_program(tmp_path) as gateway:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot", PATIENCE_S)
         ages_ms = []
@@ -31,9 +32,8 @@ def test_a_thousand_values_a_second_are_one_fresh_value(ros_domain: int, tmp_pat
         assert sorted(ages_ms)[len(ages_ms) // 2] <= 100
 
 
-def test_one_value_in_ten_seconds_is_fresh_for_as_long_as_it_is_told_to_be(
-    ros_domain: int, tmp_path: Path
-) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_one_value_in_ten_seconds_is_fresh_for_as_long_as_it_is_told_to_be(tmp_path: Path) -> None:
     """The same topic for a limit that suits its rate, and for one that does not."""
     kept = [source.model_dump(mode="json") for source in DEFAULT_SOURCES if source.name != "battery"]
     battery = next(source for source in DEFAULT_SOURCES if source.name == "battery").model_dump(mode="json")

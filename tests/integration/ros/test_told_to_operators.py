@@ -6,8 +6,9 @@ import struct
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,13 +86,14 @@ def test_what_a_plain_subscriber_saw_last_is_what_is_served(talker: Talker, tmp_
         wait_until(
             lambda: all(gateway.source(name).available for name in TYPES), "the gateway to hear everything"
         )
+
+        def heard_more_than(counts: dict[str, int]) -> bool:
+            return all(len(plain.heard[name]) > counts[name] for name in TYPES)
+
         for speed in (0.25, -0.5, 0.75):
             robot.change(speed_mps=speed, silent=[])
             counts = {name: len(heard) for name, heard in plain.heard.items()}
-            wait_until(
-                lambda before=counts: all(len(plain.heard[name]) > before[name] for name in TYPES),
-                "new messages of everything",
-            )
+            wait_until(partial(heard_more_than, counts), "new messages of everything")
             robot.change(silent=["odometry", "vision", "battery", "detections", "effective_command"])
             wait_until(lambda: gateway.source("odometry").stale, "silence")
             overlay = gateway.overlay()
@@ -156,6 +158,21 @@ def test_the_mode_and_the_components_a_plain_subscriber_heard_are_served(
         DiagnosticArray, TOPICS["diagnostics"], lambda it: heard.update(components=it.status), 10
     )
     sources = [*(each.model_dump(mode="json", exclude_none=True) for each in DEFAULT_SOURCES), MODE]
+
+    def was_heard(mode: str, levels: dict[str, str]) -> bool:
+        return (
+            heard.get("mode") == mode
+            and "components" in heard
+            and len(in_trouble(heard["components"])) == len(levels)
+        )
+
+    def serves_what_was_heard(answer: Callable[[], Any]) -> bool:
+        status = answer()
+        return bool(
+            status.mission.mode == heard["mode"]
+            and component_faults(status) == in_trouble(heard["components"])
+        )
+
     with (
         simulated_robot(tmp_path, "--diagnostics-hz", "20") as robot,
         gateway_program(tmp_path, sources=sources, faults={"clear_after_ms": 100}) as gateway,
@@ -167,20 +184,10 @@ def test_the_mode_and_the_components_a_plain_subscriber_heard_are_served(
             ("idle", {}),
         ):
             robot.change(mode=mode, components=levels)
-            wait_until(
-                lambda mode=mode, levels=levels: (
-                    heard.get("mode") == mode
-                    and "components" in heard
-                    and len(in_trouble(heard["components"])) == len(levels)
-                ),
-                f"the plain subscriber to hear {mode} and {levels}",
-            )
+            wait_until(partial(was_heard, mode, levels), f"the plain subscriber to hear {mode} and {levels}")
             for answer in (gateway.status, lambda: gateway.overlay().status):
                 wait_until(
-                    lambda answer=answer: (
-                        (status := answer()).mission.mode == heard["mode"]
-                        and component_faults(status) == in_trouble(heard["components"])
-                    ),
+                    partial(serves_what_was_heard, answer),
                     f"{heard['mode']} and {in_trouble(heard['components'])} to be served",
                 )
 
@@ -240,7 +247,8 @@ def test_a_mismatch_is_told_in_words_without_ros_names(talker: Talker, tmp_path:
         assert TOPICS["odometry"] in log, "whoever looks after the robot is told the topic"
 
 
-def test_a_stopped_robot_is_stale_and_its_late_burst_is_new(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_a_stopped_robot_is_stale_and_its_late_burst_is_new(tmp_path: Path) -> None:
     """Stopped as a debugger would: the publishers stay, nothing comes; then everything goes on."""
     with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot")
@@ -263,7 +271,8 @@ def stopped(process: subprocess.Popen[str]) -> Iterator[None]:
         process.send_signal(signal.SIGCONT)
 
 
-def test_ages_grow_with_the_clock_while_nothing_comes(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_ages_grow_with_the_clock_while_nothing_comes(tmp_path: Path) -> None:
     with gateway_program(tmp_path) as gateway, simulated_robot(tmp_path) as robot:
         wait_until(lambda: gateway.status().health.ready, "a healthy robot")
         robot.change(silent=["odometry"])

@@ -1,6 +1,7 @@
 """Real rclpy on both sides: what is published is what the board holds."""
 
 import math
+from functools import partial
 from typing import Any
 
 import pytest
@@ -20,6 +21,7 @@ from gateway.ros.readers import registry
 from gateway.status.board import Board
 from gateway.status.sources import BATTERY, DETECTIONS, ODOMETRY, VISION
 from gateway.status.values import Battery, Detection, Velocity, Vision
+from tests.support.boards import has_all, newest
 from tests.support.talker import Talker, talking
 from tests.support.waiting import wait_until
 
@@ -57,17 +59,11 @@ def test_every_default_source_arrives(talker: Talker) -> None:
             "/battery",
             BatteryState(present=True, voltage=15.5, percentage=0.75, power_supply_status=2),
         )
-        wait_until(
-            lambda: board[ODOMETRY] and board[VISION] and board[DETECTIONS] and board[BATTERY], "all values"
-        )
-    assert board[ODOMETRY]
-    assert board[ODOMETRY].value == Velocity(0.5, -0.25, 0.125)
-    assert board[VISION]
-    assert board[VISION].value == Vision(30.0, 29.5, 18.25, 2**64 - 1, 3)
-    assert board[DETECTIONS]
-    assert board[DETECTIONS].value.items == (Detection(2, "car", 0.5, "9", 640, 360, 100, 50),)
-    assert board[BATTERY]
-    assert board[BATTERY].value == Battery(True, 15.5, 75.0, False)
+        wait_until(lambda: has_all(board, ODOMETRY, VISION, DETECTIONS, BATTERY), "all values")
+    assert newest(board, ODOMETRY).value == Velocity(0.5, -0.25, 0.125)
+    assert newest(board, VISION).value == Vision(30.0, 29.5, 18.25, 2**64 - 1, 3)
+    assert newest(board, DETECTIONS).value.items == (Detection(2, "car", 0.5, "9", 640, 360, 100, 50),)
+    assert newest(board, BATTERY).value == Battery(True, 15.5, 75.0, False)
 
 
 def test_the_other_type_of_detections(talker: Talker) -> None:
@@ -93,9 +89,13 @@ def test_speeds_that_are_no_numbers_leave_the_last_good_value(talker: Talker) ->
         odometry = running.sources["odometry"]
         talker.say(running, "/odometry/filtered", driving(0.5))
         good = wait_until(lambda: board[ODOMETRY], "the good value")
+
+        def without_value(count: int) -> bool:
+            return odometry.counts.without_value == count
+
         for number, bad in enumerate((math.nan, math.inf, -math.inf), start=1):
             talker.say(running, "/odometry/filtered", driving(bad))
-            wait_until(lambda n=number: odometry.counts.without_value == n, "the bad one to be read")
+            wait_until(partial(without_value, number), "the bad one to be read")
         assert board[ODOMETRY] is good
 
 
@@ -108,7 +108,7 @@ def test_ten_thousand_detections_are_capped_and_counted(talker: Talker) -> None:
         assert found.value.count == 10_000
         assert [item.track_id for item in found.value.items] == [str(number) for number in range(100)]
         talker.say(running, "/yolo/detections", DetectionArray())
-        wait_until(lambda: board[DETECTIONS] and board[DETECTIONS].value.count == 0, "the empty picture")
+        wait_until(lambda: newest(board, DETECTIONS).value.count == 0, "the empty frame")
 
 
 def test_a_name_that_is_not_utf8_is_shown_all_the_same(talker: Talker) -> None:
@@ -142,7 +142,7 @@ def test_a_type_that_is_not_installed_leaves_the_others_alone(talker: Talker) ->
         for source in DEFAULT_SOURCES
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(registry._readers, ("no_such_msgs/msg/Thing", VISION), lambda message, source: None)
+        patch.setitem(registry._readers, ("no_such_msgs/msg/Thing", VISION), lambda *_: None)
         with intake(sources, board) as running:
             assert "vision" not in running.sources
             talker.say(running, "/odometry/filtered", driving(0.5))
@@ -175,10 +175,13 @@ def test_of_two_publishers_on_one_topic_the_later_message_counts(talker: Talker)
     with intake(DEFAULT_SOURCES, board) as running, talking("second") as second:
         second.publisher("/odometry/filtered", OdometryMessage)
         talker.meet(running, "/odometry/filtered", OdometryMessage, voices=2)
+
+        def drives_at(speed_mps: float) -> bool:
+            received = board[ODOMETRY]
+            return received is not None and received.value.vx_mps == speed_mps
+
         for number in range(1, 6):
             for voice in (talker, second):
                 speed = number + (0.5 if voice is second else 0.0)
                 voice.say(running, "/odometry/filtered", driving(speed), voices=2)
-                wait_until(
-                    lambda s=speed: board[ODOMETRY] and board[ODOMETRY].value.vx_mps == s, f"speed {speed}"
-                )
+                wait_until(partial(drives_at, speed), f"speed {speed}")

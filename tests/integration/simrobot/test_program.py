@@ -23,6 +23,7 @@ from gateway.status.sources import (
     VISION,
 )
 from gateway.status.values import CommandSource, DiagnosticLevel
+from tests.support.boards import has_all, newest
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
 
@@ -47,72 +48,71 @@ def simrobot(*arguments: str, **environment: str) -> subprocess.CompletedProcess
     )
 
 
-def test_its_topics_are_the_gateways_default_sources(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_its_topics_are_the_gateways_default_sources(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path, "battery_percent=40", "speed_mps=0.75"):
-        wait_until(
-            lambda: board[ODOMETRY] and board[VISION] and board[DETECTIONS] and board[BATTERY], "all sensors"
-        )
-        wait_until(lambda: board[DIAGNOSTICS] and board[EFFECTIVE_COMMAND] and spoken(board), "the rest")
+        wait_until(lambda: has_all(board, ODOMETRY, VISION, DETECTIONS, BATTERY), "all sensors")
+        wait_until(lambda: has_all(board, DIAGNOSTICS, EFFECTIVE_COMMAND) and spoken(board), "the rest")
     assert not board.unusable
     assert spoken(board) == {CommandSource.AUTONOMY}, "the others are there, and do not speak"
-    assert board[ODOMETRY]
-    assert board[ODOMETRY].value.vx_mps == 0.75
-    assert board[BATTERY]
-    assert board[BATTERY].value.charge_percent == pytest.approx(40, abs=1)
-    assert board[DETECTIONS]
-    assert board[DETECTIONS].value.count == 3
+    assert newest(board, ODOMETRY).value.vx_mps == 0.75
+    assert newest(board, BATTERY).value.charge_percent == pytest.approx(40, abs=1)
+    assert newest(board, DETECTIONS).value.count == 3
 
 
-def test_faults_come_and_go_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_faults_come_and_go_while_it_runs(tmp_path: Path) -> None:
     board = Board()
     with intake(DEFAULT_SOURCES, board), simulated_robot(tmp_path) as robot:
         robot.change(battery_percent=7, infer_errors_per_s=50, detection_count=250, speed_mps=-1.25)
-        wait_until(lambda: board[ODOMETRY] and board[ODOMETRY].value.vx_mps == -1.25, "the new speed")
-        wait_until(lambda: board[VISION] and board[VISION].value.infer_error_count > 10, "inference errors")
+        wait_until(lambda: (now := board[ODOMETRY]) and now.value.vx_mps == -1.25, "the new speed")
+        wait_until(lambda: (now := board[VISION]) and now.value.infer_error_count > 10, "inference errors")
         found = wait_until(
-            lambda: board[DETECTIONS] if board[DETECTIONS] and board[DETECTIONS].value.count == 250 else None,
+            lambda: now if (now := board[DETECTIONS]) and now.value.count == 250 else None,
             "many boxes",
         )
         assert len(found.value.items) == 100
         wait_until(
             lambda: (
-                board[BATTERY]
-                and board[BATTERY].value.charge_percent is not None
-                and board[BATTERY].value.charge_percent < 8
+                (now := board[BATTERY])
+                and now.value.charge_percent is not None
+                and now.value.charge_percent < 8
             ),
             "a low battery",
         )
         robot.change(not_a_number=["battery", "detections"])
         wait_until(
-            lambda: board[BATTERY] and board[BATTERY].value.charge_percent is None,
+            lambda: newest(board, BATTERY).value.charge_percent is None,
             "a charge that is not known",
         )
-        wait_until(lambda: board[DETECTIONS] and not board[DETECTIONS].value.items, "no box to draw")
+        wait_until(lambda: not newest(board, DETECTIONS).value.items, "no box to draw")
 
 
-def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_drivers_components_and_modes_change_while_it_runs(tmp_path: Path) -> None:
     board = Board()
-    latched = {"reliability": "reliable", "durability": "transient_local"}
     mode = SourceSettings(
         kind="mode",
         topic="/mission/mode",
         type="std_msgs/msg/String",
         stale_after_ms=1000,
-        **latched,
+        reliability="reliable",
+        durability="transient_local",
     )
 
     def levels() -> dict[str, DiagnosticLevel]:
-        items = board[DIAGNOSTICS].value.items if board[DIAGNOSTICS] else ()
+        received = board[DIAGNOSTICS]
+        items = received.value.items if received else ()
         return {item.component.partition(":")[0]: item.level for item in items}
 
     with simulated_robot(tmp_path, "mode=idle") as robot, intake((*DEFAULT_SOURCES, mode), board):
         wait_until(
-            lambda: board[MODE] and board[MODE].value.name == "idle", "the mode from before the gateway"
+            lambda: (now := board[MODE]) and now.value.name == "idle", "the mode from before the gateway"
         )
         robot.change(commander="keyboard", mode="returning", components={"drive": "error", "lidar": "stale"})
         wait_until(lambda: CommandSource.KEYBOARD in spoken(board), "the keyboard's commands")
-        wait_until(lambda: board[MODE] and board[MODE].value.name == "returning", "the new mode")
+        wait_until(lambda: newest(board, MODE).value.name == "returning", "the new mode")
         wait_until(
             lambda: (
                 levels()
@@ -127,7 +127,8 @@ def test_drivers_components_and_modes_change_while_it_runs(ros_domain: int, tmp_
         )
 
 
-def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_it_ends_within_two_seconds_of_sigterm(tmp_path: Path) -> None:
     with simulated_robot(tmp_path) as robot:
         started = time.monotonic()
         robot.process.terminate()
@@ -136,7 +137,8 @@ def test_it_ends_within_two_seconds_of_sigterm(ros_domain: int, tmp_path: Path) 
         assert not robot.control.exists()
 
 
-def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_control_speaks_to_a_running_robot(tmp_path: Path) -> None:
     with simulated_robot(tmp_path) as robot:
         at = ("--control", str(robot.control))
         assert '"odometry"' in simrobot("control", *at, "silence", "odometry", "battery").stdout
@@ -151,6 +153,7 @@ def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> N
             robot.change(silent=["sonar"])
 
 
+@pytest.mark.usefixtures("ros_domain")
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
@@ -160,7 +163,7 @@ def test_control_speaks_to_a_running_robot(ros_domain: int, tmp_path: Path) -> N
         (("control", "--control", "/nonexistent/robot.sock", "show"), 3, "no simulated robot answers"),
     ],
 )
-def test_a_mistake_is_one_line(ros_domain: int, arguments: tuple[str, ...], code: int, said: str) -> None:
+def test_a_mistake_is_one_line(arguments: tuple[str, ...], code: int, said: str) -> None:
     done = simrobot(*arguments)
     assert done.returncode == code, done.stderr
     assert said in done.stderr
@@ -168,7 +171,8 @@ def test_a_mistake_is_one_line(ros_domain: int, arguments: tuple[str, ...], code
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_without_its_message_packages_it_says_what_to_type(ros_domain: int, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("ros_domain")
+def test_without_its_message_packages_it_says_what_to_type(tmp_path: Path) -> None:
     """A package of the same name that has nothing in it stands in the way of the real one."""
     (tmp_path / "omniseer_msgs").mkdir()
     (tmp_path / "omniseer_msgs" / "__init__.py").touch()

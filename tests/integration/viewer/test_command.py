@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
-from tests.support.judges import decoded_pictures
+from tests.support.judges import decoded_frames
 from tests.support.robotctl import ENDS_WITHIN_S, ROBOTCTL, environment, only_line, robotctl_process
 from tests.support.robotctl_docs import documented, holds
 from tests.support.video_ground import VideoGround, video_ground
@@ -62,12 +62,12 @@ def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path
     holds(documented("view --json"), document, complete=True)
     assert document["pictures"] >= 20
     assert document["recording"] == {"file": str(file), "bytes": file.stat().st_size, "gaps": 0}
-    assert decoded_pictures(file) >= 20
+    assert decoded_frames(file) >= 20
 
 
 def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
-    command = [ROBOTCTL, "--target", running.target, "view", "--headless", "--record", str(file)]
+    command = [str(ROBOTCTL), "--target", running.target, "view", "--headless", "--record", str(file)]
     with subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True) as viewing:
         try:
             wait_until(lambda: file.exists() and file.stat().st_size > 50_000, "something is kept", 30)
@@ -77,11 +77,19 @@ def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> No
             viewing.kill()
     assert viewing.returncode == 0
     assert "kept.ts: " in only_line(said)
-    assert decoded_pictures(file) > 0
+    assert decoded_frames(file) > 0
 
 
 def test_the_window_shows_and_closes(running: VideoGround, tmp_path: Path) -> None:
-    command = [ROBOTCTL, "--target", running.target, "--json", "view", "--record", str(tmp_path / "kept.ts")]
+    command = [
+        str(ROBOTCTL),
+        "--target",
+        running.target,
+        "--json",
+        "view",
+        "--record",
+        str(tmp_path / "kept.ts"),
+    ]
     offscreen = environment(QT_QPA_PLATFORM="offscreen")
     with subprocess.Popen(
         command, env=offscreen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -15,7 +15,7 @@ from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from tests.integration.viewer.conftest import following
 from tests.support.free import free_udp_port
-from tests.support.judges import decoded_pictures
+from tests.support.judges import decoded_frames
 from tests.support.streams import SrtSender, encode
 from tests.support.video_ground import VideoGround, video_ground
 from tests.support.waiting import wait_until
@@ -150,7 +150,7 @@ def test_a_recording_goes_on_over_connections(ground: VideoGround, tmp_path: Pat
     assert recording.size_bytes >= kept_while_live > 0
     assert recording.size_bytes % 188 == 0
     # A frame that waits in the session is dropped for a newer one; the file has them all.
-    assert decoded_pictures(recording.file) >= seen >= 60
+    assert decoded_frames(recording.file) >= seen >= 60
 
 
 def test_a_full_disk_ends_the_recording_alone(ground: VideoGround) -> None:

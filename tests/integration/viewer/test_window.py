@@ -12,6 +12,7 @@ from console.receiver.recording import Recording
 from console.viewer.geometry import Box
 from console.viewer.playback import PlaybackState
 from console.viewer.summary import FrameCounter
+from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
@@ -175,7 +176,8 @@ def seeing(
         shown = double.status.preview
         shown.state = states.PREVIEW_RUNNING
         shown.endpoint.host, shown.endpoint.port, shown.endpoint.latency_ms = "127.0.0.1", preview.port, 20
-        shown.endpoint.transport = shown.endpoint.container = 1
+        shown.endpoint.transport = preview_pb2.STREAM_TRANSPORT_SRT
+        shown.endpoint.container = preview_pb2.STREAM_CONTAINER_MPEG_TS
         with viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
             yield view, double
 

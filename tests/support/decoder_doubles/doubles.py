@@ -7,12 +7,12 @@ DECODER_DOUBLES holds JSON: element name -> how it fails. Elements that are not 
 | ok | it decodes |
 | refuse | the device can't be opened |
 | silent | units go in, nothing comes out, no error |
-| late | it holds pictures back |
-| wrong | its pictures are too light |
-| hang | the driver never comes back from its first picture |
+| late | it holds frames back |
+| wrong | its frames are too light |
+| hang | the driver never comes back from its first frame |
 | stuck | the driver never comes back from being opened |
 | crash | the process dies |
-| error | an ERROR message instead of a picture |
+| error | an ERROR message instead of a frame |
 
 With "later " before it, the decoder proves itself in its trial and fails with the real stream only.
 """
@@ -34,7 +34,7 @@ _BODIES = {
 }
 
 
-class _Double(Gst.Bin):
+class _Double(Gst.Bin):  # type: ignore[misc]  # gi has no types
     """One decoder."""
 
     element: ClassVar[str]

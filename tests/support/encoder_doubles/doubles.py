@@ -31,7 +31,7 @@ VARIABLE = "ENCODER_DOUBLES"
 _ENDLESS = threading.Event()
 
 
-class _Double(Gst.Bin):
+class _Double(Gst.Bin):  # type: ignore[misc]  # gi has no types
     """What the doubles share; the subclasses bring name, properties and the encoder inside."""
 
     element: ClassVar[str]

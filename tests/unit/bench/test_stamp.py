@@ -17,7 +17,7 @@ def drawn(at_s: float) -> bytearray:
     return luma
 
 
-def middle_row(luma: bytes) -> bytes:
+def middle_row(luma: bytearray) -> bytes:
     return bytes(luma[MIDDLE * STRIDE : (MIDDLE + 1) * STRIDE])
 
 

@@ -27,17 +27,17 @@ class Recorder(Interceptor[Call]):
     def __init__(self, name: str, steps: list[str]) -> None:
         self.name, self.steps = name, steps
 
-    def on_call(self, call: Call) -> None:
+    def on_call(self, _call: Call) -> None:
         self.steps.append(f"{self.name} call")
 
-    def on_request(self, call: Call, request: Any) -> Any:
+    def on_request(self, _call: Call, request: Any) -> Any:
         self.steps.append(f"{self.name} {request.decode()}")
         return request + self.name.encode()
 
-    def on_response(self, call: Call, response: Any) -> None:
+    def on_response(self, _call: Call, response: Any) -> None:
         self.steps.append(f"{self.name} {response.decode()}")
 
-    def on_end(self, call: Call, error: BaseException | None) -> None:
+    def on_end(self, _call: Call, error: BaseException | None) -> None:
         self.steps.append(f"{self.name} end" + (f" {type(error).__name__}" if error else ""))
 
 
@@ -70,7 +70,7 @@ async def called(chain: Chain, kind: str, *requests: bytes) -> list[bytes]:
     """What a caller gets over a real connection."""
     make, name = KINDS[kind]
     server = new_server(chain)
-    handlers = {kind: make(BEHAVIORS[kind])}
+    handlers: dict[str, grpc.RpcMethodHandler[bytes, bytes]] = {kind: make(BEHAVIORS[kind])}
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
@@ -107,12 +107,12 @@ async def test_a_caller_that_leaves_a_stream_of_requests_has_not_finished_it(kin
     ended: asyncio.Future[BaseException | None] = asyncio.get_running_loop().create_future()
 
     class Ending(Interceptor[Call]):
-        def on_end(self, call: Call, error: BaseException | None) -> None:
+        def on_end(self, _call: Call, error: BaseException | None) -> None:
             ended.set_result(error)
 
     make, name = KINDS[kind]
     server = new_server(Chain([ErrorInterceptor(), Ending()]))
-    handlers = {kind: make(BEHAVIORS[kind])}
+    handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {kind: make(BEHAVIORS[kind])}
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handlers),))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
@@ -128,7 +128,7 @@ async def test_a_caller_that_leaves_a_stream_of_requests_has_not_finished_it(kin
 
 
 class Refusing(Interceptor[Call]):
-    def on_call(self, call: Call) -> None:
+    def on_call(self, _call: Call) -> None:
         raise InvalidRequestError("not like this")
 
 
@@ -142,7 +142,7 @@ async def test_a_refusal_ends_what_has_begun_and_nothing_else() -> None:
 
 
 class Failing(Interceptor[Call]):
-    def on_end(self, call: Call, error: BaseException | None) -> None:
+    def on_end(self, _call: Call, _error: BaseException | None) -> None:
         raise ZeroDivisionError("secret")
 
 

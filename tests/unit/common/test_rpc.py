@@ -33,7 +33,7 @@ async def answers(error: Exception | None, *, stream: bool = False) -> Any:
         if error:
             raise error
 
-    handlers = {
+    handlers: dict[str, grpc.RpcMethodHandler[bytes, bytes]] = {
         "Unary": grpc.unary_unary_rpc_method_handler(unary),
         "Stream": grpc.unary_stream_rpc_method_handler(streaming),
     }
@@ -44,8 +44,12 @@ async def answers(error: Exception | None, *, stream: bool = False) -> Any:
     try:
         async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
             if stream:
-                return [each async for each in channel.unary_stream("/test.Service/Stream")(b"")]
-            return await channel.unary_unary("/test.Service/Unary")(b"")
+                streamed: grpc.aio.UnaryStreamMultiCallable[bytes, bytes] = channel.unary_stream(
+                    "/test.Service/Stream"
+                )
+                return [each async for each in streamed(b"")]
+            once: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = channel.unary_unary("/test.Service/Unary")
+            return await once(b"")
     finally:
         await server.stop(None)
 
@@ -80,8 +84,11 @@ async def test_an_unknown_method_is_unimplemented() -> None:
     await server.start()
     try:
         async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            nothing: grpc.aio.UnaryUnaryMultiCallable[bytes, bytes] = channel.unary_unary(
+                "/test.Service/Nothing"
+            )
             with pytest.raises(grpc.aio.AioRpcError) as seen:
-                await channel.unary_unary("/test.Service/Nothing")(b"")
+                await nothing(b"")
             assert seen.value.code() is grpc.StatusCode.UNIMPLEMENTED
     finally:
         await server.stop(None)

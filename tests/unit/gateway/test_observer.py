@@ -1,17 +1,21 @@
 from dataclasses import replace
+from typing import Any
 
 from gateway.status.board import Board
 from gateway.status.event import EncoderFallback, Event, FaultRaised, PreviewChanged
 from gateway.status.fault import Severity
 from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Snapshot, SourceRule
-from gateway.status.sources import MODE, ODOMETRY
+from gateway.status.sources import MODE, ODOMETRY, SourceSpec
 from gateway.status.values import Mode, Received, Velocity
 from tests.support import status
 from tests.support.fault_rules import new_observer
 
 OFF = replace(status.OFF, profile=Profile.BALANCED)
-SOURCES = {ODOMETRY: SourceRule(1000, required=True), MODE: SourceRule(0, required=False)}
+SOURCES: dict[SourceSpec[Any], SourceRule] = {
+    ODOMETRY: SourceRule(1000, required=True),
+    MODE: SourceRule(0, required=False),
+}
 
 
 def snapshot(board: Board, preview: PreviewView = OFF, now_s: float = 100.0) -> Snapshot:
@@ -81,9 +85,10 @@ def test_each_settled_state_of_the_preview_is_an_event_of_its_own() -> None:
 
 def test_what_a_fault_tells_programs() -> None:
     observer, board = new_observer(startup_grace_s=0.0), Board()
-    [news] = [each for each in observer.observe(snapshot(board)) if isinstance(each.detail, FaultRaised)]
+    raised = ((each, each.detail) for each in observer.observe(snapshot(board)))
+    [(news, detail)] = [(each, detail) for each, detail in raised if isinstance(detail, FaultRaised)]
     assert (news.severity, news.component) == (Severity.ERROR, "odometry")
-    assert news.message == news.detail.fault.condition.message, "without the word that the severity says"
+    assert news.message == detail.fault.condition.message, "without the word that the severity says"
 
 
 def test_a_fallback_to_another_encoder_is_news() -> None:

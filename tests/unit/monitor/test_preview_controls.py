@@ -16,7 +16,9 @@ from tests.support.snapshots import NOW_S, heard, snapshot
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
 
 
-def with_preview(state: int, error: str = "", reachable: bool = True) -> OverlaySnapshot:
+def with_preview(
+    state: states.PreviewState.ValueType, error: str = "", reachable: bool = True
+) -> OverlaySnapshot:
     def change(made: overlay_pb2.OverlaySnapshot) -> None:
         preview = made.status.preview
         preview.state, preview.last_error, preview.service_reachable = state, error, reachable
@@ -52,7 +54,9 @@ def test_off_a_profile_is_only_selected_for_the_next_time() -> None:
 
 
 @pytest.mark.parametrize("state", [states.PREVIEW_RUNNING, states.PREVIEW_STARTING, states.PREVIEW_FAULTED])
-def test_on_the_switch_turns_it_off_and_a_profile_is_taken_at_once(state: int) -> None:
+def test_on_the_switch_turns_it_off_and_a_profile_is_taken_at_once(
+    state: states.PreviewState.ValueType,
+) -> None:
     now = of(with_preview(state))
     assert now.toggled() == DesiredPreview(False)
     assert now.with_profile(LOW) == DesiredPreview(True, LOW)

@@ -59,7 +59,7 @@ class PlayedRobot:
         return self
 
     @asynccontextmanager
-    async def connect(self, target: str) -> AsyncIterator["PlayedRobot"]:
+    async def connect(self, _target: str) -> AsyncIterator["PlayedRobot"]:
         self.open += 1
         try:
             yield self
@@ -75,11 +75,14 @@ class PlayedRobot:
         return self.lists
 
     async def enable_preview(
-        self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
+        self,
+        profile: PreviewProfile = PreviewProfile.UNKNOWN,
+        *,
+        settle_within_s: float = 10.0,  # noqa: ARG002  # the client's
     ) -> PreviewChange:
         return await self._take(DesiredPreview(True, profile))
 
-    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
+    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:  # noqa: ARG002  # the client's
         return await self._take(DesiredPreview(False))
 
     async def events(
@@ -283,8 +286,9 @@ def test_an_invalid_address_is_reported_at_once() -> None:
 def test_a_fault_of_our_own_does_not_look_like_a_robot_that_stands_still() -> None:
     @asynccontextmanager
     async def broken(target: str) -> AsyncIterator[PlayedRobot]:
-        raise ZeroDivisionError("ours")
-        yield
+        if target:
+            raise ZeroDivisionError("ours")
+        yield PlayedRobot()
 
     worker = Worker("robot", lambda: None, broken)
     worker.start()

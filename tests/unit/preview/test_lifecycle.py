@@ -1,5 +1,7 @@
 """Every transition, driven directly."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -93,6 +95,16 @@ def test_a_first_frame_alone_does_not_shorten_the_delay() -> None:
     lifecycle.handle(Event.FIRST_FRAME)
     lifecycle.handle(Event.FAILURE)
     assert lifecycle.retry_delay_s == 2
+
+
+@pytest.mark.parametrize("again", [Event.RETRY, Event.ENABLE])
+def test_a_start_after_a_fault_is_a_restart_and_another_request_meanwhile_is_no_start(again: Event) -> None:
+    lifecycle = in_state(State.FAULTED)
+    before = lifecycle.counters
+    lifecycle.handle(again)
+    lifecycle.handle(Event.ENABLE)
+    assert lifecycle.state is State.STARTING
+    assert lifecycle.counters == replace(before, starts=before.starts + 1, restarts=before.restarts + 1)
 
 
 def test_counters() -> None:

@@ -5,35 +5,73 @@ import pytest
 pytest_plugins = ["pytester"]
 
 LEAVES = {
-    "process": "subprocess.Popen(['sleep', '5'], start_new_session=True)",
-    "thread": "threading.Thread(target=threading.Event().wait, args=(30,), daemon=True).start()",
-    "socket": "KEPT.append(socket.create_server(('127.0.0.1', 0)))",
-    "file": "KEPT.append(open(__file__))",
-    "unnamed descriptor": "KEPT.extend(os.pipe() for _ in range(30))",
+    "process": ("process", "subprocess.Popen(['sleep', '5'], start_new_session=True)"),
+    "orphan": ("process", "subprocess.run(['sh', '-c', 'setsid sleep 5 &'])"),
+    "zombie": ("process", "KEPT.append(subprocess.Popen(['true']))"),
+    "thread": ("thread", "threading.Thread(target=threading.Event().wait, args=(30,), daemon=True).start()"),
+    "listener": ("socket", "KEPT.append(socket.create_server(('127.0.0.1', 0)))"),
+    "connection": ("socket", "KEPT.extend(connected())"),
+    "datagrams": ("socket", "KEPT.append(bound(socket.AF_INET, ('127.0.0.1', 0)))"),
+    "unix_socket": ("socket", "KEPT.append(bound(socket.AF_UNIX, 'service.sock'))"),
+    "file": ("file", "KEPT.append(open(__file__))"),
+    "pipe": ("pipe", "KEPT.append(os.pipe())"),
+    "events": ("unnamed descriptor", "KEPT.extend(os.eventfd(0) for _ in range(30))"),
 }
+"""Name of the module -> what is reported, what it does."""
+TIDY = {
+    "child": "subprocess.run(['true'])",
+    # Of the process, and kept as long as it lives.
+    "ports": "from tests.support.free import free_tcp_port; free_tcp_port()",
+}
+SHARED = """
+@pytest.fixture(scope="session", autouse=True)
+def shared():
+    yield
+    KEPT.append(socket.create_server(("127.0.0.1", 0)))
+"""
 
 
-@pytest.mark.parametrize("kind", LEAVES)
-def test_a_module_that_leaves_something_fails(pytester: pytest.Pytester, kind: str) -> None:
-    ran = run(pytester, LEAVES[kind])
+def test_each_kind_of_leftover_fails_its_module(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")  # of the summary
+    # The last one has the error of the session.
+    ran = run(pytester, {name: body for name, (_, body) in LEAVES.items()} | {"zz_last": "pass"})
+    ran.assert_outcomes(passed=len(LEAVES) + 1, errors=len(LEAVES) + 1)
+    for name, (what, _) in LEAVES.items():
+        ran.stdout.fnmatch_lines_random(f"ERROR test_{name}.py::test_it - *left behind: {what}*")
+
+
+def test_a_fixture_of_the_session_that_leaves_something_fails(pytester: pytest.Pytester) -> None:
+    ran = run(pytester, {"session": "pass"}, SHARED)
     ran.assert_outcomes(passed=1, errors=1)
-    ran.stdout.fnmatch_lines([f"*left behind: {kind}*"])
+    ran.stdout.fnmatch_lines("ERROR test_session.py::test_it - *left behind: socket*")
 
 
-def test_a_module_that_tidies_up_passes(pytester: pytest.Pytester) -> None:
-    run(pytester, "subprocess.run(['true'])").assert_outcomes(passed=1)
+def test_modules_that_tidy_up_pass(pytester: pytest.Pytester) -> None:
+    run(pytester, TIDY).assert_outcomes(passed=len(TIDY))
 
 
-def run(pytester: pytest.Pytester, body: str) -> pytest.RunResult:
+def run(pytester: pytest.Pytester, bodies: dict[str, str], more: str = "") -> pytest.RunResult:
+    """Runs a module of one test for each body."""
     pytester.makeconftest("from tests.support import leftovers; leftovers.GONE_WITHIN_S = 0.5")
-    pytester.makepyfile(
-        f"""
-        import os, socket, subprocess, threading
-        KEPT = []
+    helpers = """
+import os, socket, subprocess, threading
+import pytest
+KEPT = []
 
-        def test_it():
-            {body}
-        """
-    )
+def bound(family, address):
+    made = socket.socket(family, socket.SOCK_DGRAM)
+    made.bind(address)
+    return made
+
+def connected():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return socket.create_connection(server.getsockname()), server.accept()[0]
+"""
+    modules = {
+        f"test_{name}": f"{helpers}{more}\ndef test_it():\n    {body}\n" for name, body in bodies.items()
+    }
+    pytester.makepyfile(**modules)
     # In a process of its own: what is left behind ends with it, or by its own time.
-    return pytester.runpytest_subprocess("-p", "tests.support.leftovers", "-p", "no:cacheprovider")
+    return pytester.runpytest_subprocess("-ra", "-p", "tests.support.leftovers", "-p", "no:cacheprovider")

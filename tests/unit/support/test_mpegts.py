@@ -49,7 +49,7 @@ class Maker:
     def _table(self, pid: int, section: bytes) -> None:
         self.packet(pid, b"\0" + section + crc32(section), starts=True)
 
-    def picture(self, at_ms: int, *kinds: int, sized: bool = True, filling: int = 0) -> None:
+    def unit(self, at_ms: int, *kinds: int, sized: bool = True, filling: int = 0) -> None:
         pts = at_ms * 90
         stamp = bytes(
             [
@@ -76,7 +76,7 @@ def good(pictures: int = 5) -> Maker:
     for number in range(pictures):
         maker.tables()
         kinds = (SPS, PPS, IDR) if number == 0 else (SLICE,)
-        maker.picture(number * 40, *kinds, filling=600)
+        maker.unit(number * 40, *kinds, filling=600)
     return maker
 
 
@@ -88,20 +88,20 @@ def test_a_good_stream() -> None:
     assert found.broken_tables == 0
     assert found.longest_without_pat_ms == found.longest_without_pmt_ms == pytest.approx(40)
     assert found.longest_without_pcr_ms == pytest.approx(40)
-    assert [picture.pts for picture in found.pictures] == [number * 3600 for number in range(5)]
-    assert [picture.key for picture in found.pictures] == [True, False, False, False, False]
-    assert found.pictures[0].headed
-    assert found.pictures[0].nal_types == (SPS, PPS, IDR)
-    assert all(picture.sized for picture in found.pictures)
+    assert [unit.pts for unit in found.access_units] == [number * 3600 for number in range(5)]
+    assert [unit.key for unit in found.access_units] == [True, False, False, False, False]
+    assert found.access_units[0].headed
+    assert found.access_units[0].nal_types == (SPS, PPS, IDR)
+    assert all(unit.sized for unit in found.access_units)
 
 
 def test_times_beyond_26_hours_fit_their_33_bits() -> None:
     maker = Maker()
     maker.tables()
-    maker.picture(90_000_000, IDR)
-    maker.picture(90_000_040, SLICE)
+    maker.unit(90_000_000, IDR)
+    maker.unit(90_000_040, SLICE)
     found = maker.analysed()
-    assert [picture.pts for picture in found.pictures] == [8_100_000_000, 8_100_003_600]
+    assert [unit.pts for unit in found.access_units] == [8_100_000_000, 8_100_003_600]
     assert found.longest_without_pcr_ms == pytest.approx(40)
 
 
@@ -150,7 +150,7 @@ def test_rare_tables_and_clocks_are_measured() -> None:
     for number in range(10):
         if number in {0, 1, 6, 7}:
             maker.tables()
-        maker.picture(number * 30 + (200 if number > 8 else 0), IDR)
+        maker.unit(number * 30 + (200 if number > 8 else 0), IDR)
     found = maker.analysed()
     assert found.longest_without_pat_ms == pytest.approx(150)
     assert found.longest_without_pmt_ms == pytest.approx(150)
@@ -171,32 +171,32 @@ def test_rare_tables_and_clocks_are_measured() -> None:
 def test_parameter_sets_come_before_the_picture(kinds: tuple[int, ...], headed: bool) -> None:
     maker = Maker()
     maker.tables()
-    maker.picture(0, *kinds)
-    (picture,) = maker.analysed().pictures
-    assert picture.key
-    assert picture.headed is headed
+    maker.unit(0, *kinds)
+    (unit,) = maker.analysed().access_units
+    assert unit.key
+    assert unit.headed is headed
 
 
 def test_h265() -> None:
     maker = Maker(stream_type=0x24)
     maker.tables()
-    maker.picture(0, 32 << 1, 33 << 1, 34 << 1, 19 << 1)
-    maker.picture(40, 1 << 1)
+    maker.unit(0, 32 << 1, 33 << 1, 34 << 1, 19 << 1)
+    maker.unit(40, 1 << 1)
     found = maker.analysed()
     assert found.codec == "h265"
-    assert [(picture.key, picture.headed) for picture in found.pictures] == [(True, True), (False, False)]
+    assert [(unit.key, unit.headed) for unit in found.access_units] == [(True, True), (False, False)]
 
 
 def test_a_packet_without_length_is_noticed() -> None:
     maker = Maker()
     maker.tables()
-    maker.picture(0, IDR, sized=False)
-    assert not maker.analysed().pictures[0].sized
+    maker.unit(0, IDR, sized=False)
+    assert not maker.analysed().access_units[0].sized
 
 
 def test_a_torn_picture_at_the_end_can_be_cut_off() -> None:
     whole, more = good(), good()
-    more.picture(200, SLICE, filling=600)
+    more.unit(200, SLICE, filling=600)
     data = b"".join(more.packets)
     assert analyse(data[:-PACKET_BYTES]).whole_bytes == len(b"".join(whole.packets))
 

@@ -248,9 +248,8 @@ class TestSwitching:
             assert "already running" in again.message
         assert len(double.applied) == 1
 
-    async def test_an_unspecified_profile_is_the_last_chosen(
-        self, operator: Operator, double: PreviewDouble
-    ) -> None:
+    @pytest.mark.usefixtures("double")
+    async def test_an_unspecified_profile_is_the_last_chosen(self, operator: Operator) -> None:
         await operator.switch(True, pb.PREVIEW_PROFILE_LOW_BW)
         await operator.switch(False, pb.PREVIEW_PROFILE_HIGH_QUALITY)
         assert (await operator.switch(True)).preview.profile == pb.PREVIEW_PROFILE_LOW_BW
@@ -317,9 +316,8 @@ class TestSwitching:
         assert status.preview.state == (states.PREVIEW_RUNNING if last.enabled else states.PREVIEW_DISABLED)
         assert double.actual.applied_revision == last.revision
 
-    async def test_events_show_what_happened_without_a_question(
-        self, operator: Operator, double: PreviewDouble
-    ) -> None:
+    @pytest.mark.usefixtures("double")
+    async def test_events_show_what_happened_without_a_question(self, operator: Operator) -> None:
         await operator.switch(True)
         overlay = await eventually(
             operator.overlay,
@@ -330,9 +328,8 @@ class TestSwitching:
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
         assert len(sequences) <= 8
 
-    async def test_a_preview_that_was_on_for_a_moment_was_seen(
-        self, operator: Operator, double: PreviewDouble
-    ) -> None:
+    @pytest.mark.usefixtures("double")
+    async def test_a_preview_that_was_on_for_a_moment_was_seen(self, operator: Operator) -> None:
         for _ in range(2):
             await operator.switch(True)
             await operator.switch(False)

@@ -183,7 +183,7 @@ def test_the_page_gives_every_reason_its_code_and_exception() -> None:
     ]
     assert [row[0] for row in rows] == list(dict.fromkeys(row[0] for row in rows)), "each once"
     assert {row[0]: row[-1] for row in rows} == {
-        reason.value: family.__name__ for reason, family in REASONS.items()
+        str(reason): family.__name__ for reason, family in REASONS.items()
     }
     fixed = {error.reason: code for error, code in STATUS_CODES.items() if hasattr(error, "reason")}
     for row in rows:

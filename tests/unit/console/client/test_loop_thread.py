@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from console.client import loop_thread
 from console.client.errors import Cancelled
 from console.client.loop_thread import LoopThread
 
@@ -41,11 +40,11 @@ def test_a_garbage_collection_within_submit_may_submit(
     really_submit = asyncio.run_coroutine_threadsafe
 
     def collecting(*args: object) -> object:
-        monkeypatch.setattr(loop_thread.asyncio, "run_coroutine_threadsafe", really_submit)
+        monkeypatch.setattr(asyncio, "run_coroutine_threadsafe", really_submit)
         loop.submit(seven()).result(5)
         return really_submit(*args)  # type: ignore[arg-type]  # passed on
 
-    monkeypatch.setattr(loop_thread.asyncio, "run_coroutine_threadsafe", collecting)
+    monkeypatch.setattr(asyncio, "run_coroutine_threadsafe", collecting)
     assert loop.run(seven()) == 7
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
@@ -13,6 +13,8 @@ from console.client.unary import UnaryCalls
 
 STATUS = GET_SYSTEM_STATUS.decode(b"")
 GONE = Unreachable("gone")
+
+T = TypeVar("T")
 
 
 @dataclass
@@ -45,7 +47,7 @@ class Stage:
         self.pauses_s.append(seconds)
         self.now_s += seconds
 
-    async def play(self, work: Awaitable[object], *outcomes: object, each_takes_s: float = 0.0) -> object:
+    async def play(self, work: Awaitable[T], *outcomes: object, each_takes_s: float = 0.0) -> T:
         """Answers each attempt with the next outcome; returns the result."""
         self.outcomes = list(outcomes)
         self.each_takes_s = each_takes_s

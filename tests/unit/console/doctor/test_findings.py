@@ -64,9 +64,9 @@ def test_another_version_is_worth_a_note(double: GatewayDouble) -> None:
     assert (finding.verdict, "0.0.1" in finding.what) == (Verdict.NOTE, True)
 
 
-def test_an_older_gateway_is_examined_all_the_same(double: GatewayDouble) -> None:
+def test_an_older_gateway_is_examined_all_the_same() -> None:
     class Old(GatewayDouble):
-        def GetGatewayInfo(self, request: object, context: grpc.ServicerContext) -> None:  # type: ignore[override]  # noqa: N802
+        def GetGatewayInfo(self, _request: object, context: grpc.ServicerContext) -> None:  # type: ignore[override]  # noqa: N802
             context.abort(grpc.StatusCode.UNIMPLEMENTED, "no such method")
 
     findings = examined(Old())
@@ -126,7 +126,7 @@ def test_a_running_preview_behind_a_firewall(double: GatewayDouble) -> None:
     assert "firewall" in findings["stream"].why
 
 
-def test_a_running_preview_that_answers(double: GatewayDouble) -> None:
+def test_a_running_preview_that_answers() -> None:
     with srt_listener() as port:
         assert network.stream_finding("127.0.0.1", port).verdict is Verdict.GOOD
 

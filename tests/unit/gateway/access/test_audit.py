@@ -84,7 +84,7 @@ def test_a_full_disk_leaves_no_half_line_and_is_told(tmp_path: Path, monkeypatch
         room -= written
         return written
 
-    monkeypatch.setattr(audit.os, "write", write)
+    monkeypatch.setattr(os, "write", write)
     with log.writing():
         for number in range(10):
             log.record(action(number))

@@ -32,7 +32,7 @@ def test_waits_grow_and_end() -> None:
         lockout.failed("10.0.0.5", "a")
         seen.append(waits_s(lockout))
         clock.now_s += seen[-1]
-        assert waits_s(lockout) == 0
+        lockout.admit("10.0.0.5", "a")
     assert seen == [0.0] * FREE_FAILURES + [1, 2, 4, 8, 16, 32, LONGEST_WAIT_S, *[LONGEST_WAIT_S] * 3]
 
 
@@ -51,14 +51,54 @@ def test_only_the_pair_of_address_and_credential_waits() -> None:
 def test_success_and_a_quiet_time_reset_the_count() -> None:
     clock = Clock()
     lockout = Lockout(clock)
-    for forget in (
-        lambda: lockout.succeeded("10.0.0.5", "a"),
-        lambda: setattr(clock, "now_s", clock.now_s + FORGET_AFTER_S + 1),
-    ):
+
+    def succeed() -> None:
+        lockout.succeeded("10.0.0.5", "a")
+
+    def wait() -> None:
+        clock.now_s += FORGET_AFTER_S + 1
+
+    for forget in (succeed, wait):
         for _ in range(FREE_FAILURES):
             assert not lockout.failed("10.0.0.5", "a")
         forget()
     assert not lockout.failed("10.0.0.5", "a")
+
+
+def test_the_quiet_time_begins_with_the_last_failure() -> None:
+    clock = Clock()
+    lockout = Lockout(clock)
+    for _ in range(FREE_FAILURES):
+        assert not lockout.failed("10.0.0.5", "a")
+        clock.now_s += FORGET_AFTER_S
+    assert lockout.failed("10.0.0.5", "a"), "each came just before the one before it was forgotten"
+    for _ in range(4):
+        lockout.failed("10.0.0.5", "a")
+    clock.now_s += FORGET_AFTER_S + 1
+    assert not lockout.failed("10.0.0.5", "a"), "not with the end of the wait"
+
+
+def test_the_wait_is_rounded_up_for_people() -> None:
+    clock = Clock()
+    lockout = Lockout(clock)
+    for _ in range(FREE_FAILURES + 2):
+        lockout.failed("10.0.0.5", "a")
+    clock.now_s += 0.75
+    with pytest.raises(TooMuchError, match=r"^7 wrong credentials .* Try again in 2 s$") as caught:
+        lockout.admit("10.0.0.5", "a")
+    assert caught.value.retry_after_s == 1.25
+
+
+def test_a_guesser_who_goes_on_is_not_the_first_to_be_dropped() -> None:
+    lockout = Lockout(Clock())
+    for _ in range(FREE_FAILURES + 1):
+        lockout.failed("10.0.0.5", "a")
+    for number in range(MAX_ENTRIES - 1):
+        lockout.failed("10.0.0.6", str(number))
+    lockout.failed("10.0.0.5", "a")
+    lockout.failed("10.0.0.6", "one more")
+    assert len(vars(lockout)["_entries"]) == MAX_ENTRIES
+    assert waits_s(lockout)
 
 
 def test_memory_is_bounded_and_the_newest_are_remembered() -> None:

@@ -55,12 +55,10 @@ def test_a_refused_request_is_not_repeated_to_the_same_process_but_to_the_next()
     reconciler = connected()
     desired = reconciler.request(BRIGHT)
     reconciler.take_refusal(desired, "too bright")
-    assert reconciler.refusal == "too bright"
-    assert reconciler.pending() is None
+    assert (reconciler.refusal, reconciler.pending()) == ("too bright", None)
     assert reconciler.settled(desired)
     reconciler.take_report(LampReport("b"), 1.0)
-    assert reconciler.refusal is None
-    assert reconciler.pending() == desired
+    assert (reconciler.refusal, reconciler.pending()) == (None, desired)
 
 
 def test_a_new_request_follows_a_refused_one() -> None:
@@ -92,6 +90,33 @@ def test_a_report_that_a_reply_has_overtaken_is_ignored() -> None:
     assert not reconciler.take_report(LampReport("a", 0, 0), 1.1)
     assert reconciler.view.percent == 90
     assert reconciler.pending() is None
+
+
+def test_an_older_report_counts_after_a_loss() -> None:
+    """The process may have lost what it had applied, without becoming another one."""
+    reconciler = connected()
+    desired = reconciler.request(BRIGHT)
+    reconciler.take_report(LampReport("a", desired.revision, 90), 1.0)
+    reconciler.take_loss("gone")
+    assert reconciler.take_report(LampReport("a", 0, 0), 2.0)
+    assert reconciler.pending() is desired
+
+
+def test_only_a_spec_that_was_applied_before_is_applied_again() -> None:
+    seen: list[bool] = []
+
+    class Recording(LampModel):
+        def take_report(self, _spec: LampSpec, _report: LampReport, *, reapplying: bool) -> None:
+            seen.append(reapplying)
+
+    reconciler = Reconciler(FIRST, Recording())
+    first = reconciler.request(BRIGHT)
+    reconciler.take_report(LampReport("a"), 0.0)
+    reconciler.take_report(LampReport("a", first.revision), 1.0)
+    reconciler.take_report(LampReport("b"), 2.0)
+    reconciler.request(DIM)
+    reconciler.take_report(LampReport("b"), 3.0)
+    assert seen == [False, False, True, False]
 
 
 def test_an_older_request_is_settled_by_a_newer_one() -> None:

@@ -4,6 +4,7 @@ import asyncio
 import json
 import re
 import time
+from collections.abc import AsyncGenerator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -236,6 +237,7 @@ async def test_what_a_slow_reader_does_not_get_is_counted() -> None:
 
     ticking = asyncio.create_task(stream.run())
     responses = stream.responses(0, Recipient("127.0.0.1", sees_passphrase=True))
+    assert isinstance(responses, AsyncGenerator)
     await anext(responses)
     assert stream.skipped == 0
     await eventually(skipped, lambda count: count > 0, "the next one came due before the reader was back")

@@ -246,4 +246,4 @@ def test_a_type_read_for_another_kind_is_refused() -> None:
 
 def test_two_readers_for_one_type_are_a_mistake() -> None:
     with pytest.raises(ValueError, match="two readers"):
-        reads("nav_msgs/msg/Odometry", specs.ODOMETRY)(lambda message, settings: None)
+        reads("nav_msgs/msg/Odometry", specs.ODOMETRY)(lambda *_: None)

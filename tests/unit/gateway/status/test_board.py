@@ -32,6 +32,7 @@ def test_diagnostics_are_put_together_and_as_old_as_the_newest_message() -> None
     for number, name in enumerate(("drive", "arm")):
         item = DiagnosticItem(name, DiagnosticLevel.OK, "")
         board[DIAGNOSTICS] = Received(Diagnostics((item,)), float(number))
-    assert board[DIAGNOSTICS]
-    assert [item.component for item in board[DIAGNOSTICS].value.items] == ["drive", "arm"]
-    assert board[DIAGNOSTICS].at_s == 1.0
+    newest = board[DIAGNOSTICS]
+    assert newest
+    assert [item.component for item in newest.value.items] == ["drive", "arm"]
+    assert newest.at_s == 1.0

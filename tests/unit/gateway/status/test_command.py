@@ -1,5 +1,8 @@
 """Who gave the command: named only where there is no doubt."""
 
+from dataclasses import replace
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,7 +47,15 @@ def test_what_nobody_asked_for_is_nobodys() -> None:
 
 def test_an_input_of_long_ago_is_not_what_the_mux_emits_now() -> None:
     assert giver(STOP, {KEYBOARD: Received(STOP, NOW_S - TOGETHER_S - 0.01)}) is None
-    assert giver(STOP, {KEYBOARD: Received(STOP, NOW_S - TOGETHER_S + 0.01)}) is KEYBOARD
+    assert giver(STOP, {KEYBOARD: Received(STOP, NOW_S - TOGETHER_S)}) is KEYBOARD
+
+
+@pytest.mark.parametrize("part", ["vx_mps", "vy_mps", "wz_rad_s"])
+def test_every_part_of_the_velocity_has_to_agree(part: str) -> None:
+    speed = getattr(FORWARD, part)
+    for off, expected in ((TOLERANCE / 2, KEYBOARD), (2 * TOLERANCE, None), (-2 * TOLERANCE, None)):
+        asked = replace(FORWARD, **{part: speed + off})
+        assert giver(FORWARD, {KEYBOARD: Received(asked, NOW_S)}) is expected, off
 
 
 def test_a_mux_that_fell_silent_follows_nobody() -> None:

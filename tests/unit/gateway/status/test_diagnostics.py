@@ -37,7 +37,8 @@ def test_too_many_components_forget_those_who_are_silent_longest() -> None:
     )
 )
 def test_the_last_word_of_each_is_kept_whatever_comes(messages: list[Diagnostics]) -> None:
-    known, model = said(), {}
+    known = said()
+    model: dict[str, DiagnosticItem] = {}
     for message in messages:
         known = known.merged(message)
         model |= {item.component: item for item in message.items}

@@ -1,5 +1,7 @@
 """Freshness and health against the plainest model of the same rules."""
 
+from typing import Any
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -7,7 +9,7 @@ from gateway.status.board import Board
 from gateway.status.freshness import NEVER, Freshness, sample
 from gateway.status.health import HealthState, RobotHealth, assess
 from gateway.status.snapshot import SourceRule
-from gateway.status.sources import ODOMETRY, VISION
+from gateway.status.sources import ODOMETRY, VISION, SourceSpec
 from gateway.status.values import Received, Velocity, Vision
 from tests.support.status import snapshot_of
 
@@ -69,11 +71,11 @@ def test_health_follows_the_contract_line_by_line(
 ) -> None:
     """None for "required" is a robot that is configured without the source."""
     now_s = 1000.0
-    sources = {
-        spec: SourceRule(limit, required)
-        for spec, limit, required in [(ODOMETRY, 1000, odometry_required), (VISION, 2000, vision_required)]
-        if required is not None
-    }
+    sources: dict[SourceSpec[Any], SourceRule] = {}
+    if odometry_required is not None:
+        sources[ODOMETRY] = SourceRule(1000, odometry_required)
+    if vision_required is not None:
+        sources[VISION] = SourceRule(2000, vision_required)
     # Half a millisecond off, so that no age sits on a rounding edge.
     board = Board()
     if odometry_age_ms is not None:

@@ -140,7 +140,7 @@ GAS = SourceSpec("gas", Gas, stale_after_ms=2000)
 @contextmanager
 def gas_reader() -> Iterator[None]:
     key = ("my_msgs/msg/Gas", GAS)
-    reads(*key)(lambda message, source: Gas(float(message.ppm)))
+    reads(*key)(lambda message, _source: Gas(float(message.ppm)))
     try:
         yield
     finally:
@@ -152,6 +152,7 @@ def test_a_made_up_kind_needs_its_entry_and_a_reader() -> None:
     with gas_reader():
         assert types_of(GAS) == ["my_msgs/msg/Gas"]
         value = registry._readers["my_msgs/msg/Gas", GAS](SimpleNamespace(ppm=12), None)  # type: ignore[arg-type]
+    assert value
     board = Board()
     waiting = snapshot(board, GAS)
     board[GAS] = Received(value, NOW_S)

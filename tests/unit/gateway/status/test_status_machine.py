@@ -22,9 +22,9 @@ from tests.support.fault_rules import new_observer
 from tests.support.status import snapshot_of
 
 GRACE_S, CLEAR_AFTER_S, PASS_S = 5.0, 2.0, 0.05
-LIMITS_MS = {ODOMETRY: 1000, VISION: 2000, BATTERY: 5000}
+LIMITS_MS: dict[SourceSpec[Any], int] = {ODOMETRY: 1000, VISION: 2000, BATTERY: 5000}
 RULES = {spec: SourceRule(limit, spec is not BATTERY) for spec, limit in LIMITS_MS.items()}
-WORDS = {ODOMETRY: "odometry", VISION: "vision telemetry"}
+WORDS: dict[SourceSpec[Any], str] = {ODOMETRY: "odometry", VISION: "vision telemetry"}
 SPECS = st.sampled_from(sorted(LIMITS_MS, key=lambda spec: spec.name))
 
 
@@ -135,7 +135,8 @@ class Life(RuleBasedStateMachine):
     def health_names_the_first_thing_that_is_wrong(self) -> None:
         now = self.snapshot()
         expected = "robot healthy"
-        for spec in (VISION, ODOMETRY):
+        required: tuple[SourceSpec[Any], ...] = (VISION, ODOMETRY)
+        for spec in required:
             seen = now[spec].freshness
             if not seen.available:
                 expected = f"waiting for {WORDS[spec]}"

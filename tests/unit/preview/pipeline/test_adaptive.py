@@ -91,6 +91,26 @@ def test_it_climbs_slowly_back_to_the_target() -> None:
     assert controller.decide(QUIET, now + 31).reason == ""
 
 
+def test_it_climbs_after_three_quiet_seconds_by_a_step_a_second() -> None:
+    controller = BitrateController(2500, 500)
+    now = settled(controller)
+    assert controller.decide(link(dropped=5), now).bitrate_kbps == 1750
+    assert controller.decide(QUIET, now + 2.5).bitrate_kbps == 1750
+    assert controller.decide(QUIET, now + 3.0).bitrate_kbps == 1875
+    assert controller.decide(QUIET, now + 3.5).bitrate_kbps == 1875, "one step a second"
+    assert controller.decide(QUIET, now + 4.0).bitrate_kbps == 2000
+
+
+def test_it_climbs_carefully_near_the_rate_that_was_too_much_last() -> None:
+    controller = BitrateController(2500, 500)
+    now = settled(controller)
+    for step in range(2):
+        controller.decide(link(dropped=5), now + step)
+    rates = [controller.decide(QUIET, now + step).bitrate_kbps for step in range(3, 10)]
+    # 80 % of 1750 is 1400, and of 2500 it is 2000.
+    assert rates == [1225, 1350, 1475, 1506, 1537, 1568, 1599]
+
+
 def test_where_hardly_anything_gets_through_the_rate_is_halved() -> None:
     for severe in (link(loss=40), link(dropped=30)):
         controller = BitrateController(2500, 500)
@@ -102,6 +122,29 @@ def test_a_round_trip_that_is_always_long_is_no_congestion() -> None:
     controller = BitrateController(2500, 500)
     for step in range(40):
         assert controller.decide(link(rtt_ms=250), step * 0.5).bitrate_kbps == 2500
+
+
+def test_a_round_trip_that_stays_longer_becomes_the_usual_one() -> None:
+    """1.02 a window: from 10 ms it takes 106 windows until 200 ms are no more than 2.5 times as long."""
+    controller = BitrateController(2500, 500)
+    now = settled(controller)
+    rates = [controller.decide(link(rtt_ms=200), now + step * 0.5).bitrate_kbps for step in range(250)]
+    assert rates[100] == 500
+    assert rates[-1] == 2500
+
+
+def test_a_short_round_trip_may_grow_by_40_ms() -> None:
+    controller = BitrateController(2500, 500)
+    now = settled(controller)
+    assert controller.decide(link(rtt_ms=49), now).bitrate_kbps == 2500
+    assert controller.decide(link(rtt_ms=55), now + 0.5).bitrate_kbps == 1750
+
+
+def test_the_round_trip_of_the_viewer_before_does_not_count() -> None:
+    controller = BitrateController(2500, 500)
+    now = settled(controller)
+    controller.decide(None, now)
+    assert controller.decide(link(rtt_ms=250), now + 0.5).bitrate_kbps == 2500
 
 
 def test_without_viewers_the_target_comes_back() -> None:

@@ -24,7 +24,7 @@ def test_a_source_may_take_its_time_to_begin() -> None:
 def test_a_source_that_stalls() -> None:
     watchdogs = dogs()
     assert watchdogs.check(30, 30, 1.0) is None
-    assert watchdogs.check(30, 30, 2.4) is None
+    assert watchdogs.check(30, 30, 2.5) is None
     assert watchdogs.check(30, 30, 2.6) is Silent.SOURCE
 
 
@@ -32,7 +32,16 @@ def test_an_encoder_that_never_begins_is_timed_from_the_first_frame() -> None:
     watchdogs = dogs()
     assert watchdogs.check(1, 0, 4.0) is None
     assert watchdogs.check(20, 0, 4.9) is None
-    assert watchdogs.check(25, 0, 5.1) is Silent.ENCODER
+    assert watchdogs.check(25, 0, 5.0) is None, "not longer than its second"
+    assert watchdogs.check(26, 0, 5.5) is Silent.ENCODER
+    assert watchdogs.silence_s(Silent.ENCODER, 5.5) == 1.5
+
+
+def test_the_encoders_time_starts_with_an_early_first_frame() -> None:
+    watchdogs = dogs()
+    assert watchdogs.check(1, 0, 0.5) is None
+    assert watchdogs.check(10, 0, 1.4) is None
+    assert watchdogs.check(11, 0, 1.6) is Silent.ENCODER
 
 
 def test_an_encoder_that_stops() -> None:

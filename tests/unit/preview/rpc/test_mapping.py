@@ -23,7 +23,7 @@ FULL = ActualState(
     latency_ms=125,
     stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
     encoder=EncoderChoice("va-h265", hardware=True, wanted="mpp-h265", fallback_reason="why"),
-    measurement=Measurement(59.5, 4400.0, 2, 12, 30.5, 1.5),
+    measurement=Measurement(59.5, 4400.0, 21, 12, 30.5, 1.5),
 )
 
 
@@ -55,12 +55,34 @@ def test_a_full_status_fills_every_field() -> None:
     assert unset_fields(mapping.actual_state(FULL)) == []
 
 
-def test_numbers_arrive_where_they_belong() -> None:
-    actual = mapping.actual_state(FULL)
-    assert actual.counters == pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4)
-    assert (actual.stream.target_bitrate_kbps, actual.stream.fps) == (3000, 60)
-    assert (actual.listener.port, actual.listener.latency_ms) == (7100, 125)
-    assert (actual.measurement.worst_rtt_ms, actual.measurement.worst_loss_percent) == (30.5, 1.5)
+def test_every_value_arrives_at_its_place() -> None:
+    assert mapping.actual_state(FULL) == pb.ActualState(
+        instance_id="abc",
+        applied_revision=7,
+        state=pb.LIFECYCLE_STATE_RUNNING,
+        profile=pb.PROFILE_HIGH_QUALITY,
+        last_error="something",
+        counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+        listener=pb.Listener(port=7100, latency_ms=125),
+        stream=pb.Stream(
+            width_px=1280,
+            height_px=720,
+            fps=60,
+            target_bitrate_kbps=3000,
+            codec=pb.CODEC_H265,
+            encrypted=True,
+            bitrate_reason="because",
+        ),
+        encoder=pb.Encoder(name="va-h265", hardware=True, wanted="mpp-h265", fallback_reason="why"),
+        measurement=pb.Measurement(
+            fps=59.5,
+            bitrate_kbps=4400,
+            viewer_count=21,
+            last_frame_age_ms=12,
+            worst_rtt_ms=30.5,
+            worst_loss_percent=1.5,
+        ),
+    )
 
 
 def test_an_empty_status_leaves_out_what_is_not_there() -> None:
@@ -72,7 +94,19 @@ def test_an_empty_status_leaves_out_what_is_not_there() -> None:
 def test_a_candidate_fills_every_field() -> None:
     candidate = mapping.candidate(CATALOGUE["mpp-h265"], Verdict(True, True, "reason", 12.0))
     assert unset_fields(candidate) == []
-    assert not mapping.candidate(CATALOGUE["x264"], Verdict(False, False)).HasField("first_byte_ms")
+    assert candidate == pb.EncoderCandidate(
+        name="mpp-h265",
+        family="mpp",
+        element="mpph265enc",
+        codec=pb.CODEC_H265,
+        hardware=True,
+        present=True,
+        proven=True,
+        reason="reason",
+        first_byte_ms=12,
+    )
+    untried = mapping.candidate(CATALOGUE["x264"], Verdict(True, False))
+    assert (untried.present, untried.proven, untried.HasField("first_byte_ms")) == (True, False, False)
 
 
 def test_a_desired_state_and_its_passphrase() -> None:

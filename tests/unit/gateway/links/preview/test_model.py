@@ -110,13 +110,11 @@ def test_the_service_lost_while_on_is_a_fault_and_its_return_a_restart() -> None
     assert preview.pending() is None
 
     assert preview.take_loss("gone")
-    assert preview.view.state is S.FAULTED
-    assert preview.view.stream is None
+    assert (preview.view.state, preview.view.stream) == (S.FAULTED, None)
     assert not preview.take_loss("still gone")
 
     preview.take_report(report(instance="b"), 2.0)
-    assert preview.pending() == desired
-    assert preview.view.state is S.STARTING
+    assert (preview.pending(), preview.view.state) == (desired, S.STARTING)
     preview.take_report(
         report(S.RUNNING, desired.revision, instance="b", starts=1, profile=Profile.LOW_BW), 3.0
     )

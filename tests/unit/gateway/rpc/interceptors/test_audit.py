@@ -210,7 +210,7 @@ async def test_a_caller_that_is_locked_out_is_not_recorded() -> None:
 class Leaving(Interceptor[CallContext]):
     """In the place of Auth, while it reads the credentials: the caller leaves meanwhile."""
 
-    def on_call(self, call: CallContext) -> None:
+    def on_call(self, _call: CallContext) -> None:
         raise asyncio.CancelledError
 
 

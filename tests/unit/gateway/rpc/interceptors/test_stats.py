@@ -23,7 +23,7 @@ class Clock:
 class Refusing(Interceptor[CallContext]):
     """One further in, that lets no call pass."""
 
-    def on_call(self, call: CallContext) -> None:
+    def on_call(self, _call: CallContext) -> None:
         raise TooMuchError("too often", Reason.TOO_MANY_REQUESTS)
 
 

@@ -1,6 +1,7 @@
 """What counts as a fault, rule by rule."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -26,6 +27,7 @@ from gateway.status.sources import (
     ODOMETRY,
     ONBOARD_BATTERY,
     SOURCES,
+    SourceSpec,
 )
 from gateway.status.values import (
     Battery,
@@ -102,7 +104,8 @@ def test_a_source_that_does_not_come(
     at_s: float | None, required: bool, up_s: float, expected: dict[str, Severity]
 ) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
+    if at_s is not None:
+        of[ODOMETRY] = Received(Velocity(0, 0, 0), at_s)
     faults = found(snapshot(of, odometry=required), up_s=up_s)
     assert {fault_id: fault.severity for fault_id, fault in faults.items()} == expected
 
@@ -122,9 +125,19 @@ def test_a_source_that_does_not_come(
 )
 def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, expected: str | None) -> None:
     of = board()
-    of[ODOMETRY] = None if at_s is None else Received(Velocity(0, 0, 0), at_s)
+    if at_s is not None:
+        of[ODOMETRY] = Received(Velocity(0, 0, 0), at_s)
     of.publishers[ODOMETRY] = publishers
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
+
+
+@pytest.mark.parametrize(("up_s", "expected"), [(4.9, set()), (5.0, {"odometry.silent"})])
+def test_a_publisher_may_be_silent_until_the_startup_grace_has_elapsed(
+    up_s: float, expected: set[str]
+) -> None:
+    of = board()
+    of.publishers[ODOMETRY] = Publishers(1)
+    assert set(found(snapshot(of, odometry=True), up_s=up_s)) == expected
 
 
 def test_messages_that_cant_be_decoded() -> None:
@@ -247,9 +260,24 @@ def test_what_is_not_known_neither_raises_nor_ends_a_fault() -> None:
     assert set(found(snapshot(unknown), active)) == active
 
 
+def test_a_stale_charge_neither_raises_nor_clears_a_fault() -> None:
+    for charge_percent, active in ((5.0, frozenset[str]()), (90.0, frozenset({"battery.low"}))):
+        of = board()
+        of[BATTERY] = Received(replace(FULL, charge_percent=charge_percent), NOW_S - 10)
+        # Its staleness is a fault of the source.
+        assert found(snapshot(of, battery=False), active).keys() - {"battery.stale"} == active
+
+
 def test_a_computer_that_is_not_looked_at_any_more_is_a_fault_of_its_own() -> None:
     old = board(compute=replace(COOL, cpu_temperature_c=99.0), at_s=NOW_S - 10)
     assert set(found(snapshot(old))) == {"platform.stale"}
+
+
+@pytest.mark.parametrize("spec", [COMPUTE, NETWORK], ids=lambda spec: spec.name)
+def test_one_stale_part_of_the_computer_is_enough(spec: SourceSpec[Any]) -> None:
+    parts: dict[SourceSpec[Any], Any] = {COMPUTE: COOL, NETWORK: STRONG}
+    of = Board({each: Received(part, NOW_S - 10 * (each is spec)) for each, part in parts.items()})
+    assert set(found(snapshot(of))) == {"platform.stale"}
 
 
 def test_a_preview_that_tries_again_has_not_recovered() -> None:

@@ -70,6 +70,33 @@ def test_only_the_newest_that_are_over_are_remembered(book: FaultTracker) -> Non
     assert len(book.faults) == MOST_CLEARED
 
 
+def test_the_newest_cleared_fault_comes_first(book: FaultTracker) -> None:
+    book.update([condition("a"), condition("b")], 10.0)
+    book.update([condition("a")], 13.0)
+    book.update([], 16.0)
+    assert ids(book.faults) == ["a", "b"]
+
+
+def test_counts_are_kept_of_the_latest_ids_alone(book: FaultTracker) -> None:
+    now_s = 0.0
+
+    def raised(*names: str) -> int:
+        """Raises and clears these faults; returns the count of the last one."""
+        nonlocal now_s
+        count = 0
+        for name in names:
+            now_s += 10.0
+            (fault,) = book.update([condition(name)], now_s).raised
+            count = fault.times_raised
+            now_s += 10.0
+            book.update([], now_s)
+        return count
+
+    assert raised("a", *(f"one {number}" for number in range(1000)), "a") == 2
+    assert raised(*(f"two {number}" for number in range(1000)), "a") == 3, "raised again, it is the latest"
+    assert raised(*(f"three {number}" for number in range(1024)), "a") == 1, "1024 others came since"
+
+
 def test_getting_worse_is_told_and_keeps_the_onset(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     changes = book.update([condition("a", Severity.ERROR, "it burns")], 11.0)
@@ -99,6 +126,14 @@ def test_worse_takes_the_place_and_what_gave_way_is_not_called_over(book: FaultT
     assert ids(changes.raised) == ["worst", CAPPED]
     assert changes.cleared == ()
     assert len([fault for fault in book.faults if fault.active]) == MOST_ACTIVE
+
+
+def test_among_equals_the_listed_ones_stay(book: FaultTracker) -> None:
+    listed = [condition(f"m{number:03}") for number in range(MOST_ACTIVE - 1)]
+    book.update(listed, 1.0)
+    changes = book.update([condition("a"), *listed, condition("z")], 2.0)
+    assert ids(changes.raised) == [CAPPED]
+    assert {each.fault_id for each in listed} < book.active_ids
 
 
 STEPS = st.lists(
