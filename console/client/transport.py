@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
 import grpc
+from google.protobuf.message import DecodeError
 
 from console.client.credentials import Credentials
 from console.client.error_table import error_from, stream_error_from
-from console.client.errors import Cancelled, DeadlineExceeded, GatewayError
+from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed
 from console.client.mapping.methods import METHODS, STREAMS, Method
 from console.client.options import ClientOptions
 
@@ -53,9 +54,7 @@ class GrpcTransport:
         """
         self.check_open()
         try:
-            result: ResultT = await self._calls[method.name](
-                request, timeout=timeout_s, metadata=self._metadata
-            )
+            answer = await self._calls[method.name](request, timeout=timeout_s, metadata=self._metadata)
         except grpc.RpcError as failure:
             raise error_from(failure, self._target, timeout_s) from None
         except asyncio.CancelledError:
@@ -63,7 +62,7 @@ class GrpcTransport:
             if not self._closed.is_set() or _being_cancelled():
                 raise
             raise Cancelled("this client was closed") from None
-        return result
+        return self.decode(method, answer)
 
     def open(self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool) -> "Responses":
         """Starts a server-streaming call.
@@ -78,7 +77,20 @@ class GrpcTransport:
         """
         self.check_open()
         call = self._streams[method.name](request, metadata=self._metadata)
-        return Responses(call, self, newest_only=newest_only)
+        return Responses(call, method, self, newest_only=newest_only)
+
+    def decode(self, method: Method[Any, ResultT], answer: bytes) -> ResultT:
+        """Returns the result of an answer.
+
+        Raises:
+            GatewayFailed: It is unreadable. As a deserializer of gRPC, `Method.decode` would lose its error.
+        """
+        try:
+            return method.decode(answer)
+        except DecodeError as error:
+            raise GatewayFailed(
+                f"the robot gateway at {self._target} sent an unreadable answer to {method.name}"
+            ) from error
 
     async def sleep(self, seconds: float) -> None:
         """Sleeps.
@@ -112,7 +124,10 @@ class GrpcTransport:
 class Responses:
     """The items of one server-streaming call, received by a task of its own."""
 
-    def __init__(self, call: Any, transport: GrpcTransport, *, newest_only: bool) -> None:
+    def __init__(
+        self, call: Any, method: Method[Any, Any], transport: GrpcTransport, *, newest_only: bool
+    ) -> None:
+        self._method = method
         self._transport = transport
         self._newest_only = newest_only
         self._queue: asyncio.Queue[Any] = asyncio.Queue(1 if newest_only else _MOST_WAITING)
@@ -141,13 +156,17 @@ class Responses:
     async def _receive(self, call: Any) -> None:
         error: GatewayError
         try:
-            async for item in call:
+            async for answer in call:
+                item = self._transport.decode(self._method, answer)
                 if self._newest_only and self._queue.full():
                     self._queue.get_nowait()
                 await self._queue.put(item)
             error = self._transport.end_of_stream(None)
         except grpc.RpcError as failure:
             error = self._transport.end_of_stream(failure)
+        except GatewayFailed as failure:
+            call.cancel()
+            error = failure
         except asyncio.CancelledError:
             call.cancel()
             # gRPC raises it, too, when the channel was closed under the call.
@@ -159,12 +178,7 @@ class Responses:
 
 
 def _by_name(multicallable: Any, methods: tuple[Method[Any, Any], ...]) -> Mapping[str, Any]:
-    return {
-        method.name: multicallable(
-            method.path, request_serializer=method.encode, response_deserializer=method.decode
-        )
-        for method in methods
-    }
+    return {method.name: multicallable(method.path, request_serializer=method.encode) for method in methods}
 
 
 def _being_cancelled() -> bool:

@@ -23,7 +23,9 @@ from console.client import (
     Cancelled,
     ClientOptions,
     DeadlineExceeded,
+    GatewayClient,
     GatewayError,
+    GatewayFailed,
     Overloaded,
     PreviewProfile,
     PreviewState,
@@ -33,12 +35,12 @@ from console.client import (
 from console.client.error_table import ERRORS
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.client.results import Freshness, HealthState
-from omniseer.gateway.v1 import overlay_pb2, preview_pb2
+from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import Relay, black_hole
 from tests.support.clients import FACES, Blocking, Face
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving
+from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving, serving_handlers
 from tests.support.waiting import wait_until
 
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "the robot is starting")
@@ -406,6 +408,35 @@ def test_a_link_that_went_silent_between_calls_is_replaced(face: type[Face], por
         assert robot.status().gateway_name == "lab-1"
         assert relay.connections == 2
         assert robot.retries == 0, "the call never met the dead connection"
+
+
+# --- answers that can't be read ---
+
+
+@pytest.fixture
+def gibberish() -> Iterator[int]:
+    """The port of a server that answers each method with bytes that are no message."""
+    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+    handlers = {
+        method.name: grpc.unary_stream_rpc_method_handler(lambda _request, _context: iter([b"\xff"]))
+        if method.server_streaming
+        else grpc.unary_unary_rpc_method_handler(lambda _request, _context: b"\xff")
+        for method in service.methods
+    }
+    with serving_handlers(grpc.method_handlers_generic_handler(service.full_name, handlers)) as port:
+        yield port
+
+
+def test_an_unreadable_answer_says_so(face: type[Face], gibberish: int, ask: Ask) -> None:
+    with face(at(gibberish)) as robot, pytest.raises(GatewayFailed, match="sent an unreadable answer to"):
+        ask(robot)
+
+
+def test_an_unreadable_item_ends_the_stream(gibberish: int) -> None:
+    with GatewayClient(at(gibberish)) as robot:
+        for stream in (robot.events(), robot.watch_status()):
+            with pytest.raises(GatewayFailed, match="sent an unreadable answer to"):
+                next(stream)
 
 
 # --- nothing is left ---
