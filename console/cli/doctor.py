@@ -4,22 +4,18 @@ import typer
 
 from common.errors import ExitCode
 from common.findings import exit_code, print_findings
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.options import with_session
+from console.cli.session import Session
 from console.client import parse_target
 from console.doctor.examination import Examination
 
 
-def doctor(
-    context: typer.Context,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
-) -> None:
+@with_session
+def doctor(session: Session) -> None:
     """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
 
     Ends 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
-    session = session_of(context, target, as_json, robot)
     examination = Examination(parse_target(session.target), session.credentials())
     findings = list(examination.findings())
     print_findings(findings, as_json=session.as_json, out=session.out)

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.options import with_session
 from console.cli.session import Session, error_as_json
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
@@ -32,8 +32,9 @@ class SeverityWord(StrEnum):
     ERROR = "error"
 
 
+@with_session
 def events(
-    context: typer.Context,
+    session: Session,
     *,
     follow: Annotated[bool, typer.Option("--follow", help="Go on until Ctrl-C.", show_default=False)] = False,
     since: Annotated[
@@ -43,15 +44,11 @@ def events(
     severity: Annotated[
         SeverityWord, typer.Option("--severity", help="Leave out events of lower severity.")
     ] = SeverityWord.INFO,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Show past events of the robot, as far back as the gateway keeps them.
 
     With --follow also new ones, each once, across lost connections.
     """
-    session = session_of(context, target, as_json, robot)
     after = _position(since)
     least = FaultSeverity.UNKNOWN if severity is SeverityWord.INFO else FaultSeverity(severity.value)
     with session.connect() as gateway, until_stopped(gateway.close) as stopped:

@@ -7,7 +7,7 @@ import typer
 
 from common.errors import UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.options import with_session
 from console.cli.session import Session
 from console.cli.tables import rows_table
 from console.client import PreviewChange, PreviewProfile, PreviewState
@@ -35,20 +35,17 @@ WaitOption = Annotated[
 
 
 @preview_app.command("on")
+@with_session
 def preview_on(
-    context: typer.Context,
+    session: Session,
     *,
     profile: ProfileOption = None,
     wait_s: WaitOption = 10.0,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Turn the preview on, or change its profile while it runs.
 
     Ends 0 when frames leave the robot, 1 when the preview can't start (with the robot's reason).
     """
-    session = session_of(context, target, as_json, robot)
     wanted = PreviewProfile(profile.value) if profile else PreviewProfile.UNKNOWN
     with session.connect() as gateway:
         change = gateway.enable_preview(wanted, settle_within_s=wait_s)
@@ -56,15 +53,12 @@ def preview_on(
 
 
 @preview_app.command("off")
+@with_session
 def preview_off(
-    context: typer.Context,
+    session: Session,
     wait_s: WaitOption = 10.0,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Turn the preview off. Ends 0 when it is off, whether it was on or not."""
-    session = session_of(context, target, as_json, robot)
     with session.connect() as gateway:
         change = gateway.disable_preview(settle_within_s=wait_s)
     _finish(session, change, PreviewState.DISABLED, wait_s)

@@ -10,7 +10,7 @@ import typer
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
+from console.cli.options import RobotOption, TargetOption, session_of, with_session
 from console.cli.session import Session
 from console.cli.stopping import until_stopped
 from console.client import parse_target
@@ -49,22 +49,19 @@ PatienceOption = Annotated[
 ]
 
 
+@with_session
 def view(
-    context: typer.Context,
+    session: Session,
     *,
     record: RecordOption = None,
     headless: HeadlessOption = False,
     frames: FramesOption = None,
     patience_s: PatienceOption = 15.0,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Show the live preview with detections overlaid. The robot provides all settings.
 
     Keys: p preview on or off, o boxes, f full screen, q quit.
     """
-    session = session_of(context, target, as_json, robot)
     if frames and not headless:
         raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
     address = parse_target(session.target)
@@ -94,7 +91,7 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     """
     with _requiring_qt():
         from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
-    session = session_of(context, target, False, robot)
+    session = session_of(context, target, robot)
     run_monitor(session.target, session.credentials)
 
 
