@@ -236,8 +236,22 @@ def test_a_notation_that_can_not_be_edited_stays_as_it_is(path: Path) -> None:
     path.parent.mkdir()
     path.write_text(text := 'robots = { lab1 = { target = "a:1" } }\n')
     with pytest.raises(UserError, match="can't change"):
-        put_robot("lab1", Robot(target="b:1"), path=path)
+        put_robot("lab2", Robot(target="b:1"), path=path)
     assert path.read_text() == text
+    put_robot("lab1", Robot(target="b:1"), path=path)
+    assert path.read_text() == text.replace("a:1", "b:1")
+
+
+def test_comments_behind_values_stay(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text(
+        '[robots.lab1]\ntarget = "a:1"  # the cable\n\n# about lab2\n[robots.lab2]\ntarget = "b:1"\n'
+    )
+    put_robot("lab1", Robot(target="c:1", token_file=path.parent / "t"), path=path)
+    assert path.read_text() == (
+        '[robots.lab1]\ntarget = "c:1"  # the cable\ntoken_file = "t"\n\n'
+        '# about lab2\n[robots.lab2]\ntarget = "b:1"\n'
+    )
 
 
 def test_many_at_once_lose_nothing(path: Path) -> None:
