@@ -1,9 +1,8 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 from rich.text import Text
@@ -16,12 +15,8 @@ from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
-from console.presentation.formatting import plural
+from console.presentation.formatting import plural, wall_clock
 from console.presentation.severity_style import FAULT_STYLES
-
-Item = Event | EventGap | CaughtUp | Outage
-
-_MS_PER_S: Final = 1000
 
 
 class SeverityWord(StrEnum):
@@ -81,8 +76,7 @@ def _document(item: Event | EventGap | Outage) -> dict[str, Any]:
 def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
     match item:
         case Event():
-            at = datetime.fromtimestamp(item.wall_clock_unix_ms / _MS_PER_S).astimezone()
-            yield Text(at.strftime("%Y-%m-%d %H:%M:%S"), style="dim")
+            yield Text(f"{wall_clock(item.wall_clock_unix_ms):19}", style="dim")
             yield Text(f"{item.severity.value:7}", style=_style(item.severity))
             yield Text(f"{item.component:10}")
             yield Text(item.message)
