@@ -9,7 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from console.client.aio import AsyncGatewayClient
 from console.client.credentials import Credentials
 from console.client.errors import Cancelled
-from console.client.loop_thread import LoopThread
+from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions
 from console.client.target import DEFAULT_TARGET
 
@@ -79,14 +79,14 @@ class GatewayClient:
         async def create() -> AsyncGatewayClient:
             return AsyncGatewayClient(target, options, credentials)
 
-        self._loop = LoopThread()
-        # Also at the end of a program that does not close its client.
-        stop = weakref.finalize(self, self._loop.stop)
+        self._loop = shared_loop.acquire()
         try:
             self._client = self._loop.run(create())
         except BaseException:
-            stop()
+            shared_loop.release(self._loop)
             raise
+        # Also at the end of a program that does not close its client.
+        self._end = weakref.finalize(self, _end, self._loop, self._client)
         self.target = self._client.target
         self.clock = self._client.clock
 
@@ -113,13 +113,20 @@ class GatewayClient:
         """Closes the connection. Pending calls and streams in other threads end with `Cancelled`."""
         with suppress(Cancelled):
             self._loop.run(self._client.close())
-        self._loop.stop()
+        self._end()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _end(loop: LoopThread, client: AsyncGatewayClient) -> None:
+    # Not waited for: the garbage collector may call this in the loop's own thread.
+    with suppress(Cancelled):
+        loop.submit(client.close())
+    shared_loop.release(loop)
 
 
 async def _next(items: AsyncIterator[ResultT]) -> ResultT:

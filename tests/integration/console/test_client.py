@@ -4,6 +4,8 @@ The policy itself (pauses, deadlines, what is settled) is played by hand in the 
 it, and the clock is the wall's.
 """
 
+import asyncio
+import gc
 import socket
 import threading
 import time
@@ -471,6 +473,35 @@ def test_many_clients_leave_no_thread_and_no_socket(face: type[Face], port: int)
     wait_until(lambda: open_files() < files + 10, f"{files} open files before")
     wait_until(lambda: native_threads() < native + 10, f"{native} threads before")
     wait_until(lambda: threading.active_count() <= python, f"{python} Python threads before")
+
+
+def test_no_loop_of_a_closed_client_is_kept(port: int) -> None:
+    """Each loop that a channel was used in is kept by gRPC, as long as there is a channel."""
+    with Blocking(at(port)) as stays:
+        stays.status()
+        gc.collect()
+        before = loops()
+        for _ in range(5):
+            with Blocking(at(port)) as goes:
+                goes.status()
+        gc.collect()
+        assert loops() == before
+
+
+def loops() -> int:
+    return sum(isinstance(each, asyncio.AbstractEventLoop) for each in gc.get_objects())
+
+
+def test_a_client_that_is_not_closed_goes_with_its_last_reference(port: int) -> None:
+    with Blocking(at(port)) as stays:
+        stays.status()
+        abandoned = Blocking(at(port))
+        abandoned.status()
+        wait_until(lambda: connections_to(port) == 2, "both are connected")
+        del abandoned
+        gc.collect()
+        wait_until(lambda: connections_to(port) == 1, "the connection of the abandoned one is closed")
+        assert stays.status().gateway_name == "lab-1"
 
 
 def open_files() -> int:
