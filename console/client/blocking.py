@@ -60,14 +60,7 @@ class GatewayClient:
             change = robot.enable_preview(PreviewProfile.BALANCED)
             print(change.preview.endpoint)
 
-    Args:
-        target: HOST or HOST:PORT.
-        options: Deadlines, retries and keepalive.
-        credentials: Token and certificates; None for a robot without authentication.
-
-    Raises:
-        UserError: The target is not an address, or the credentials would be sent in the clear. Every method
-            raises a `GatewayError`.
+    Arguments and errors are those of `AsyncGatewayClient`.
     """
 
     def __init__(

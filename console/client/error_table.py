@@ -115,31 +115,14 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> errors.
     return error
 
 
-def stream_error_from(error: errors.GatewayError | None, target: str) -> errors.GatewayError:
-    """Returns the exception for a stream that the gateway ended.
-
-    Args:
-        error: The error of its call; None for an orderly end.
-        target: The robot's address, for the message.
-    """
-    if error is None or isinstance(error, errors.Cancelled):
-        # A gateway that stops completes its streams or cancels them.
-        return errors.Unreachable(f"no robot gateway reached at {target}: it ended the stream")
-    return error
-
-
 def _sentence(family: type[errors.GatewayError], details: str, target: str, timeout_s: float) -> str:
     if family is errors.Unreachable:
-        return f"no robot gateway reached at {target}: {_plain(details)}"
+        return f"no robot gateway reached at {target}: {_message_for(details, _PLAIN_MESSAGES) or details}"
     if family is errors.DeadlineExceeded:
         return f"the robot gateway at {target} did not answer within {timeout_s:.1f} s"
     if issubclass(family, errors.Refused | errors.InvalidRequest):
         return f"the robot gateway at {target} refused: {details}"
     return f"the call to the robot gateway at {target} failed: {details}"
-
-
-def _plain(details: str) -> str:
-    return _message_for(details, _PLAIN_MESSAGES) or details
 
 
 def _message_for(details: str, table: tuple[tuple[str, str], ...]) -> str:

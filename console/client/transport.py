@@ -8,8 +8,8 @@ import grpc
 from google.protobuf.message import DecodeError
 
 from console.client.credentials import Credentials
-from console.client.error_table import error_from, stream_error_from
-from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed
+from console.client.error_table import error_from
+from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed, Unreachable
 from console.client.mapping.methods import METHODS, STREAMS, Method
 from console.client.options import ClientOptions
 
@@ -113,7 +113,10 @@ class GrpcTransport:
     def end_of_stream(self, failure: grpc.RpcError | None) -> GatewayError:
         """Returns the error for a stream that the other side ended; without failure, for an orderly end."""
         error = error_from(failure, self._target, 0.0) if failure else None
-        return stream_error_from(error, self._target)
+        if error is None or isinstance(error, Cancelled):
+            # A gateway that stops completes its streams or cancels them.
+            return Unreachable(f"no robot gateway reached at {self._target}: it ended the stream")
+        return error
 
     async def close(self) -> None:
         """Closes the channel. Pending calls and streams end with `Cancelled`."""
