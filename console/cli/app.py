@@ -25,8 +25,8 @@ AnswerT = TypeVar("AnswerT")
 
 app = typer.Typer(
     name="robotctl",
-    help="A robot's status and preview, for people and scripts.",
-    epilog="Ends 0 when done, 1 when refused or failed, 2 for a wrong command line, 3 when no robot answers.",
+    help="Show a robot's status and control its preview.",
+    epilog="Exit codes: 0 done, 1 refused or failed, 2 wrong command line, 3 no robot answers.",
     pretty_exceptions_enable=False,
 )
 app.add_typer(preview_app, name="preview")
@@ -49,7 +49,7 @@ def robotctl(
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version.")
     ] = False,
 ) -> None:
-    """A robot's status and preview, for people and scripts."""
+    """Show a robot's status and control its preview."""
     context.obj = GlobalOptions(target, robot, as_json)
 
 
@@ -86,7 +86,7 @@ COMMANDS: Final[Mapping[str, Callable[..., None]]] = {
         GatewayClient.info,
         info_json,
         info_view,
-        "Show the gateway program: its build, its calls, its configuration.",
+        "Show the gateway program: build, call counts, configuration.",
     ),
     "doctor": doctor,
     "login": login,

@@ -14,7 +14,7 @@ from console.doctor.examination import Examination
 def doctor(session: Session) -> None:
     """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
 
-    Ends 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
+    Exit code 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
     examination = Examination(parse_target(session.target), session.credentials())
     findings = list(examination.findings())

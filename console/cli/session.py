@@ -61,13 +61,9 @@ class Session:
     def show(self, document: Mapping[str, Any], view: RenderableType) -> None:
         """Prints the JSON document, or the view for people."""
         if self.as_json:
-            self.print_json(document)
+            print_json(self.out, document)
         else:
             self.out.print(view)
-
-    def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
-        """Prints one JSON document and flushes the output."""
-        print_json(self.out, value, on_one_line=on_one_line)
 
 
 def standard_output() -> Console:
@@ -85,8 +81,9 @@ def print_json(out: Console, value: Mapping[str, Any], *, on_one_line: bool = Fa
 
 def error_as_json(error: UserError) -> dict[str, Any]:
     """Returns the JSON form of an error."""
+    own = "usage" if error.exit_code is ExitCode.USAGE else "failed"
     return {
-        "kind": _kind(error),
+        "kind": error.kind if isinstance(error, GatewayError) else own,
         "what": " ".join(error.what.split()),
         "remedy": error.remedy,
         "exit_code": int(error.exit_code),
@@ -99,9 +96,3 @@ def report(error: UserError) -> None:
         print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
     else:
         print(f"error: {error}", file=sys.stderr)
-
-
-def _kind(error: UserError) -> str:
-    if isinstance(error, GatewayError):
-        return error.kind
-    return "usage" if error.exit_code is ExitCode.USAGE else "failed"

@@ -8,7 +8,7 @@ import typer
 from console.cli.json_form import json_form
 from console.cli.live_watch import watch_on_a_terminal
 from console.cli.options import with_session
-from console.cli.session import Session, error_as_json
+from console.cli.session import Session, error_as_json, print_json
 from console.cli.stopping import until_stopped
 from console.client import Outage, WatchedStatus
 from console.presentation.status_line import status_line
@@ -60,4 +60,4 @@ def _print_json(session: Session, item: WatchedStatus | Outage) -> None:
         "status": json_form(item.status) if isinstance(item, WatchedStatus) else None,
         "error": error_as_json(item.error) if isinstance(item, Outage) else None,
     }
-    session.print_json(document, on_one_line=True)
+    print_json(session.out, document, on_one_line=True)

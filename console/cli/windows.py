@@ -11,7 +11,7 @@ import typer
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
 from console.cli.options import RobotOption, TargetOption, session_of, with_session
-from console.cli.session import Session
+from console.cli.session import Session, print_json
 from console.cli.stopping import until_stopped
 from console.client import parse_target
 from console.receiver.recording import Recording
@@ -32,7 +32,9 @@ RecordOption = Annotated[
     Path | None,
     typer.Option("--record", metavar="FILE", help="Record the encoded stream (MPEG-TS) to a new file."),
 ]
-HeadlessOption = Annotated[bool, typer.Option("--headless", help="Without a window.", show_default=False)]
+HeadlessOption = Annotated[
+    bool, typer.Option("--headless", help="Receive the video without a window.", show_default=False)
+]
 FramesOption = Annotated[
     int | None,
     typer.Option("--frames", min=1, help="With --headless: end after so many frames.", show_default=False),
@@ -77,7 +79,7 @@ def view(
     else:
         summary = run_view(address, recording, session.credentials)
     if session.as_json:
-        session.print_json(json_form(summary))
+        print_json(session.out, json_form(summary))
     elif headless or recording:
         session.out.print(summary.line(), soft_wrap=True)
     if recording and recording.error:

@@ -1,7 +1,6 @@
 """The gRPC channel of a client: methods in, results or `GatewayError`s out. Belongs to one asyncio loop."""
 
 import asyncio
-from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
 import grpc
@@ -10,7 +9,7 @@ from google.protobuf.message import DecodeError
 from console.client.credentials import Credentials
 from console.client.error_table import error_from
 from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed, Unreachable
-from console.client.mapping.methods import METHODS, STREAMS, Method
+from console.client.mapping.methods import Method
 from console.client.options import ClientOptions
 
 RequestT = TypeVar("RequestT")
@@ -42,8 +41,6 @@ class GrpcTransport:
             if encryption
             else grpc.aio.insecure_channel(target, options=arguments)
         )
-        self._calls = _by_name(self._channel.unary_unary, METHODS)
-        self._streams = _by_name(self._channel.unary_stream, STREAMS)
         self._closed = asyncio.Event()
 
     async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
@@ -54,12 +51,14 @@ class GrpcTransport:
         """
         self.check_open()
         try:
-            answer = await self._calls[method.name](request, timeout=timeout_s, metadata=self._metadata)
+            attempt: Any = self._channel.unary_unary(method.path, request_serializer=method.encode)
+            answer = await attempt(request, timeout=timeout_s, metadata=self._metadata)
         except grpc.RpcError as failure:
             raise error_from(failure, self._target, timeout_s) from None
         except asyncio.CancelledError:
             # gRPC raises it, too, when another task closed the channel under this call.
-            if not self._closed.is_set() or _being_cancelled():
+            task = asyncio.current_task()
+            if not self._closed.is_set() or (task and task.cancelling()):
                 raise
             raise Cancelled("this client was closed") from None
         return self.decode(method, answer)
@@ -76,7 +75,8 @@ class GrpcTransport:
             Cancelled: The client is closed.
         """
         self.check_open()
-        call = self._streams[method.name](request, metadata=self._metadata)
+        stream: Any = self._channel.unary_stream(method.path, request_serializer=method.encode)
+        call = stream(request, metadata=self._metadata)
         return Responses(call, method, self, newest_only=newest_only)
 
     def decode(self, method: Method[Any, ResultT], answer: bytes) -> ResultT:
@@ -178,12 +178,3 @@ class Responses:
             error = Cancelled("this client was closed")
         # Behind the items that wait to be read.
         await self._queue.put(error)
-
-
-def _by_name(multicallable: Any, methods: tuple[Method[Any, Any], ...]) -> Mapping[str, Any]:
-    return {method.name: multicallable(method.path, request_serializer=method.encode) for method in methods}
-
-
-def _being_cancelled() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0
