@@ -11,7 +11,7 @@ from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
-    PreviewRequest,
+    DesiredPreview,
     WatchRequest,
 )
 from console.client.options import ClientOptions
@@ -92,11 +92,17 @@ class AsyncGatewayClient:
             The gateway's message and the newest preview status: RUNNING, FAULTED (see `last_error`), or
             still STARTING when time ran out.
         """
-        return await self._calls.set_preview(PreviewRequest(True, profile), settle_within_s)
+        return await self.set_preview(DesiredPreview(True, profile), settle_within_s=settle_within_s)
 
     async def disable_preview(self, *, settle_within_s: float = 10.0) -> results.PreviewChange:
         """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""
-        return await self._calls.set_preview(PreviewRequest(False), settle_within_s)
+        return await self.set_preview(DesiredPreview(False), settle_within_s=settle_within_s)
+
+    async def set_preview(
+        self, desired: DesiredPreview, *, settle_within_s: float = 10.0
+    ) -> results.PreviewChange:
+        """Turns the preview on or off, as `enable_preview` and `disable_preview` do."""
+        return await self._calls.set_preview(desired, settle_within_s)
 
     async def ping(self) -> Offset:
         """Returns the offset of the robot's clock. Each call improves `clock`."""

@@ -88,6 +88,7 @@ class GatewayClient:
     info = _blocking(AsyncGatewayClient.info)
     enable_preview = _blocking(AsyncGatewayClient.enable_preview)
     disable_preview = _blocking(AsyncGatewayClient.disable_preview)
+    set_preview = _blocking(AsyncGatewayClient.set_preview)
     ping = _blocking(AsyncGatewayClient.ping)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)

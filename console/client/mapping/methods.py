@@ -22,8 +22,8 @@ ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True, slots=True)
-class PreviewRequest:
-    """The desired state of the preview. A profile that is UNKNOWN keeps the current one."""
+class DesiredPreview:
+    """Desired state of the preview. UNKNOWN keeps the current profile."""
 
     enabled: bool
     profile: PreviewProfile = PreviewProfile.UNKNOWN
@@ -90,7 +90,7 @@ class Method(Generic[RequestT, ResultT]):
         return self.result(GetMessageClass(_SERVICE.methods_by_name[self.name].output_type).FromString(data))
 
 
-def _preview_fields(request: PreviewRequest) -> dict[str, Any]:
+def _preview_fields(request: DesiredPreview) -> dict[str, Any]:
     return {"enabled": request.enabled, "profile": enums.number(request.profile)}
 
 
@@ -109,7 +109,7 @@ GET_SYSTEM_STATUS: Final[Method[None, results.SystemStatus]] = Method(
     "GetSystemStatus", partial(read, results.SystemStatus)
 )
 # Idempotent, because a request names the desired state, not a change.
-SET_PREVIEW_MODE: Final[Method[PreviewRequest, results.PreviewChange]] = Method(
+SET_PREVIEW_MODE: Final[Method[DesiredPreview, results.PreviewChange]] = Method(
     "SetPreviewMode", partial(read, results.PreviewChange), _preview_fields
 )
 GET_OVERLAY_SNAPSHOT: Final[Method[None, results.OverlaySnapshot]] = Method(

@@ -24,9 +24,9 @@ from console.client.mapping.methods import (
     STREAMS,
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
+    DesiredPreview,
     EventsRequest,
     Method,
-    PreviewRequest,
     WatchRequest,
 )
 from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
@@ -489,7 +489,7 @@ def test_the_tables_name_only_fields_of_answers() -> None:
 
 def test_every_field_of_a_preview_request_is_set() -> None:
     request = robot_gateway_pb2.SetPreviewModeRequest.FromString(
-        SET_PREVIEW_MODE.encode(PreviewRequest(True, PreviewProfile.HIGH_QUALITY))
+        SET_PREVIEW_MODE.encode(DesiredPreview(True, PreviewProfile.HIGH_QUALITY))
     )
     assert request.enabled
     assert request.profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
