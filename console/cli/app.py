@@ -6,8 +6,9 @@ from typing import Annotated, Any, Final, TypeVar
 import typer
 from rich.console import RenderableType
 
+from common.errors import ExitCode
+from common.findings import exit_code, print_findings
 from common.version import project_version
-from console.cli.doctor import doctor
 from console.cli.events import events
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
@@ -19,7 +20,8 @@ from console.cli.session import Session
 from console.cli.tables import overlay_view, status_view
 from console.cli.watch import watch
 from console.cli.windows import monitor, view
-from console.client import GatewayClient
+from console.client import GatewayClient, parse_target
+from console.doctor.examination import Examination
 
 AnswerT = TypeVar("AnswerT")
 
@@ -68,6 +70,19 @@ def _query(
 
     query.__doc__ = help_text
     return with_session(query)
+
+
+@with_session
+def doctor(session: Session) -> None:
+    """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
+
+    Exit code 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
+    """
+    examination = Examination(parse_target(session.target), session.credentials())
+    findings = list(examination.findings())
+    print_findings(findings, as_json=session.as_json, out=session.out)
+    code = exit_code(findings) if examination.reached else ExitCode.UNREACHABLE
+    raise typer.Exit(int(code))
 
 
 COMMANDS: Final[Mapping[str, Callable[..., None]]] = {

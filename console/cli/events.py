@@ -1,8 +1,7 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.text import Text
@@ -19,14 +18,6 @@ from console.presentation.formatting import plural, wall_clock
 from console.presentation.severity_style import FAULT_STYLES
 
 
-class SeverityWord(StrEnum):
-    """The lowest severity that can be requested."""
-
-    INFO = "info"
-    WARNING = "warning"
-    ERROR = "error"
-
-
 @with_session
 def events(
     session: Session,
@@ -39,15 +30,16 @@ def events(
         typer.Option("--since", metavar="RUN:SEQUENCE", help="Resume after this event.", show_default=False),
     ] = None,
     severity: Annotated[
-        SeverityWord, typer.Option("--severity", help="Leave out events of lower severity.")
-    ] = SeverityWord.INFO,
+        Literal["info", "warning", "error"],
+        typer.Option("--severity", help="Leave out events of lower severity."),
+    ] = "info",
 ) -> None:
     """Show past events of the robot, as far back as the gateway keeps them.
 
     With --follow also new ones, each once, across lost connections.
     """
     after = _position(since)
-    least = FaultSeverity.UNKNOWN if severity is SeverityWord.INFO else FaultSeverity(severity.value)
+    least = FaultSeverity.UNKNOWN if severity == "info" else FaultSeverity(severity)
     with session.connect() as gateway, until_stopped(gateway.close) as stopped:
         for item in stopped.as_end_of(gateway.events(after, least=least)):
             if isinstance(item, CaughtUp):

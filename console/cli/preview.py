@@ -1,7 +1,6 @@
 """robotctl preview on|off."""
 
-from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,16 +15,8 @@ from console.presentation.status_table import preview_rows
 preview_app = typer.Typer(help="Turn the live preview on or off.", pretty_exceptions_enable=False)
 
 
-class ProfileWord(StrEnum):
-    """The profiles that can be requested."""
-
-    LOW_BW = "low-bw"
-    BALANCED = "balanced"
-    HIGH_QUALITY = "high-quality"
-
-
 ProfileOption = Annotated[
-    ProfileWord | None,
+    Literal["low-bw", "balanced", "high-quality"] | None,
     typer.Option("--profile", help="Bandwidth profile.", show_default="the current one, or balanced"),
 ]
 WaitOption = Annotated[

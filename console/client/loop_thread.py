@@ -80,10 +80,7 @@ class LoopThread:
     def _serve(self) -> None:
         # The runner cancels the remaining tasks and waits for them.
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._wait_for_stop())
-
-    async def _wait_for_stop(self) -> None:
-        await self._stopping.wait()
+            runner.run(self._stopping.wait())
 
 
 class SharedLoop:
