@@ -36,10 +36,11 @@ SOURCES = tuple(
 
 def sample() -> int:
     with ros_node("bench_sampler") as node:
+        board = Board()
         sources = [
-            Source(each, subscribe(node, each), Board(), created_at_s=time.monotonic()) for each in SOURCES
+            Source(each, subscribe(node, each), board, created_at_s=time.monotonic()) for each in SOURCES
         ]
-        with Sampler(sources):
+        with Sampler(sources, board):
             wait_for_the_end(lambda: all(source.counts.values for source in sources))
         return sum(source.counts.values for source in sources)
 

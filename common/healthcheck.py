@@ -1,7 +1,7 @@
 """Health check for containers: exits 0 if a gRPC server reports SERVING, else 1.
 
 `python -m common.healthcheck [TARGET [SERVICE]]`. TARGET defaults to the environment variable HEALTH_TARGET,
-SERVICE to the server as a whole.
+SERVICE to HEALTH_SERVICE, and without that to the server as a whole.
 """
 
 import os
@@ -36,7 +36,8 @@ def main() -> None:
     target = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("HEALTH_TARGET", "")
     if not target:
         raise SystemExit("error: no target. Name one, 127.0.0.1:50051 for example, or set HEALTH_TARGET")
-    state = state_of(target, sys.argv[2] if len(sys.argv) > 2 else "")
+    service = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("HEALTH_SERVICE", "")
+    state = state_of(target, service)
     print(f"{target}: {state}")
     raise SystemExit(0 if state == "SERVING" else 1)
 

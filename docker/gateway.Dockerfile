@@ -45,14 +45,21 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && mkdir ros
 
 FROM tools AS rclpy-packages
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends ca-certificates git \
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
 COPY requirements/gateway.txt requirements/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && python3 -m venv --without-pip --system-site-packages .venv \
  && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
       -r requirements/gateway.txt
-COPY interfaces interfaces
-COPY docker/build-interfaces-ros docker/
-RUN docker/build-interfaces-ros
+COPY interfaces/omniseer_msgs interfaces/omniseer_msgs
+COPY docker/build-interfaces-ros docker/refuse-stand-ins docker/
+# Release 4.6.1. A commit names its content, as a checksum does.
+ARG YOLO_ROS_REPOSITORY=https://github.com/mgonzs13/yolo_ros.git
+ARG YOLO_ROS_COMMIT=e712bdee9c5fcffb5e42a17b28792de004224964
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && docker/build-interfaces-ros
 
 FROM rclpy-${ROS} AS built
 COPY pyproject.toml README.md LICENSE ./
@@ -76,7 +83,8 @@ ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
     GRPC_VERBOSITY=ERROR \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \
-    HEALTH_TARGET=127.0.0.1:50051
+    HEALTH_TARGET=127.0.0.1:50051 \
+    HEALTH_SERVICE=omniseer.gateway.v1.RobotGateway
 # The group is shared with the preview: it owns the socket between the two.
 USER 10001:10000
 STOPSIGNAL SIGTERM

@@ -12,7 +12,7 @@ import grpc
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
 from gateway.metrics.endpoint import serving_metrics
-from gateway.rpc.server import serving
+from gateway.rpc.server import SERVICE, serving
 
 _log = logging.getLogger(__name__)
 
@@ -95,6 +95,7 @@ async def _observe(gateway: Gateway) -> None:
     link, presence = gateway.preview_link, gateway.interceptors.presence
     while True:
         seen = gateway.state.observe(gateway.access.view())
+        gateway.health.set_serving(SERVICE, serving=not seen.ros_stalled)
         presence.report_joined()
         await link.changes.wait_until(partial(_has_changed, gateway, seen.preview), OBSERVE_EVERY_S)
 

@@ -91,6 +91,10 @@ _WHY: Final = {
         "The gateway lacks the message type",
         "Type on the robot: robot-gateway doctor",
     ),
+    SourceState.UNDECODABLE: (
+        "The robot's message type has other fields than the gateway's",
+        "Install the robot's version of this message package beside the gateway",
+    ),
     SourceState.UNKNOWN: ("The gateway is newer than this program", "Update this program"),
 }
 

@@ -30,7 +30,12 @@ class Density(Flag):
 
 BOTH: Final = Density.FULL | Density.COMPACT
 _MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
-_UNREADABLE: Final = (SourceState.QOS_MISMATCH, SourceState.WRONG_TYPE, SourceState.TYPE_MISSING)
+_UNREADABLE: Final = (
+    SourceState.QOS_MISMATCH,
+    SourceState.WRONG_TYPE,
+    SourceState.TYPE_MISSING,
+    SourceState.UNDECODABLE,
+)
 
 
 @dataclass(frozen=True, slots=True)

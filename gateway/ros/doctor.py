@@ -1,18 +1,22 @@
 """Examines ROS 2 on this machine: middleware, domain, message types, publishers."""
 
 import os
+import sys
 import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 from common.errors import UserError
-from common.findings import Finding, good, note, wrong
+from common.findings import Finding, Verdict, good, note, wrong
 from gateway.config import SourceSettings
 from gateway.ros.lifetime import middleware_name, ros_node
 from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
 from gateway.ros.subscription import TypeMissingError, message_class
 
+_STAND_IN: Final = "STAND_IN"
+"""The file that marks the packages of interfaces/stand_ins."""
 DISCOVERY_S: Final = 3.0
 """Time limit for discovery; those of a running robot are usually found in a tenth of it."""
 _POLL_EVERY_S: Final = 0.1
@@ -25,7 +29,7 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
     for source in sources:
         finding = _type_finding(source)
         yield finding
-        if not finding.remedy:
+        if finding.verdict is not Verdict.WRONG:
             readable.append(source)
     try:
         with ros_node("robot_gateway_doctor") as node:
@@ -35,7 +39,15 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)
         return
     for source, publishers in found:
-        yield _topic_finding(source, publishers)
+        if isinstance(publishers, str):
+            yield wrong(
+                f"topic.{source.name}",
+                f"the publishers of {source.topic} can't be listed: {publishers}",
+                "A program in this ROS domain announces itself with a name that is no text",
+                "Set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, so that other machines are left out",
+            )
+        else:
+            yield _topic_finding(source, publishers)
 
 
 def _environment() -> Iterator[Finding]:
@@ -55,7 +67,7 @@ def _type_finding(source: SourceSettings) -> Finding:
     check = f"type.{source.name}"
     try:
         reader_for(source)
-        message_class(source.type)
+        installed = message_class(source.type)
     except TypeMissingError as error:
         return wrong(
             check,
@@ -65,18 +77,41 @@ def _type_finding(source: SourceSettings) -> Finding:
         )
     except UserError as error:
         return wrong(check, error.what, f"{source.name} can't be read", error.remedy)
+    if _is_stand_in(installed):
+        return note(
+            check,
+            f"{source.type} is this project's stand-in, for machines without the real package",
+            "Messages of the real package can't be decoded with it",
+            "On a robot use the image with ROS packages: scripts/images build --ros packages",
+        )
     return good(check, f"{source.type} is installed")
 
 
-def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any]]]:
-    """Returns the publishers of each source, once each has one or the time limit is reached."""
+def _is_stand_in(message_type: Any) -> bool:
+    """Returns whether the class comes from a package of interfaces/stand_ins."""
+    package = message_type.__module__.partition(".")[0]
+    # PREFIX/lib/pythonX.Y/site-packages/PACKAGE/__init__.py, as colcon and the wheels install it.
+    file = Path(sys.modules[package].__file__ or "")
+    return len(file.parents) > 4 and (file.parents[4] / "share" / package / _STAND_IN).exists()
+
+
+def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any] | str]]:
+    """Returns the publishers of each source, or why they can't be listed, once each has one or time is up."""
     until_s = time.monotonic() + DISCOVERY_S
     while True:
-        found = [(source, list(node.get_publishers_info_by_topic(source.topic))) for source in sources]
+        found = [(source, _publishers(node, source.topic)) for source in sources]
         if all(publishers for _, publishers in found) or time.monotonic() >= until_s:
             return found
         # Polled: graph events need an executor that spins.
         time.sleep(_POLL_EVERY_S)
+
+
+def _publishers(node: Any, topic: str) -> list[Any] | str:
+    """Returns the publishers of a topic, or why they can't be listed."""
+    try:
+        return list(node.get_publishers_info_by_topic(topic))
+    except (RuntimeError, UnicodeError) as error:
+        return str(error)
 
 
 def _topic_finding(source: SourceSettings, publishers: list[Any]) -> Finding:

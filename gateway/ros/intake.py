@@ -43,7 +43,7 @@ def intake(
     with ros_node("robot_gateway") as node:
         sources = dict(_open(node, settings, board))
         monitor = PublisherMonitor(node, [source for source in settings if source.name in sources], board)
-        with Sampler((*sources.values(), monitor), rate_hz) as sampler:
+        with Sampler((*sources.values(), monitor), board, rate_hz) as sampler:
             yield Intake(sampler, sources)
 
 

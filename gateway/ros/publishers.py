@@ -65,7 +65,8 @@ class PublisherMonitor:
     def __init__(self, node: Any, sources: Sequence[SourceSettings], board: Board) -> None:
         self._node, self._sources, self._board = node, tuple(sources), board
         self._due_s = 0.0
-        self._failing = False
+        self._failing: set[str] = set()
+        """Topics whose publishers could not be examined the last time."""
 
     def take(self) -> None:
         """Examines the graph when it is due. Never raises."""
@@ -73,16 +74,16 @@ class PublisherMonitor:
         if now_s < self._due_s:
             return
         self._due_s = now_s + EXAMINE_EVERY_S
-        try:
-            for source in self._sources:
+        for source in self._sources:
+            try:
                 self._update(source, self._node.get_publishers_info_by_topic(source.topic))
-            self._failing = False
-        except RuntimeError as error:
-            # Raised by the middleware. Values still arrive; only the reasons for missing ones are unknown.
-            self._board.publishers.clear()
-            if not self._failing:
-                log.warning("the ROS graph can't be examined: %s", error)
-            self._failing = True
+                self._failing.discard(source.topic)
+            except Exception as error:  # noqa: BLE001  # a peer's name that is not UTF-8, a middleware's error
+                # Values still arrive; only the reasons for missing ones are unknown.
+                self._board.publishers.pop(source.spec, None)
+                if source.topic not in self._failing:
+                    log.warning("the publishers of %s can't be examined: %s", source.topic, error)
+                self._failing.add(source.topic)
 
     def _update(self, source: SourceSettings, endpoints: Sequence[Any]) -> None:
         publishers = publishers_of(source, endpoints)

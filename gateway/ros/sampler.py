@@ -4,43 +4,56 @@ An executor wakes up for every message, polling costs the same at any message ra
 show more than twenty values a second, and a value's age is exact whenever it is fetched.
 """
 
+import logging
+import math
 import threading
 import time
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Final, Protocol, Self
 
+from gateway.status.board import Board
+
+_log = logging.getLogger(__name__)
+
 SAMPLING_HZ: Final = 20.0
 """How often each source is polled: a value waits at most 50 ms."""
 
-_STOP_WITHIN_S = 5.0
+_STOP_WITHIN_S: Final = 5.0
+_WARN_EVERY_S: Final = 10.0
 
 
 class Takes(Protocol):
     """What the sampler needs of a source."""
 
     def take(self) -> None:
-        """Fetches the newest value if there is a new one. Never raises, never waits."""
+        """Fetches the newest value if there is a new one. Never waits."""
 
 
 class Sampler:
     """Calls `take` of every source at fixed times, from `__enter__` to `__exit__`.
 
+    What the graph holds can be anything, and rclpy raises many things: an error of one source costs that
+    source one pass, never the thread. The end of each pass is noted on the board, so that a thread that hangs
+    in the middleware is a fault of its own.
+
     Args:
         sources: polled one after the other.
+        board: where the end of each pass is noted.
         rate_hz: how often.
     """
 
-    def __init__(self, sources: Sequence[Takes], rate_hz: float = SAMPLING_HZ) -> None:
+    def __init__(self, sources: Sequence[Takes], board: Board, rate_hz: float = SAMPLING_HZ) -> None:
         self._sources = tuple(sources)
+        self._board = board
         self._period_s = 1 / rate_hz
+        self._warned_at_s = -math.inf
         self._stop = threading.Event()
         # A daemon, so that a middleware call that never returns can't prevent the process from exiting.
         self._thread = threading.Thread(target=self._run, name="ros-sampler", daemon=True)
-        self.last_pass_at_s: float | None = None
-        """When the newest pass ended, in monotonic seconds; None before the first."""
 
     def __enter__(self) -> Self:
+        self._board.ros_passed_s = time.monotonic()
         self._thread.start()
         return self
 
@@ -56,7 +69,17 @@ class Sampler:
         due_s = time.monotonic()
         while not self._stop.wait(max(0.0, due_s - time.monotonic())):
             for source in self._sources:
-                source.take()
-            self.last_pass_at_s = time.monotonic()
+                try:
+                    source.take()
+                except Exception:  # noqa: BLE001  # whatever it is: the other sources are read all the same
+                    self._warn()
+            self._board.ros_passed_s = passed_s = time.monotonic()
             # Missed passes are skipped, not repeated: they would find nothing new.
-            due_s = max(due_s + self._period_s, self.last_pass_at_s)
+            due_s = max(due_s + self._period_s, passed_s)
+
+    def _warn(self) -> None:
+        """Logs the present exception with its traceback, unless another one was logged lately."""
+        now_s = time.monotonic()
+        if now_s - self._warned_at_s >= _WARN_EVERY_S:
+            self._warned_at_s = now_s
+            _log.exception("a source can't be sampled; it is tried again at the next pass")

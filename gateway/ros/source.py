@@ -95,8 +95,10 @@ class Source:
                 return False
             raw, info = taken
             self._hand_over(raw, received_at(info["received_timestamp"], now, self._emptied_at_s))
-        except Exception as error:  # noqa: BLE001 - one bad message or reader must not end the sampling
+            self._board.undecodable.discard(self._spec)
+        except Exception as error:  # noqa: BLE001  # one bad message or reader must not end the sampling
             self._failures += 1
+            self._board.undecodable.add(self._spec)
             self._warn(error, now.monotonic_s)
         return True
 

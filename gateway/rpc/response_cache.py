@@ -15,7 +15,7 @@ from gateway.rpc.ports import State
 from gateway.rpc.recipient import Recipient
 from gateway.status.snapshot import Snapshot
 
-REUSE_S: Final = 0.005
+REUSE_S: Final = 0.01
 
 Build: TypeAlias = Callable[[Snapshot, Recipient], Message]
 """A mapping of gateway/rpc/mapping."""

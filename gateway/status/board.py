@@ -33,14 +33,19 @@ class Board:
     Attributes:
         publishers: by source; a source is absent until the graph was examined.
         unusable: sources that can't be subscribed (message type not installed), with the reason for the log.
+        undecodable: sources of which the newest message could not be decoded.
+        ros_passed_s: when the ROS sampler last had read all sources; monotonic seconds. None where no sampler
+            runs.
     """
 
-    __slots__ = ("_newest", "publishers", "unusable")
+    __slots__ = ("_newest", "publishers", "ros_passed_s", "undecodable", "unusable")
 
     def __init__(self, newest: Mapping[SourceSpec[Any], Received[Any]] | None = None) -> None:
         self._newest: dict[SourceSpec[Any], Received[Any]] = dict(newest or {})
         self.publishers: dict[SourceSpec[Any], Publishers] = {}
         self.unusable: dict[SourceSpec[Any], str] = {}
+        self.undecodable: set[SourceSpec[Any]] = set()
+        self.ros_passed_s: float | None = None
 
     def __getitem__(self, spec: SourceSpec[ValueT]) -> Received[ValueT] | None:
         """Returns the newest value; None before the first."""

@@ -16,9 +16,9 @@ from gateway.status.snapshot import Snapshot
 from gateway.status.source_view import SourceView
 from gateway.status.sources import SourceSpec
 
-EXCLUDED: Final = frozenset({"at_s", "gateway", "events", "access"})
-"""Time; counters that the watchers' own calls advance; events, which have their own stream; the access state,
-whose problems are faults."""
+EXCLUDED: Final = frozenset({"at_s", "gateway", "events", "access", "ros_stalled"})
+"""Time; counters that the watchers' own calls advance; events, which have their own stream; the access state
+and the ROS sampler's, whose problems are faults."""
 
 
 def change_key(snapshot: Snapshot) -> tuple[Any, ...]:

@@ -1,13 +1,12 @@
 """Whether a value was ever received, and whether it is too old to rely on."""
 
 from dataclasses import dataclass
-from typing import Any, Final, Generic
+from typing import Any, Final, Generic, NamedTuple
 
 from gateway.status.values import Received, ValueT_co
 
 
-@dataclass(frozen=True, slots=True)
-class Freshness:
+class Freshness(NamedTuple):
     """Availability, staleness and age of a value; `age_ms` is 0 if none was received."""
 
     available: bool

@@ -29,6 +29,7 @@ class Health:
 
 
 HEALTHY: Final = Health(HealthState.OK, "robot healthy")
+NOT_READ: Final = Health(HealthState.DEGRADED, "the gateway does not read ROS")
 
 
 def assess(required: Iterable[tuple[str, Freshness]]) -> Health:

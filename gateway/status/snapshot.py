@@ -10,7 +10,7 @@ from gateway.status.command import Command, effective_command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
-from gateway.status.health import Health, assess
+from gateway.status.health import NOT_READ, Health, assess
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.runtime import UNKNOWN, Runtime
 from gateway.status.source_view import SourceView, source_view
@@ -24,6 +24,8 @@ from gateway.status.sources import (
 )
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
+ROS_STALLED_AFTER_S: Final = 2.0
+"""Forty passes of the ROS sampler: it hangs in the middleware, or the computer is overloaded."""
 _HEALTH_SOURCES: Final = tuple(spec for spec in SOURCES if spec.health_name)
 
 
@@ -61,6 +63,7 @@ class Snapshot:
         command: the effective command with the mux input it is attributed to.
         sources: the state of each configured source.
         events: the overlay's short list, oldest first.
+        ros_stalled: whether the ROS sampler makes no progress, so that the sources' ages accuse no publisher.
     """
 
     at_s: float
@@ -75,6 +78,7 @@ class Snapshot:
     events: tuple[OperatorEvent, ...]
     faults: tuple[Fault, ...]
     access: AccessView
+    ros_stalled: bool
 
     def __getitem__(self, spec: SourceSpec[ValueT]) -> Sample[ValueT]:
         """Returns the sample of a source; an absent one if the source is not configured."""
@@ -98,11 +102,14 @@ def take(
     samples = {spec: sample(board[spec], rule.stale_after_ms, now_s) for spec, rule in configured.items()}
     for spec in PLATFORM_SOURCES:
         samples[spec] = sample(board[spec], rules.platform_stale_after_ms, now_s)
+    ros_stalled = board.ros_passed_s is not None and now_s - board.ros_passed_s > ROS_STALLED_AFTER_S
     return Snapshot(
         at_s=now_s,
         identity=identity,
         gateway=gateway,
-        health=assess(
+        health=NOT_READ
+        if ros_stalled
+        else assess(
             (spec.health_name, samples[spec].freshness)
             for spec in _HEALTH_SOURCES
             if spec in configured and configured[spec].required
@@ -118,12 +125,15 @@ def take(
                 board.publishers.get(spec),
                 required=rule.required,
                 unusable=spec in board.unusable,
+                undecodable=spec in board.undecodable,
+                stalled=ros_stalled,
             )
             for spec, rule in configured.items()
         ),
         events=events,
         faults=faults,
         access=access,
+        ros_stalled=ros_stalled,
     )
 
 

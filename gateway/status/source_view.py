@@ -1,9 +1,8 @@
 """The state of every configured source for operators: whether it is received, and if not, why."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from gateway.status.board import Publishers
 from gateway.status.freshness import Freshness
@@ -26,10 +25,11 @@ class SourceState(Enum):
     """Every publisher has another message type than configured."""
     TYPE_MISSING = "type_missing"
     """The message type is not installed beside the gateway."""
+    UNDECODABLE = "undecodable"
+    """Messages arrive, but can't be decoded: the type has the same name and other fields."""
 
 
-@dataclass(frozen=True, slots=True)
-class SourceView:
+class SourceView(NamedTuple):
     """One configured source at one instant; `detail` explains the state, empty if all is well."""
 
     spec: SourceSpec[Any]
@@ -52,8 +52,12 @@ _SENTENCES: Final[Mapping[SourceState, str]] = {
     SourceState.QOS_MISMATCH: "the robot offers {name} with delivery guarantees that exclude the gateway's",
     SourceState.WRONG_TYPE: "the robot offers {name} in another form than the gateway is configured for",
     SourceState.TYPE_MISSING: "{name} can't be read: its message type is not installed beside the gateway",
+    SourceState.UNDECODABLE: "{name} arrives, but can't be decoded: the robot's message type has other fields"
+    " than the one installed beside the gateway",
 }
 """Total: a sentence for every state. It names no topic, node or type: those are the robot's own affair."""
+_BLAMES_SILENCE: Final = frozenset({SourceState.WAITING, SourceState.SILENT, SourceState.STALE})
+_NOT_READ: Final = "the gateway does not read ROS at the moment"
 
 
 def source_view(
@@ -63,6 +67,8 @@ def source_view(
     *,
     required: bool,
     unusable: bool,
+    undecodable: bool,
+    stalled: bool,
 ) -> SourceView:
     """Returns the view of one source.
 
@@ -72,14 +78,20 @@ def source_view(
         publishers: None before the graph was examined.
         required: whether the configuration requires it.
         unusable: whether it can't be subscribed.
+        undecodable: whether its newest message could not be decoded.
+        stalled: whether the ROS sampler makes no progress.
     """
-    state = _state(freshness, publishers, unusable=unusable)
+    state = _state(freshness, publishers, unusable=unusable, undecodable=undecodable)
+    if stalled and state in _BLAMES_SILENCE:
+        return SourceView(spec, state, freshness, required, _NOT_READ)
     return SourceView(spec, state, freshness, required, detail(state, spec.display_name, publishers))
 
 
 def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
     """Returns the sentence on a source that people know by `name`; empty if all is well."""
-    if state is SourceState.RECEIVING and publishers and publishers.count > 1:
+    if state is SourceState.RECEIVING:
+        if not publishers or publishers.count < 2:
+            return ""
         return f"{publishers.count} programs publish {name}: the values shown may be from any of them"
     if state is SourceState.STALE and publishers and publishers.count == 0:
         return f"{name} stopped coming: nothing on the robot publishes it any more"
@@ -88,16 +100,18 @@ def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
     return _SENTENCES[state].format(name=name)
 
 
-def _state(freshness: Freshness, publishers: Publishers | None, *, unusable: bool) -> SourceState:
+def _state(
+    freshness: Freshness, publishers: Publishers | None, *, unusable: bool, undecodable: bool
+) -> SourceState:
     if unusable:
         return SourceState.TYPE_MISSING
     if freshness.fresh:
         return SourceState.RECEIVING
-    if publishers and publishers.count:
-        if publishers.wrong_type:
-            return SourceState.WRONG_TYPE
-        if publishers.qos_mismatch:
-            return SourceState.QOS_MISMATCH
-        if not freshness.available:
-            return SourceState.SILENT
-    return SourceState.STALE if freshness.available else SourceState.WAITING
+    if undecodable:
+        return SourceState.UNDECODABLE
+    offered = publishers is not None and publishers.count > 0
+    if publishers and offered and (publishers.wrong_type or publishers.qos_mismatch):
+        return SourceState.WRONG_TYPE if publishers.wrong_type else SourceState.QOS_MISMATCH
+    if freshness.available:
+        return SourceState.STALE
+    return SourceState.SILENT if offered else SourceState.WAITING

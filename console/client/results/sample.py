@@ -48,6 +48,8 @@ class SourceState(Enum):
     """Published with another type than configured: nothing can be received."""
     TYPE_MISSING = "type_missing"
     """The gateway lacks the message type: nothing can be received."""
+    UNDECODABLE = "undecodable"
+    """Messages arrive, but the robot's type has other fields than the gateway's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

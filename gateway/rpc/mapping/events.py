@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
-from gateway.rpc.mapping.faults import fault_message
+from gateway.rpc.mapping.faults import fill_fault
 from gateway.status.event import (
     ClientJoined,
     ClientLeft,
@@ -57,11 +57,15 @@ def position_from(message: pb.EventPosition) -> Position:
 
 
 def _raised(detail: FaultRaised, at_s: float) -> pb.FaultRaised:
-    return pb.FaultRaised(fault=fault_message(detail.fault, at_s))
+    message = pb.FaultRaised()
+    fill_fault(message.fault, detail.fault, at_s)
+    return message
 
 
 def _cleared(detail: FaultCleared, at_s: float) -> pb.FaultCleared:
-    return pb.FaultCleared(fault=fault_message(detail.fault, at_s))
+    message = pb.FaultCleared()
+    fill_fault(message.fault, detail.fault, at_s)
+    return message
 
 
 def _preview(detail: PreviewChanged, _at_s: float) -> pb.PreviewStateChanged:

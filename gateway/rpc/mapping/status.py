@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
-from gateway.rpc.mapping.faults import fault_message
+from gateway.rpc.mapping.faults import fill_fault
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
@@ -39,7 +39,7 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
 
     `teleop` stays unset, which means "not available".
     """
-    return system_status_pb2.SystemStatus(
+    status = system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
         gateway_version=snapshot.identity.version,
         preview=preview_status(snapshot.preview, snapshot.preview_measured, recipient),
@@ -49,10 +49,14 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
         effective_command=_command(snapshot.command),
         mission=_mission(snapshot[MODE]),
         insecure=snapshot.identity.insecure,
-        faults=[fault_message(fault, snapshot.at_s) for fault in snapshot.faults],
-        sources=[_source(source) for source in snapshot.sources],
         gateway=gateway_facts(snapshot.gateway),
     )
+    # In place: a message that is passed to a constructor is copied, which doubles the cost of a short one.
+    for fault in snapshot.faults:
+        fill_fault(status.faults.add(), fault, snapshot.at_s)
+    for source in snapshot.sources:
+        _fill_source(status.sources.add(), source)
+    return status
 
 
 def overlay_snapshot(snapshot: Snapshot, recipient: Recipient) -> overlay_pb2.OverlaySnapshot:
@@ -146,17 +150,15 @@ def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
     )
 
 
-def _source(source: SourceView) -> source_pb2.SourceStatus:
-    # The most frequent message of a status: without the dictionary of freshness_fields, which costs 0.4 us.
-    return source_pb2.SourceStatus(
-        name=source.spec.name,
-        state=SOURCE_STATES[source.state],
-        available=source.freshness.available,
-        stale=source.freshness.stale,
-        age_ms=source.freshness.age_ms,
-        required=source.required,
-        detail=source.detail,
-    )
+def _fill_source(message: source_pb2.SourceStatus, source: SourceView) -> None:
+    available, stale, age_ms = source.freshness
+    message.name = source.spec.name
+    message.state = SOURCE_STATES[source.state]
+    message.available = available
+    message.stale = stale
+    message.age_ms = age_ms
+    message.required = source.required
+    message.detail = source.detail
 
 
 def _event(event: OperatorEvent, now_s: float) -> overlay_pb2.OperatorEvent:

@@ -9,7 +9,7 @@ from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.limits import PlatformLimits
 from gateway.status.faults.platform import platform_faults
 from gateway.status.faults.preview import preview_faults
-from gateway.status.faults.sources import source_faults
+from gateway.status.faults.sources import sampler_fault, source_faults
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import DIAGNOSTICS
 
@@ -42,7 +42,12 @@ def conditions(
         up_s: how long the gateway has been running.
     """
     settled = up_s >= rules.startup_grace_s
-    yield from source_faults(snapshot.sources, settled=settled)
+    of_sources = source_faults(snapshot.sources, settled=settled)
+    if snapshot.ros_stalled:
+        yield sampler_fault()
+        # While ROS is not read, silence accuses no publisher; what was a fault before stays one.
+        of_sources = (each for each in of_sources if each.fault_id in active)
+    yield from of_sources
     yield from diagnostics_faults(snapshot[DIAGNOSTICS])
     yield from preview_faults(snapshot.preview, active, settled=settled)
     yield from platform_faults(snapshot, rules.platform, active)

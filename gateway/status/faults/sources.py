@@ -34,11 +34,25 @@ STATE_FAULTS: Final[Mapping[SourceState, _FaultOfState | None]] = {
         "wrong_type", "Correct the type of this source in the gateway's configuration"
     ),
     SourceState.TYPE_MISSING: _FaultOfState("type_missing", "Type on the robot: robot-gateway doctor"),
+    SourceState.UNDECODABLE: _FaultOfState(
+        "undecodable", "Install the robot's version of this message package beside the gateway"
+    ),
 }
 """Total: the fault of each state; None for the one that is none."""
 
 _STARTUP_STATES: Final = frozenset({SourceState.WAITING, SourceState.SILENT})
 """States in which every source begins."""
+
+
+def sampler_fault() -> Condition:
+    """Returns the condition of a gateway that does not read ROS: the robot's programs are not to blame."""
+    return Condition(
+        "ros.stalled",
+        Severity.ERROR,
+        "gateway",
+        "the gateway does not read ROS at the moment; the values shown are old",
+        "If it stays, restart the gateway; its log, and the load of the robot, show why",
+    )
 
 
 def source_faults(sources: tuple[SourceView, ...], *, settled: bool) -> Iterator[Condition]:

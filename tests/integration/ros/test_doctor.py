@@ -54,3 +54,11 @@ def test_a_type_that_is_not_installed_says_what_to_install(talker: Talker) -> No
     finding = examined(missing)["type.vision"]
     assert finding.verdict is Verdict.WRONG
     assert "topic.vision" not in examined(missing)
+
+
+def test_a_stand_in_is_named_and_its_topic_is_examined_all_the_same(ros_domain: int) -> None:
+    findings = examined(DETECTIONS)
+    finding = findings["type.detections"]
+    assert finding.verdict is Verdict.NOTE
+    assert finding.what.startswith("yolo_msgs/msg/DetectionArray is this project's stand-in")
+    assert "topic.detections" in findings

@@ -155,7 +155,9 @@ def test_starting_and_stopping_leaves_nothing_behind(ros_domain: int) -> None:
     assert "ros-sampler" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_the_sampler_says_when_it_last_looked(ros_domain: int) -> None:
-    with intake(DEFAULT_SOURCES, Board()) as running:
-        first = wait_until(lambda: running.sampler.last_pass_at_s, "the first pass")
-        wait_until(lambda: (running.sampler.last_pass_at_s or 0) > first, "another pass")
+def test_the_board_says_when_ros_was_last_read(ros_domain: int) -> None:
+    board = Board()
+    assert board.ros_passed_s is None
+    with intake(DEFAULT_SOURCES, board):
+        first = wait_until(lambda: board.ros_passed_s, "the first pass")
+        wait_until(lambda: (board.ros_passed_s or 0) > first, "another pass")

@@ -2,11 +2,7 @@
 
 import json
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -21,6 +17,7 @@ from gateway.status.board import Board
 from gateway.status.sources import DIAGNOSTICS, ODOMETRY
 from gateway.status.values import DiagnosticItem, DiagnosticLevel
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.helper import first_line, helper, last_words
 from tests.support.ros import simulated_robot
 from tests.support.talker import Talker
 from tests.support.waiting import wait_until
@@ -28,32 +25,6 @@ from tests.support.waiting import wait_until
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
 
 ROOT = Path(__file__).parents[3]
-
-
-@contextmanager
-def helper(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """A program of tests.support; it ends when its standard input closes."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", *arguments],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def first_line(process: subprocess.Popen[str]) -> str:
-    assert process.stdout
-    return process.stdout.readline()
-
-
-def last_words(process: subprocess.Popen[str]) -> str:
-    return process.communicate("", timeout=20)[0]
 
 
 def test_a_killed_gateway_costs_the_robots_own_pair_nothing(ros_domain: int, tmp_path: Path) -> None:

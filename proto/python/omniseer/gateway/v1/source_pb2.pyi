@@ -41,6 +41,10 @@ class _SourceStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_SourceSta
     """It is offered in another form than the gateway is configured for: nothing can arrive."""
     SOURCE_STATE_TYPE_MISSING: _SourceState.ValueType  # 7
     """The gateway lacks the message type that it needs to read it: nothing can arrive."""
+    SOURCE_STATE_UNDECODABLE: _SourceState.ValueType  # 8
+    """Messages arrive, but can't be decoded: their type has the same name and other fields than the
+    gateway's.
+    """
 
 class SourceState(_SourceState, metaclass=_SourceStateEnumTypeWrapper):
     """State of a source of values at one instant."""
@@ -63,6 +67,10 @@ SOURCE_STATE_WRONG_TYPE: SourceState.ValueType  # 6
 """It is offered in another form than the gateway is configured for: nothing can arrive."""
 SOURCE_STATE_TYPE_MISSING: SourceState.ValueType  # 7
 """The gateway lacks the message type that it needs to read it: nothing can arrive."""
+SOURCE_STATE_UNDECODABLE: SourceState.ValueType  # 8
+"""Messages arrive, but can't be decoded: their type has the same name and other fields than the
+gateway's.
+"""
 Global___SourceState: _TypeAlias = SourceState  # noqa: Y015
 
 @_typing.final

@@ -127,6 +127,31 @@ def test_why_a_source_does_not_come(publishers: Publishers, at_s: float | None, 
     assert set(found(snapshot(of, odometry=True))) == ({expected} if expected else set())
 
 
+def test_messages_that_cant_be_decoded() -> None:
+    of = board()
+    of.publishers[ODOMETRY] = Publishers(1)
+    of.undecodable.add(ODOMETRY)
+    assert set(found(snapshot(of, odometry=True))) == {"odometry.undecodable"}
+    of[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S)
+    assert found(snapshot(of, odometry=True)) == {}, "a fresh value was decoded"
+
+
+def test_a_sampler_without_progress_is_one_fault_and_accuses_no_publisher() -> None:
+    of = board()
+    of.publishers[ODOMETRY] = Publishers(1)
+    of[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S - 3)
+    of.ros_passed_s = NOW_S - 2.1
+    stalled = snapshot(of, odometry=True)
+    assert set(found(stalled)) == {"ros.stalled"}
+    assert found(stalled)["ros.stalled"].severity is Severity.ERROR
+    assert set(found(stalled, active=frozenset({"odometry.stale"}))) == {"ros.stalled", "odometry.stale"}
+    assert stalled.health.summary == "the gateway does not read ROS"
+    assert not stalled.health.ready
+    assert stalled.sources[0].detail == "the gateway does not read ROS at the moment"
+    of.ros_passed_s = NOW_S - 1.9
+    assert set(found(snapshot(of, odometry=True))) == {"odometry.stale"}
+
+
 def test_two_publishers_of_one_source_are_said_so() -> None:
     of = board()
     of[ODOMETRY], of.publishers[ODOMETRY] = Received(Odometry(0, 0, 0), NOW_S), Publishers(2)

@@ -1,0 +1,58 @@
+"""A ROS sampler that hangs in the middleware: the door stays open, and says what is wrong."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import grpc
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
+
+from gateway.app import running
+from gateway.assembly import ThisRobot, build
+from gateway.config import GatewaySettings
+from gateway.rpc.server import SERVICE
+from gateway.status.board import Board
+from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.eventually import eventually
+
+
+class StalledRobot(ThisRobot):
+    """Its sampler has begun, and hangs."""
+
+    @contextmanager
+    def feeding(self, board: Board) -> Iterator[None]:
+        self.board = board
+        board.ros_passed_s = time.monotonic() - 10
+        yield
+
+
+async def test_a_sampler_that_hangs_is_a_fault_and_not_serving_until_it_goes_on(tmp_path: Path) -> None:
+    settings = GatewaySettings.model_validate(
+        {"grpc": {"port": 0}, "sources": (), "preview": {"socket": tmp_path / "preview.sock"}}
+    )
+    robot = StalledRobot(settings)
+    async with (
+        running(build(settings, robot)) as port,
+        grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel,
+    ):
+        health: Any = HealthStub(channel)
+        gateway: Any = RobotGatewayStub(channel)
+
+        async def serving() -> Any:
+            return (await health.Check(HealthCheckRequest(service=SERVICE), timeout=5)).status
+
+        async def is_stalled() -> bool:
+            status = await gateway.GetSystemStatus(GetSystemStatusRequest(), timeout=5)
+            return "ros.stalled" in {fault.id for fault in status.faults if fault.active}
+
+        async def serving_after_a_pass() -> Any:
+            robot.board.ros_passed_s = time.monotonic()
+            return await serving()
+
+        await eventually(serving, HealthCheckResponse.NOT_SERVING.__eq__, "NOT_SERVING")
+        assert await is_stalled()
+        await eventually(serving_after_a_pass, HealthCheckResponse.SERVING.__eq__, "SERVING")
