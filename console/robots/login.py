@@ -15,6 +15,7 @@ from typing import Final
 
 from common.errors import ExitCode, UserError
 from console.client import Credentials
+from console.client.printable import printable
 from console.robots.credentials import credentials_directory
 from console.robots.robots_file import Robot, RobotsFile, robots_file_path
 from console.robots.robots_file_edit import put_robot
@@ -73,7 +74,7 @@ def parse_login(text: str) -> Login:
         client_key=pems.get("key"),
         token=words.get("token") or None,
     )
-    return Login(words.get("name", ""), words.get("role", ""), shown)
+    return Login(printable(words.get("name", "")), printable(words.get("role", "")), shown)
 
 
 def keep_login(name: str, target: str, credentials: Credentials, path: Path | None = None) -> RobotsFile:

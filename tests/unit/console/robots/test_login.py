@@ -7,7 +7,7 @@ import pytest
 from common.errors import UserError
 from console.client import Credentials
 from console.robots import Robot, read_credentials, read_robots_file, robots_file_edit
-from console.robots.login import keep_login
+from console.robots.login import keep_login, parse_login
 from console.robots.robots_file_edit import put_robot
 
 TOKEN = Credentials(ca_certificate=b"CA", token="abc.DEF-123")
@@ -24,6 +24,14 @@ def test_a_login_is_read_as_it_was_stored(path: Path, credentials: Credentials) 
     known = keep_login("lab1", "a:1", credentials, path)
     assert known == read_robots_file(path)
     assert read_credentials(known.find("lab1")) == credentials
+
+
+def test_who_a_login_is_for_holds_no_control_character() -> None:
+    text = (
+        "# Robot Gateway login 1\nname: anna\x1b]0;owned\x07\nrole: admin\u202e\ntoken: a\nauthority:\nCA\n"
+    )
+    login = parse_login(text)
+    assert (login.name, login.role) == ("anna ]0;owned ", "admin ")
 
 
 def test_another_kind_of_login_leaves_nothing_of_the_one_before(path: Path) -> None:
