@@ -1,32 +1,38 @@
 """The command line of robotctl. Commands raise their errors; console.cli.run reports them."""
 
-from typing import Annotated
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Final, TypeVar
 
 import typer
+from rich.console import RenderableType
 
+from common.errors import ExitCode
+from common.findings import exit_code, print_findings
 from common.version import project_version
-from console.cli.doctor import doctor
 from console.cli.events import events
 from console.cli.info import info_json, info_view
 from console.cli.json_form import json_form
 from console.cli.login import login
-from console.cli.options import JsonOption, RobotOption, TargetOption, keep_global_options, session_of
+from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, with_session
 from console.cli.preview import preview_app
 from console.cli.robots import robots_app
+from console.cli.session import Session
 from console.cli.tables import overlay_view, status_view
-from console.cli.watch import watch_until_stopped
+from console.cli.watch import watch
 from console.cli.windows import monitor, view
+from console.client import GatewayClient, parse_target
+from console.doctor.examination import Examination
+
+AnswerT = TypeVar("AnswerT")
 
 app = typer.Typer(
     name="robotctl",
-    help="A robot's status and preview, for people and scripts.",
-    epilog="Ends 0 when done, 1 when refused or failed, 2 for a wrong command line, 3 when no robot answers.",
+    help="Show a robot's status and control its preview.",
+    epilog="Exit codes: 0 done, 1 refused or failed, 2 wrong command line, 3 no robot answers.",
     pretty_exceptions_enable=False,
 )
 app.add_typer(preview_app, name="preview")
 app.add_typer(robots_app, name="robots")
-for command in (doctor, events, login, monitor, view):
-    app.command()(command)
 
 
 def _print_version(requested: bool) -> None:
@@ -45,72 +51,62 @@ def robotctl(
         bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version.")
     ] = False,
 ) -> None:
-    """A robot's status and preview, for people and scripts."""
-    keep_global_options(context, target, robot, as_json)
+    """Show a robot's status and control its preview."""
+    context.obj = GlobalOptions(target, robot, as_json)
 
 
-@app.command()
-def status(
-    context: typer.Context,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Show the status of the whole robot, once."""
-    session = session_of(context, target, as_json, robot)
-    with session.connect() as gateway:
-        answer = gateway.status()
-    session.show(json_form(answer), status_view(answer, gateway.target))
+def _query(
+    call: Callable[[GatewayClient], AnswerT],
+    document: Callable[[AnswerT], dict[str, Any]],
+    view: Callable[[AnswerT, str], RenderableType],
+    help_text: str,
+) -> Callable[..., None]:
+    """Returns the command that shows the answer of one call."""
+
+    def query(session: Session) -> None:
+        with session.connect() as gateway:
+            answer = call(gateway)
+        session.show(document(answer), view(answer, gateway.target))
+
+    query.__doc__ = help_text
+    return with_session(query)
 
 
-@app.command()
-def overlay(
-    context: typer.Context,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Show the robot's detections and the newest events, once."""
-    session = session_of(context, target, as_json, robot)
-    with session.connect() as gateway:
-        snapshot = gateway.overlay()
-    session.show(json_form(snapshot), overlay_view(snapshot, gateway.target))
+@with_session
+def doctor(session: Session) -> None:
+    """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
 
-
-@app.command()
-def info(
-    context: typer.Context,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Show the gateway program: its build, its calls, its configuration."""
-    session = session_of(context, target, as_json, robot)
-    with session.connect() as gateway:
-        answer = gateway.info()
-    session.show(info_json(answer), info_view(answer, gateway.target))
-
-
-@app.command()
-def watch(
-    context: typer.Context,
-    *,
-    interval_s: Annotated[
-        float,
-        typer.Option(
-            "--interval", min=0.1, max=3600, metavar="SECONDS", help="Shortest time between updates."
-        ),
-    ] = 1.0,
-    count: Annotated[
-        int | None,
-        typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
-    ] = None,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Show the status whenever it changes, until Ctrl-C.
-
-    On a terminal it is redrawn in place; a pipe or a file gets one line per update.
+    Exit code 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
-    watch_until_stopped(session_of(context, target, as_json, robot), interval_s, count)
+    examination = Examination(parse_target(session.target), session.credentials())
+    findings = list(examination.findings())
+    print_findings(findings, as_json=session.as_json, out=session.out)
+    code = exit_code(findings) if examination.reached else ExitCode.UNREACHABLE
+    raise typer.Exit(int(code))
+
+
+COMMANDS: Final[Mapping[str, Callable[..., None]]] = {
+    "status": _query(
+        GatewayClient.status, json_form, status_view, "Show the status of the whole robot, once."
+    ),
+    "watch": watch,
+    "overlay": _query(
+        GatewayClient.overlay,
+        json_form,
+        overlay_view,
+        "Show the robot's detections and the newest events, once.",
+    ),
+    "events": events,
+    "info": _query(
+        GatewayClient.info,
+        info_json,
+        info_view,
+        "Show the gateway program: build, call counts, configuration.",
+    ),
+    "doctor": doctor,
+    "login": login,
+    "view": view,
+    "monitor": monitor,
+}
+for name, function in COMMANDS.items():
+    app.command(name)(function)

@@ -1,59 +1,45 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from datetime import datetime
-from enum import StrEnum
-from typing import Annotated, Any, Final
+from typing import Annotated, Literal
 
 import typer
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
-from console.cli.session import Session, error_as_json
+from console.cli.options import with_session
+from console.cli.session import Session, error_as_json, print_json
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
-from console.presentation.formatting import plural
+from console.presentation.formatting import plural, wall_clock
 from console.presentation.severity_style import FAULT_STYLES
 
-Item = Event | EventGap | CaughtUp | Outage
 
-_MS_PER_S: Final = 1000
-
-
-class SeverityWord(StrEnum):
-    """The lowest severity that can be requested."""
-
-    INFO = "info"
-    WARNING = "warning"
-    ERROR = "error"
-
-
+@with_session
 def events(
-    context: typer.Context,
+    session: Session,
     *,
-    follow: Annotated[bool, typer.Option("--follow", help="Go on until Ctrl-C.", show_default=False)] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", help="Continue with new events until Ctrl-C.", show_default=False)
+    ] = False,
     since: Annotated[
         str | None,
-        typer.Option("--since", metavar="RUN:SEQUENCE", help="Go on after this event.", show_default=False),
+        typer.Option("--since", metavar="RUN:SEQUENCE", help="Resume after this event.", show_default=False),
     ] = None,
     severity: Annotated[
-        SeverityWord, typer.Option("--severity", help="Leave out events of lower severity.")
-    ] = SeverityWord.INFO,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
+        Literal["info", "warning", "error"],
+        typer.Option("--severity", help="Leave out events of lower severity."),
+    ] = "info",
 ) -> None:
     """Show past events of the robot, as far back as the gateway keeps them.
 
     With --follow also new ones, each once, across lost connections.
     """
-    session = session_of(context, target, as_json, robot)
     after = _position(since)
-    least = FaultSeverity.UNKNOWN if severity is SeverityWord.INFO else FaultSeverity(severity.value)
+    least = FaultSeverity.UNKNOWN if severity == "info" else FaultSeverity(severity)
     with session.connect() as gateway, until_stopped(gateway.close) as stopped:
         for item in stopped.as_end_of(gateway.events(after, least=least)):
             if isinstance(item, CaughtUp):
@@ -67,37 +53,30 @@ def events(
 
 
 def _show(session: Session, item: Event | EventGap | Outage) -> None:
-    if session.as_json:
-        session.print_json(_document(item), on_one_line=True)
-    else:
+    if not session.as_json:
         session.out.print(Text("  ").join(_columns(item)), soft_wrap=True)
-
-
-def _document(item: Event | EventGap | Outage) -> dict[str, Any]:
-    return {
+        return
+    document = {
         "event": json_form(item) if isinstance(item, Event) else None,
         "gap": json_form(item) if isinstance(item, EventGap) else None,
         "error": error_as_json(item.error) if isinstance(item, Outage) else None,
     }
+    print_json(session.out, document, on_one_line=True)
 
 
 def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
     match item:
         case Event():
-            at = datetime.fromtimestamp(item.wall_clock_unix_ms / _MS_PER_S).astimezone()
-            yield Text(at.strftime("%Y-%m-%d %H:%M:%S"), style="dim")
-            yield Text(f"{item.severity.value:7}", style=_style(item.severity))
+            yield Text(f"{wall_clock(item.wall_clock_unix_ms):19}", style="dim")
+            loud = item.severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
+            style = STYLES[FAULT_STYLES[item.severity]] if loud else ""
+            yield Text(f"{item.severity.value:7}", style=style)
             yield Text(f"{item.component:10}")
             yield Text(item.message)
         case EventGap():
             yield Text(f"--- {_missing(item)}", style="bold yellow")
         case Outage():
             yield Text(f"--- {item.error.what}", style="bold red")
-
-
-def _style(severity: FaultSeverity) -> str:
-    loud = severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
-    return STYLES[FAULT_STYLES[severity]] if loud else ""
 
 
 def _missing(gap: EventGap) -> str:

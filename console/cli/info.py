@@ -1,8 +1,8 @@
 """robotctl info: the gateway program itself."""
 
 import json
-from datetime import UTC, datetime
-from typing import Any, Final
+from datetime import UTC
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -11,9 +11,7 @@ from rich.text import Text
 from console.cli.json_form import json_form
 from console.cli.tables import grid
 from console.client import GatewayInfo
-from console.presentation.formatting import UNKNOWN, age
-
-_MS_PER_S: Final = 1000
+from console.presentation.formatting import UNKNOWN, age, wall_clock
 
 
 def info_json(info: GatewayInfo) -> dict[str, Any]:
@@ -39,13 +37,12 @@ def info_view(info: GatewayInfo, target: str) -> RenderableType:
 
 def _facts(info: GatewayInfo) -> Table:
     table = grid("nowrap", "fold")
-    clock = datetime.fromtimestamp(info.wall_clock_unix_ms / _MS_PER_S, UTC)
     for label, text in (
         ("version", info.gateway_version or UNKNOWN),
         ("revision", info.gateway.revision or UNKNOWN),
         ("up", age(info.gateway.uptime_ms)),
         ("boot", info.gateway.boot_id or UNKNOWN),
-        ("its clock", clock.isoformat(timespec="seconds")),
+        ("its clock", wall_clock(info.wall_clock_unix_ms, UTC, "%Y-%m-%dT%H:%M:%S+00:00")),
     ):
         table.add_row(Text(label, style="dim"), Text(text))
     return table

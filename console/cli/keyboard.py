@@ -10,8 +10,6 @@ from contextlib import suppress
 from enum import Enum
 from typing import Final
 
-from console.client import PreviewProfile
-
 _MOST_BYTES: Final = 1024
 # Arrows, function keys and Alt with a letter send letters and digits that are not keys of their own
 # (ECMA-48 5.4: a control sequence is ESC [, parameters 0x30-0x3F, intermediates 0x20-0x2F, final 0x40-0x7E).
@@ -26,13 +24,6 @@ class Key(Enum):
     BALANCED = "2"
     HIGH_QUALITY = "3"
     QUIT = "q"
-
-
-PROFILES: Final = {
-    Key.LOW_BW: PreviewProfile.LOW_BW,
-    Key.BALANCED: PreviewProfile.BALANCED,
-    Key.HIGH_QUALITY: PreviewProfile.HIGH_QUALITY,
-}
 
 
 def keys_in(typed: str) -> Iterator[Key]:

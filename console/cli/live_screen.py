@@ -11,10 +11,10 @@ from rich.segment import Segment
 from rich.text import Text
 
 from console.cli.keyboard import Key, Keyboard
-from console.cli.preview_keys import Message
 from console.cli.tables import STYLES, headline, rows_table
 from console.client import GatewayError, SystemStatus
 from console.presentation.formatting import age, plural
+from console.presentation.preview_switch import Note
 from console.presentation.status_table import status_rows
 
 _GAP: Final = "   "
@@ -64,7 +64,7 @@ class Fitted:
 
 
 def live_view(
-    update: Update, target: str, message: Message | None = None, keys: Iterable[tuple[Key, str, bool]] = ()
+    update: Update, target: str, message: Note | None = None, keys: Iterable[tuple[Key, str, bool]] = ()
 ) -> Fitted:
     """Returns the status table under a headline, above the newest message and the keys."""
     outage = Text()

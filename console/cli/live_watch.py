@@ -15,7 +15,7 @@ from console.cli.keyboard import Key, Keyboard, has_keyboard, keys_in
 from console.cli.live_screen import Fitted, Screen, Update, live_view
 from console.cli.preview_keys import PreviewKeys
 from console.cli.session import Session
-from console.client import GatewayError, Outage, PreviewRequest, WatchedStatus
+from console.client import DesiredPreview, GatewayError, Outage, WatchedStatus
 
 _MS_PER_S: Final = 1000
 # Messages expire, and ages count up, between two statuses as well.
@@ -156,13 +156,10 @@ class _LiveWatch:
                 self._start(self._send(request))
         self._changed.set()
 
-    async def _send(self, request: PreviewRequest) -> None:
+    async def _send(self, request: DesiredPreview) -> None:
         try:
             # The statuses show how it goes on.
-            if request.enabled:
-                change = await self._robot.enable_preview(request.profile, settle_within_s=0)
-            else:
-                change = await self._robot.disable_preview(settle_within_s=0)
+            change = await self._robot.set_preview(request, settle_within_s=0)
         except GatewayError as error:
             self._preview_keys.done(error)
         else:

@@ -21,19 +21,17 @@ _STANDARD_INPUT = "-"
 
 def login(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name from now on: --robot ROBOT.")],
-    target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Its gateway.")],
+    name: Annotated[str, typer.Argument(metavar="ROBOT", help="Name to store it under; --robot selects it.")],
+    target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Address of its gateway.")],
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="The login; - reads it from standard input.")
+        str, typer.Argument(metavar="FILE", help="File with the login; - is standard input.")
     ] = _STANDARD_INPUT,
     *,
-    ca: Annotated[
-        Path | None, typer.Option(help="Only replace the robot's certificate authority by this one (PEM).")
-    ] = None,
-    offline: Annotated[bool, typer.Option(help="Store it without asking the robot.")] = False,
+    ca: Annotated[Path | None, typer.Option(help="Replace the robot's CA certificate only (PEM).")] = None,
+    offline: Annotated[bool, typer.Option(help="Store it without contacting the robot.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Store a login that the robot's administrator gave you, and use it from now on.
+    """Store a login issued by the robot's administrator, for all later commands.
 
     On one line: ssh HOST robot-gateway credentials add NAME --role operator | robotctl login ROBOT HOST:PORT
     """
@@ -56,16 +54,13 @@ def login(
 
 
 def _read(file: str) -> tuple[str, Credentials]:
-    login = parse_login(sys.stdin.read() if file == _STANDARD_INPUT else _text(Path(file)))
-    return ", ".join(word for word in (login.name, login.role) if word), login.credentials
-
-
-def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        text = sys.stdin.read() if file == _STANDARD_INPUT else Path(file).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
-        raise UserError(f"{path} can't be read: {reason}", exit_code=ExitCode.USAGE) from error
+        raise UserError(f"{file} can't be read: {reason}", exit_code=ExitCode.USAGE) from error
+    login = parse_login(text)
+    return ", ".join(word for word in (login.name, login.role) if word), login.credentials
 
 
 def _with_new_authority(name: str, ca: Path) -> tuple[str, Credentials]:

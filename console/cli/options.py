@@ -1,8 +1,11 @@
 """The options that every command has, before or after its name."""
 
+import functools
+import inspect
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
@@ -55,13 +58,8 @@ class GlobalOptions:
     as_json: bool
 
 
-def keep_global_options(context: typer.Context, target: str | None, robot: str | None, as_json: bool) -> None:
-    """Stores the options before the command's name in the context."""
-    context.obj = GlobalOptions(target, robot, as_json)
-
-
 def session_of(
-    context: typer.Context, target: str | None, as_json: bool, robot: str | None = None
+    context: typer.Context, target: str | None = None, robot: str | None = None, as_json: bool = False
 ) -> Session:
     """Returns a session on standard output. An option after the command's name overrides one before it.
 
@@ -69,8 +67,34 @@ def session_of(
         UserError: No robot has this name, or the file of known robots is wrong.
     """
     before: GlobalOptions = context.obj
-    choice = choose(target or before.target, robot or before.robot, os.environ)
-    return Session(choice.robot, json_requested(context, as_json), standard_output(), choice.name)
+    chosen, name = choose(target or before.target, robot or before.robot, os.environ)
+    return Session(chosen, json_requested(context, as_json), standard_output(), name)
+
+
+def with_session(function: Callable[..., None]) -> Callable[..., None]:
+    """Returns the command of a function: with --target, --robot and --json, which make its first argument.
+
+    Args:
+        function: Takes the `Session`, and the command's own arguments and options by name.
+    """
+
+    @functools.wraps(function, assigned=("__module__", "__name__", "__qualname__", "__doc__"))
+    def command(
+        context: typer.Context,
+        target: TargetOption = None,
+        robot: RobotOption = None,
+        as_json: JsonOption = False,
+        **own: Any,
+    ) -> None:
+        function(session_of(context, target, robot, as_json), **own)
+
+    _, *own = inspect.signature(function).parameters.values()
+    context, *shared, _ = inspect.signature(command, follow_wrapped=False).parameters.values()
+    parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in (context, *own, *shared)]
+    # Typer reads options from these two.
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # of any callable
+    command.__annotations__ = {each.name: each.annotation for each in parameters}
+    return command
 
 
 def json_requested(context: typer.Context, as_json: bool) -> bool:

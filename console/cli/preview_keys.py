@@ -1,33 +1,24 @@
 """Preview requests from keys, one at a time, and the message about the newest one. Pure."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Final
 
-from console.cli.keyboard import PROFILES, Key
+from console.cli.keyboard import Key
 from console.client import (
+    DesiredPreview,
     GatewayError,
     PreviewChange,
     PreviewProfile,
-    PreviewRequest,
     PreviewState,
     PreviewStatus,
 )
+from console.presentation.preview_switch import PROFILES, SUCCESS_SHOWN_S, Note, PreviewSwitch, is_on
 from console.presentation.severity_style import SeverityStyle
 
-_SUCCESS_FOR_S: Final = 5.0
-_FAILURE_FOR_S: Final = 15.0
-_ON: Final = (PreviewState.STARTING, PreviewState.RUNNING, PreviewState.FAULTED)
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """A sentence about the newest request."""
-
-    text: str
-    style: SeverityStyle
-    until_s: float = float("inf")
+_FAILURE_SHOWN_S: Final = 15.0
+_PROFILES: Final = dict(zip((Key.LOW_BW, Key.BALANCED, Key.HIGH_QUALITY), PROFILES, strict=True))
 
 
 class PreviewKeys:
@@ -39,21 +30,22 @@ class PreviewKeys:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._pending: PreviewRequest | None = None
+        self._pending: DesiredPreview | None = None
         self._selected = PreviewProfile.UNKNOWN
-        self._message: Message | None = None
+        self._note: Note | None = None
+        self._until_s = math.inf
 
-    def press(self, key: Key, preview: PreviewStatus) -> PreviewRequest | None:
+    def press(self, key: Key, preview: PreviewStatus) -> DesiredPreview | None:
         """Returns the request to send; None while another one is pending or there is none to send."""
         if self._pending:
             return None
         request = self._request(key, preview)
         if request is None:
             hint = f"{self._selected.value}: p turns the preview on with it"
-            self._show(hint, SeverityStyle.QUIET, _FAILURE_FOR_S)
+            self._show(hint, SeverityStyle.QUIET, _FAILURE_SHOWN_S)
             return None
         self._pending = request
-        self._message = Message(f"{_title(request)}: request sent ...", SeverityStyle.QUIET)
+        self._show(f"{_title(request)}: request sent ...", SeverityStyle.QUIET)
         return request
 
     def done(self, outcome: PreviewChange | GatewayError) -> None:
@@ -61,44 +53,41 @@ class PreviewKeys:
         request, self._pending = self._pending, None
         assert request  # noqa: S101  # callers send one at a time
         if isinstance(outcome, GatewayError):
-            self._show(f"{_title(request)} failed: {outcome}", SeverityStyle.BAD, _FAILURE_FOR_S)
+            self._show(f"{_title(request)} failed: {outcome}", SeverityStyle.BAD, _FAILURE_SHOWN_S)
         elif not outcome.accepted:
             refusal = f"{_title(request)}: the robot refused: {outcome.message}"
-            self._show(refusal, SeverityStyle.BAD, _FAILURE_FOR_S)
+            self._show(refusal, SeverityStyle.BAD, _FAILURE_SHOWN_S)
         elif outcome.preview.state is PreviewState.FAULTED:
-            self._show(outcome.message, SeverityStyle.BAD, _FAILURE_FOR_S)
+            self._show(outcome.message, SeverityStyle.BAD, _FAILURE_SHOWN_S)
         else:
             self._selected = PreviewProfile.UNKNOWN
-            self._show(outcome.message, SeverityStyle.QUIET, _SUCCESS_FOR_S)
+            self._show(outcome.message, SeverityStyle.QUIET, SUCCESS_SHOWN_S)
 
-    def message(self) -> Message | None:
+    def message(self) -> Note | None:
         """Returns the message about the newest request, until it expires."""
-        if self._message and self._clock() > self._message.until_s:
-            self._message = None
-        return self._message
+        return None if self._clock() > self._until_s else self._note
 
     def help(self, preview: PreviewStatus) -> Iterator[tuple[Key, str, bool]]:
         """Yields each key, what it does now, and whether that is in effect already."""
-        yield Key.TOGGLE, "preview off" if preview.state in _ON else "preview on", False
+        yield Key.TOGGLE, "preview off" if is_on(preview) else "preview on", False
         selected = preview.profile if self._selected is PreviewProfile.UNKNOWN else self._selected
-        for key, profile in PROFILES.items():
+        for key, profile in _PROFILES.items():
             yield key, profile.value, profile is selected
         yield Key.QUIT, "quit", False
 
-    def _request(self, key: Key, preview: PreviewStatus) -> PreviewRequest | None:
-        on = preview.state in _ON
+    def _request(self, key: Key, preview: PreviewStatus) -> DesiredPreview | None:
+        switch = PreviewSwitch(is_on(preview), self._selected)
         if key is Key.TOGGLE:
-            return PreviewRequest(False) if on else PreviewRequest(True, self._selected)
-        if on:
-            return PreviewRequest(True, PROFILES[key])
-        self._selected = PROFILES[key]
-        return None
+            return switch.toggled()
+        if not switch.on:
+            self._selected = _PROFILES[key]
+        return switch.with_profile(_PROFILES[key])
 
-    def _show(self, text: str, style: SeverityStyle, for_s: float) -> None:
-        self._message = Message(text, style, self._clock() + for_s)
+    def _show(self, text: str, style: SeverityStyle, for_s: float = math.inf) -> None:
+        self._note, self._until_s = Note(text, style), self._clock() + for_s
 
 
-def _title(request: PreviewRequest) -> str:
+def _title(request: DesiredPreview) -> str:
     if not request.enabled:
         return "preview off"
     return "preview on" if request.profile is PreviewProfile.UNKNOWN else f"preview {request.profile.value}"

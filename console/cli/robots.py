@@ -18,7 +18,7 @@ from console.robots.robots_file import FILE_KEYS
 from console.robots.robots_file_edit import drop_robot, put_robot, set_default
 
 robots_app = typer.Typer(
-    help="The robots known by name; without a subcommand, lists them.", pretty_exceptions_enable=False
+    help="List the robots known by name, or change the list.", pretty_exceptions_enable=False
 )
 
 NameArgument = Annotated[
@@ -28,7 +28,7 @@ NameArgument = Annotated[
 
 @robots_app.callback(invoke_without_command=True)
 def robots(context: typer.Context, as_json: JsonOption = False) -> None:
-    """The robots known by name; without a subcommand, lists them."""
+    """List the robots known by name, or change the list."""
     if context.invoked_subcommand is None:
         _show(context, read_robots_file(), as_json)
     elif as_json:
@@ -38,10 +38,10 @@ def robots(context: typer.Context, as_json: JsonOption = False) -> None:
 @robots_app.command("add")
 def add(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Its name: --robot NAME.")],
-    target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Its gateway.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name to store it under; --robot selects it.")],
+    target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Address of its gateway.")],
     new_address: Annotated[
-        bool, typer.Option("--replace", help="Give a known robot this new address; its login stays.")
+        bool, typer.Option("--replace", help="Change the address of a known robot; its login stays.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -76,15 +76,11 @@ def robots_json(known: RobotsFile) -> dict[str, Any]:
         "file": str(known.path),
         "default": known.default,
         "robots": [
-            {"name": name, "target": robot.target, "default": name == known.default} | _files(robot)
+            {"name": name, "target": robot.target, "default": name == known.default}
+            | {key: str(file) if (file := getattr(robot, key)) else None for key in FILE_KEYS}
             for name, robot in known.robots.items()
         ],
     }
-
-
-def _files(robot: Robot) -> dict[str, str | None]:
-    paths = {key: getattr(robot, key) for key in FILE_KEYS}
-    return {key: str(path) if path else None for key, path in paths.items()}
 
 
 def _show(context: typer.Context, known: RobotsFile, as_json: bool) -> None:

@@ -11,6 +11,7 @@ from rich.console import Console, RenderableType
 
 from common.errors import ExitCode, UserError
 from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
+from console.client.printable import escaped
 from console.robots import Robot, read_credentials, read_robots_file
 
 # In a pipe or a file long lines are better than broken ones.
@@ -60,13 +61,9 @@ class Session:
     def show(self, document: Mapping[str, Any], view: RenderableType) -> None:
         """Prints the JSON document, or the view for people."""
         if self.as_json:
-            self.print_json(document)
+            print_json(self.out, document)
         else:
             self.out.print(view)
-
-    def print_json(self, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
-        """Prints one JSON document and flushes the output."""
-        print_json(self.out, value, on_one_line=on_one_line)
 
 
 def standard_output() -> Console:
@@ -78,13 +75,15 @@ def standard_output() -> Console:
 def print_json(out: Console, value: Mapping[str, Any], *, on_one_line: bool = False) -> None:
     """Prints one JSON document and flushes the output."""
     text = json.dumps(value, indent=None if on_one_line else 2, allow_nan=False, ensure_ascii=False)
-    print(text, file=out.file, flush=True)
+    # Results have no control characters, but the configuration in one is JSON, which can spell them.
+    print(escaped(text), file=out.file, flush=True)
 
 
 def error_as_json(error: UserError) -> dict[str, Any]:
     """Returns the JSON form of an error."""
+    own = "usage" if error.exit_code is ExitCode.USAGE else "failed"
     return {
-        "kind": _kind(error),
+        "kind": error.kind if isinstance(error, GatewayError) else own,
         "what": " ".join(error.what.split()),
         "remedy": error.remedy,
         "exit_code": int(error.exit_code),
@@ -94,12 +93,6 @@ def error_as_json(error: UserError) -> dict[str, Any]:
 def report(error: UserError) -> None:
     """Prints an error on one line of standard error; as JSON where the command line has --json."""
     if "--json" in sys.argv[1:]:
-        print(json.dumps({"error": error_as_json(error)}, ensure_ascii=False), file=sys.stderr)
+        print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
     else:
         print(f"error: {error}", file=sys.stderr)
-
-
-def _kind(error: UserError) -> str:
-    if isinstance(error, GatewayError):
-        return error.kind
-    return "usage" if error.exit_code is ExitCode.USAGE else "failed"

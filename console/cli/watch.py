@@ -1,25 +1,37 @@
 """robotctl watch: the status on every change, redrawn on a terminal, line by line elsewhere."""
 
 from datetime import UTC, datetime
+from typing import Annotated
+
+import typer
 
 from console.cli.json_form import json_form
 from console.cli.live_watch import watch_on_a_terminal
-from console.cli.session import Session, error_as_json
+from console.cli.options import with_session
+from console.cli.session import Session, error_as_json, print_json
 from console.cli.stopping import until_stopped
 from console.client import Outage, WatchedStatus
 from console.presentation.status_line import status_line
 
 
-def watch_until_stopped(session: Session, interval_s: float, count: int | None) -> None:
-    """Shows each status, until SIGINT or SIGTERM, or for `count` updates.
+@with_session
+def watch(
+    session: Session,
+    *,
+    interval_s: Annotated[
+        float,
+        typer.Option(
+            "--interval", min=0.1, max=3600, metavar="SECONDS", help="Shortest time between updates."
+        ),
+    ] = 1.0,
+    count: Annotated[
+        int | None,
+        typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
+    ] = None,
+) -> None:
+    """Show the status whenever it changes, until Ctrl-C.
 
-    Args:
-        session: The robot and the output.
-        interval_s: Least time between two updates.
-        count: None for no end.
-
-    Raises:
-        GatewayError: No status came at all. A later outage is shown instead.
+    On a terminal it is redrawn in place; a pipe or a file gets one line per update.
     """
     if session.out.is_terminal and not session.as_json:
         watch_on_a_terminal(session, interval_s, count)
@@ -27,23 +39,19 @@ def watch_until_stopped(session: Session, interval_s: float, count: int | None) 
     with session.connect() as robot, until_stopped(robot.close) as stopped:
         items = stopped.as_end_of(robot.watch_status(interval_s))
         for number, item in enumerate(items, start=1):
-            if session.as_json:
-                _print_json(session, item)
-            else:
-                _print_line(session, item)
+            (_print_json if session.as_json else _print_line)(session, item)
             if number == count:
                 return
 
 
 def _print_line(session: Session, item: WatchedStatus | Outage) -> None:
     now = datetime.now().astimezone().strftime("%H:%M:%S")
-    print(f"{now}  {_line(item)}", file=session.out.file, flush=True)
-
-
-def _line(item: WatchedStatus | Outage) -> str:
-    if isinstance(item, Outage):
-        return f"{item.error.kind}: {item.error.what}"
-    return status_line(item.status)
+    line = (
+        status_line(item.status)
+        if isinstance(item, WatchedStatus)
+        else f"{item.error.kind}: {item.error.what}"
+    )
+    print(f"{now}  {line}", file=session.out.file, flush=True)
 
 
 def _print_json(session: Session, item: WatchedStatus | Outage) -> None:
@@ -52,4 +60,4 @@ def _print_json(session: Session, item: WatchedStatus | Outage) -> None:
         "status": json_form(item.status) if isinstance(item, WatchedStatus) else None,
         "error": error_as_json(item.error) if isinstance(item, Outage) else None,
     }
-    session.print_json(document, on_one_line=True)
+    print_json(session.out, document, on_one_line=True)

@@ -10,8 +10,8 @@ import typer
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import JsonOption, RobotOption, TargetOption, session_of
-from console.cli.session import Session
+from console.cli.options import RobotOption, TargetOption, session_of, with_session
+from console.cli.session import Session, print_json
 from console.cli.stopping import until_stopped
 from console.client import parse_target
 from console.receiver.recording import Recording
@@ -32,7 +32,9 @@ RecordOption = Annotated[
     Path | None,
     typer.Option("--record", metavar="FILE", help="Record the encoded stream (MPEG-TS) to a new file."),
 ]
-HeadlessOption = Annotated[bool, typer.Option("--headless", help="Without a window.", show_default=False)]
+HeadlessOption = Annotated[
+    bool, typer.Option("--headless", help="Receive the video without a window.", show_default=False)
+]
 FramesOption = Annotated[
     int | None,
     typer.Option("--frames", min=1, help="With --headless: end after so many frames.", show_default=False),
@@ -49,22 +51,19 @@ PatienceOption = Annotated[
 ]
 
 
+@with_session
 def view(
-    context: typer.Context,
+    session: Session,
     *,
     record: RecordOption = None,
     headless: HeadlessOption = False,
     frames: FramesOption = None,
     patience_s: PatienceOption = 15.0,
-    target: TargetOption = None,
-    robot: RobotOption = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Show the live preview with detections overlaid. The robot provides all settings.
 
     Keys: p preview on or off, o boxes, f full screen, q quit.
     """
-    session = session_of(context, target, as_json, robot)
     if frames and not headless:
         raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
     address = parse_target(session.target)
@@ -80,7 +79,7 @@ def view(
     else:
         summary = run_view(address, recording, session.credentials)
     if session.as_json:
-        session.print_json(json_form(summary))
+        print_json(session.out, json_form(summary))
     elif headless or recording:
         session.out.print(summary.line(), soft_wrap=True)
     if recording and recording.error:
@@ -94,7 +93,7 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
     """
     with _requiring_qt():
         from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
-    session = session_of(context, target, False, robot)
+    session = session_of(context, target, robot)
     run_monitor(session.target, session.credentials)
 
 

@@ -27,7 +27,7 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
-from console.client.mapping.methods import PreviewRequest
+from console.client.mapping.methods import DesiredPreview
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,

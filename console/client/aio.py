@@ -3,6 +3,7 @@
 from collections.abc import AsyncIterator
 from typing import Self
 
+from console.client import results
 from console.client.clock import Clock, Offset
 from console.client.credentials import NO_CREDENTIALS, Credentials
 from console.client.event_feed import EventFeed
@@ -10,23 +11,10 @@ from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
-    PreviewRequest,
+    DesiredPreview,
     WatchRequest,
 )
 from console.client.options import ClientOptions
-from console.client.results import (
-    CaughtUp,
-    Event,
-    EventGap,
-    EventPosition,
-    FaultSeverity,
-    GatewayInfo,
-    OverlaySnapshot,
-    PreviewChange,
-    PreviewProfile,
-    SystemStatus,
-    WatchedStatus,
-)
 from console.client.streams import Outage, Streams
 from console.client.target import DEFAULT_TARGET, parse_target
 from console.client.transport import GrpcTransport
@@ -76,21 +64,24 @@ class AsyncGatewayClient:
         """Attempts beyond the first, of all calls together."""
         return self._calls.retries
 
-    async def status(self) -> SystemStatus:
+    async def status(self) -> results.SystemStatus:
         """Returns the status of the whole robot."""
         return await self._calls.read(GET_SYSTEM_STATUS)
 
-    async def overlay(self) -> OverlaySnapshot:
+    async def overlay(self) -> results.OverlaySnapshot:
         """Returns status, detections and the newest events, all of one instant."""
         return await self._calls.read(GET_OVERLAY_SNAPSHOT)
 
-    async def info(self) -> GatewayInfo:
+    async def info(self) -> results.GatewayInfo:
         """Returns the gateway program's build, call counts and configuration."""
         return await self._calls.read(GET_GATEWAY_INFO)
 
     async def enable_preview(
-        self, profile: PreviewProfile = PreviewProfile.UNKNOWN, *, settle_within_s: float = 10.0
-    ) -> PreviewChange:
+        self,
+        profile: results.PreviewProfile = results.PreviewProfile.UNKNOWN,
+        *,
+        settle_within_s: float = 10.0,
+    ) -> results.PreviewChange:
         """Turns the preview on, or changes its profile, and waits until frames leave or the start failed.
 
         Args:
@@ -101,11 +92,17 @@ class AsyncGatewayClient:
             The gateway's message and the newest preview status: RUNNING, FAULTED (see `last_error`), or
             still STARTING when time ran out.
         """
-        return await self._calls.set_preview(PreviewRequest(True, profile), settle_within_s)
+        return await self.set_preview(DesiredPreview(True, profile), settle_within_s=settle_within_s)
 
-    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:
+    async def disable_preview(self, *, settle_within_s: float = 10.0) -> results.PreviewChange:
         """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""
-        return await self._calls.set_preview(PreviewRequest(False), settle_within_s)
+        return await self.set_preview(DesiredPreview(False), settle_within_s=settle_within_s)
+
+    async def set_preview(
+        self, desired: DesiredPreview, *, settle_within_s: float = 10.0
+    ) -> results.PreviewChange:
+        """Turns the preview on or off, as `enable_preview` and `disable_preview` do."""
+        return await self._calls.set_preview(desired, settle_within_s)
 
     async def ping(self) -> Offset:
         """Returns the offset of the robot's clock. Each call improves `clock`."""
@@ -113,7 +110,7 @@ class AsyncGatewayClient:
 
     def watch_status(
         self, min_interval_s: float = 0.1, *, include_detections: bool = False
-    ) -> AsyncIterator[WatchedStatus | Outage]:
+    ) -> AsyncIterator[results.WatchedStatus | Outage]:
         """Yields the status at once, on every change, and once a second without one. Never ends.
 
         A slow reader gets the newest next. A broken connection is made again; meanwhile an `Outage` comes
@@ -129,8 +126,11 @@ class AsyncGatewayClient:
         return self._streams.status(WatchRequest(min_interval_s, include_detections))
 
     def events(
-        self, after: EventPosition | None = None, *, least: FaultSeverity = FaultSeverity.UNKNOWN
-    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        self,
+        after: results.EventPosition | None = None,
+        *,
+        least: results.FaultSeverity = results.FaultSeverity.UNKNOWN,
+    ) -> AsyncIterator[results.Event | results.EventGap | results.CaughtUp | Outage]:
         """Yields each event once and in order; events that are not available any more, as an `EventGap`.
 
         `CaughtUp` comes after the last past event, and then as a keepalive. Every item but an `Outage` has

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from console.client.aio import AsyncGatewayClient
 from console.client.credentials import Credentials
 from console.client.errors import Cancelled
-from console.client.loop_thread import LoopThread
+from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions
 from console.client.target import DEFAULT_TARGET
 
@@ -60,14 +60,7 @@ class GatewayClient:
             change = robot.enable_preview(PreviewProfile.BALANCED)
             print(change.preview.endpoint)
 
-    Args:
-        target: HOST or HOST:PORT.
-        options: Deadlines, retries and keepalive.
-        credentials: Token and certificates; None for a robot without authentication.
-
-    Raises:
-        UserError: The target is not an address, or the credentials would be sent in the clear. Every method
-            raises a `GatewayError`.
+    Arguments and errors are those of `AsyncGatewayClient`.
     """
 
     def __init__(
@@ -79,14 +72,14 @@ class GatewayClient:
         async def create() -> AsyncGatewayClient:
             return AsyncGatewayClient(target, options, credentials)
 
-        self._loop = LoopThread()
-        # Also at the end of a program that does not close its client.
-        stop = weakref.finalize(self, self._loop.stop)
+        self._loop = shared_loop.acquire()
         try:
             self._client = self._loop.run(create())
         except BaseException:
-            stop()
+            shared_loop.release(self._loop)
             raise
+        # Also at the end of a program that does not close its client.
+        self._end = weakref.finalize(self, _end, self._loop, self._client)
         self.target = self._client.target
         self.clock = self._client.clock
 
@@ -95,6 +88,7 @@ class GatewayClient:
     info = _blocking(AsyncGatewayClient.info)
     enable_preview = _blocking(AsyncGatewayClient.enable_preview)
     disable_preview = _blocking(AsyncGatewayClient.disable_preview)
+    set_preview = _blocking(AsyncGatewayClient.set_preview)
     ping = _blocking(AsyncGatewayClient.ping)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
@@ -113,13 +107,20 @@ class GatewayClient:
         """Closes the connection. Pending calls and streams in other threads end with `Cancelled`."""
         with suppress(Cancelled):
             self._loop.run(self._client.close())
-        self._loop.stop()
+        self._end()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _end(loop: LoopThread, client: AsyncGatewayClient) -> None:
+    # Not waited for: the garbage collector may call this in the loop's own thread.
+    with suppress(Cancelled):
+        loop.submit(client.close())
+    shared_loop.release(loop)
 
 
 async def _next(items: AsyncIterator[ResultT]) -> ResultT:

@@ -46,13 +46,14 @@ class Credentials:
         if self.client_certificate is not None:
             raise UserError(
                 "a client certificate needs the robot's CA certificate beside it",
-                "Type: robotctl login, with the login of this robot",
+                "Store this robot's login: robotctl login NAME HOST:PORT FILE",
                 exit_code=ExitCode.USAGE,
             )
         if self.token is not None and not _is_loopback(target):
             raise UserError(
                 f"the token would be sent to {target} in the clear",
-                "Add the robot's CA certificate (robotctl login), or use a tunnel to 127.0.0.1",
+                "Store the robot's login (robotctl login NAME HOST:PORT FILE), which has its CA certificate, "
+                "or use a tunnel to 127.0.0.1",
                 exit_code=ExitCode.USAGE,
             )
         return None

@@ -1,81 +1,69 @@
 """Maps gRPC codes and the gateway's reasons to the client's exceptions. Both tables are total."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 import grpc
 
 from common.reasons import Reason
-from console.client.errors import (
-    Cancelled,
-    DeadlineExceeded,
-    GatewayError,
-    GatewayFailed,
-    InvalidRequest,
-    NotAllowed,
-    NotTrusted,
-    Overloaded,
-    Refused,
-    Unreachable,
-    Unsupported,
-)
+from console.client import errors
+from console.client.printable import printable
 from console.client.refusal import refusal_in
 
-ERRORS: Final[Mapping[grpc.StatusCode, type[GatewayError]]] = MappingProxyType(
-    {
-        # An error with the code OK is a defect of the server.
-        grpc.StatusCode.OK: GatewayFailed,
-        grpc.StatusCode.CANCELLED: Cancelled,
-        grpc.StatusCode.UNKNOWN: GatewayFailed,
-        grpc.StatusCode.INVALID_ARGUMENT: InvalidRequest,
-        grpc.StatusCode.DEADLINE_EXCEEDED: DeadlineExceeded,
-        grpc.StatusCode.NOT_FOUND: Refused,
-        grpc.StatusCode.ALREADY_EXISTS: Refused,
-        grpc.StatusCode.PERMISSION_DENIED: NotAllowed,
-        grpc.StatusCode.RESOURCE_EXHAUSTED: Overloaded,
-        grpc.StatusCode.FAILED_PRECONDITION: Refused,
-        grpc.StatusCode.ABORTED: Refused,
-        grpc.StatusCode.OUT_OF_RANGE: InvalidRequest,
-        grpc.StatusCode.UNIMPLEMENTED: Unsupported,
-        grpc.StatusCode.INTERNAL: GatewayFailed,
-        grpc.StatusCode.UNAVAILABLE: Unreachable,
-        grpc.StatusCode.DATA_LOSS: GatewayFailed,
-        grpc.StatusCode.UNAUTHENTICATED: NotAllowed,
-    }
-)
+ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
+    # An error with the code OK is a defect of the server.
+    grpc.StatusCode.OK: errors.GatewayFailed,
+    grpc.StatusCode.CANCELLED: errors.Cancelled,
+    grpc.StatusCode.UNKNOWN: errors.GatewayFailed,
+    grpc.StatusCode.INVALID_ARGUMENT: errors.InvalidRequest,
+    grpc.StatusCode.DEADLINE_EXCEEDED: errors.DeadlineExceeded,
+    grpc.StatusCode.NOT_FOUND: errors.Refused,
+    grpc.StatusCode.ALREADY_EXISTS: errors.Refused,
+    grpc.StatusCode.PERMISSION_DENIED: errors.NotAllowed,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: errors.Overloaded,
+    grpc.StatusCode.FAILED_PRECONDITION: errors.Refused,
+    grpc.StatusCode.ABORTED: errors.Refused,
+    grpc.StatusCode.OUT_OF_RANGE: errors.InvalidRequest,
+    grpc.StatusCode.UNIMPLEMENTED: errors.Unsupported,
+    grpc.StatusCode.INTERNAL: errors.GatewayFailed,
+    grpc.StatusCode.UNAVAILABLE: errors.Unreachable,
+    grpc.StatusCode.DATA_LOSS: errors.GatewayFailed,
+    grpc.StatusCode.UNAUTHENTICATED: errors.NotAllowed,
+}
 
-REASONS: Final[Mapping[str, type[GatewayError]]] = MappingProxyType(
-    {
-        Reason.INVALID_REQUEST: InvalidRequest,
-        Reason.MESSAGE_TOO_LARGE: InvalidRequest,
-        Reason.UNKNOWN_SERVICE: Refused,
-        Reason.TOO_MANY_CONNECTIONS: Overloaded,
-        Reason.TOO_MANY_STREAMS: Overloaded,
-        Reason.TOO_MANY_REQUESTS: Overloaded,
-        Reason.CREDENTIAL_MISSING: NotAllowed,
-        Reason.CREDENTIAL_UNKNOWN: NotAllowed,
-        Reason.CREDENTIAL_REVOKED: NotAllowed,
-        Reason.CREDENTIAL_EXPIRED: NotAllowed,
-        Reason.CREDENTIAL_NOT_YET_VALID: NotAllowed,
-        Reason.ROLE_TOO_LOW: NotAllowed,
-        Reason.LOCKED_OUT: NotAllowed,
-        Reason.INTERNAL: GatewayFailed,
-    }
-)
+REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
+    Reason.INVALID_REQUEST: errors.InvalidRequest,
+    Reason.MESSAGE_TOO_LARGE: errors.InvalidRequest,
+    Reason.UNKNOWN_SERVICE: errors.Refused,
+    Reason.TOO_MANY_CONNECTIONS: errors.Overloaded,
+    Reason.TOO_MANY_STREAMS: errors.Overloaded,
+    Reason.TOO_MANY_REQUESTS: errors.Overloaded,
+    Reason.CREDENTIAL_MISSING: errors.NotAllowed,
+    Reason.CREDENTIAL_UNKNOWN: errors.NotAllowed,
+    Reason.CREDENTIAL_REVOKED: errors.NotAllowed,
+    Reason.CREDENTIAL_EXPIRED: errors.NotAllowed,
+    Reason.CREDENTIAL_NOT_YET_VALID: errors.NotAllowed,
+    Reason.ROLE_TOO_LOW: errors.NotAllowed,
+    Reason.LOCKED_OUT: errors.NotAllowed,
+    Reason.INTERNAL: errors.GatewayFailed,
+}
 """A reason takes precedence over the code; an unknown one, of a newer gateway, leaves it to that."""
 
-_ADVICE: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        Reason.TOO_MANY_CONNECTIONS: "Close another program that is connected to this robot, or wait",
-        Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
-        Reason.CREDENTIAL_EXPIRED: "Ask this robot's administrator for a new one, then type: robotctl login",
-        Reason.ROLE_TOO_LOW: (
-            "Ask this robot's administrator for a login with that role, then type: robotctl login"
-        ),
-        Reason.LOCKED_OUT: "Wait as long as it says; if the stored login is outdated, type: robotctl login",
-    }
-)
+_ADVICE: Final[Mapping[str, str]] = {
+    Reason.TOO_MANY_CONNECTIONS: "Close another program that is connected to this robot, or wait",
+    Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
+    Reason.CREDENTIAL_EXPIRED: (
+        "Ask this robot's administrator for a new login, then type: robotctl login NAME HOST:PORT FILE"
+    ),
+    Reason.ROLE_TOO_LOW: (
+        "Ask this robot's administrator for a login with that role, then type: "
+        "robotctl login NAME HOST:PORT FILE"
+    ),
+    Reason.LOCKED_OUT: (
+        "Wait as long as it says; if the stored login is outdated, store the new one: "
+        "robotctl login NAME HOST:PORT FILE"
+    ),
+}
 """Where a reason allows more specific advice than the class."""
 
 _CLOSED: Final = "the connection was closed, as by a gateway that requires a login (robotctl login)"
@@ -112,7 +100,7 @@ _NOT_TRUSTED: Final = (
 """The same for a TLS handshake that failed because of the server's certificate."""
 
 
-def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> GatewayError:
+def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> errors.GatewayError:
     """Returns the exception for a failed call.
 
     Args:
@@ -123,40 +111,24 @@ def error_from(failure: grpc.RpcError, target: str, timeout_s: float) -> Gateway
     # Both gRPC APIs raise errors with these methods, but share no class that declares them.
     call: Any = failure
     code, refusal = call.code(), refusal_in(call.trailing_metadata())
-    details = call.details() or code.name
+    details = printable(call.details() or code.name)
     if code is grpc.StatusCode.UNAVAILABLE and (why := _message_for(details, _NOT_TRUSTED)):
-        return NotTrusted(f"what answers at {target} is not trusted: {why}")
+        return errors.NotTrusted(f"what answers at {target} is not trusted: {why}")
     family = REASONS.get(refusal.reason, ERRORS[code])
     error = family(_sentence(family, details, target, timeout_s), _ADVICE.get(refusal.reason))
-    error.reason, error.fields, error.retry_after_s = refusal.reason, refusal.fields, refusal.retry_after_s
+    error.reason, error.retry_after_s = printable(refusal.reason), refusal.retry_after_s
+    error.fields = tuple(map(printable, refusal.fields))
     return error
 
 
-def stream_error_from(error: GatewayError | None, target: str) -> GatewayError:
-    """Returns the exception for a stream that the gateway ended.
-
-    Args:
-        error: The error of its call; None for an orderly end.
-        target: The robot's address, for the message.
-    """
-    if error is None or isinstance(error, Cancelled):
-        # A gateway that stops completes its streams or cancels them.
-        return Unreachable(f"no robot gateway reached at {target}: it ended the stream")
-    return error
-
-
-def _sentence(family: type[GatewayError], details: str, target: str, timeout_s: float) -> str:
-    if family is Unreachable:
-        return f"no robot gateway reached at {target}: {_plain(details)}"
-    if family is DeadlineExceeded:
+def _sentence(family: type[errors.GatewayError], details: str, target: str, timeout_s: float) -> str:
+    if family is errors.Unreachable:
+        return f"no robot gateway reached at {target}: {_message_for(details, _PLAIN_MESSAGES) or details}"
+    if family is errors.DeadlineExceeded:
         return f"the robot gateway at {target} did not answer within {timeout_s:.1f} s"
-    if issubclass(family, Refused | InvalidRequest):
+    if issubclass(family, errors.Refused | errors.InvalidRequest):
         return f"the robot gateway at {target} refused: {details}"
     return f"the call to the robot gateway at {target} failed: {details}"
-
-
-def _plain(details: str) -> str:
-    return _message_for(details, _PLAIN_MESSAGES) or details
 
 
 def _message_for(details: str, table: tuple[tuple[str, str], ...]) -> str:

@@ -63,7 +63,7 @@ class NotAllowed(Refused):
     """This client is not authenticated, or lacks the role."""
 
     kind = "not_allowed"
-    advice = "Ask this robot's administrator for access, then type: robotctl login"
+    advice = "Ask this robot's administrator for a login, then type: robotctl login NAME HOST:PORT FILE"
 
 
 class NotTrusted(GatewayError):
@@ -71,7 +71,8 @@ class NotTrusted(GatewayError):
 
     kind = "not_trusted"
     advice = (
-        "Type: robotctl login, with the login of this robot; if you have, ask its administrator for a new one"
+        "Store this robot's login: robotctl login NAME HOST:PORT FILE. If it is stored already, "
+        "ask the robot's administrator for a new one"
     )
 
 

@@ -1,11 +1,15 @@
-"""An asyncio loop in a thread of its own, which blocking code hands coroutines to."""
+"""An asyncio loop in a thread of its own, which blocking code hands coroutines to.
+
+All blocking clients of a process share one: gRPC keeps each loop that it was used in, also a closed one,
+until the process has no channel any more.
+"""
 
 import asyncio
 import os
 import threading
 from collections.abc import Coroutine
 from concurrent.futures import CancelledError, Future
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from console.client.errors import Cancelled
 
@@ -76,7 +80,38 @@ class LoopThread:
     def _serve(self) -> None:
         # The runner cancels the remaining tasks and waits for them.
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._wait_for_stop())
+            runner.run(self._stopping.wait())
 
-    async def _wait_for_stop(self) -> None:
-        await self._stopping.wait()
+
+class SharedLoop:
+    """A loop thread that is started for its first user and stopped after the last."""
+
+    def __init__(self) -> None:
+        # Reentrant: the garbage collector may release another client's within `acquire`.
+        self._lock = threading.RLock()
+        self._users = 0
+        self._loop: LoopThread | None = None
+
+    def acquire(self) -> LoopThread:
+        """Returns the loop; `release` has to follow."""
+        with self._lock:
+            # Counted first, so that no release meanwhile is the last.
+            self._users += 1
+            self._loop = self._loop or LoopThread()
+            return self._loop
+
+    def release(self, loop: LoopThread) -> None:
+        """Stops the loop after its last user; no-op for the loop of a parent process."""
+        with self._lock:
+            if loop is not self._loop:
+                return
+            self._users -= 1
+            if self._users:
+                return
+            self._loop = None
+        loop.stop()
+
+
+shared_loop: Final = SharedLoop()
+# The parent's thread does not exist in a child, and its lock may be held for ever.
+os.register_at_fork(after_in_child=shared_loop.__init__)  # type: ignore[misc]  # on purpose: begins anew

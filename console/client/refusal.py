@@ -26,22 +26,17 @@ class Refusal:
 def refusal_in(metadata: Iterable[Any] | None) -> Refusal:
     """Returns the details in the trailing metadata of a failed call; unreadable ones count as absent."""
     data = next((value for key, value in metadata or () if key == _KEY), b"")
-    status = Status()
+    status, info, request, retry = Status(), ErrorInfo(), BadRequest(), RetryInfo()
+    retry_after_s: float | None = None
     try:
         status.MergeFromString(data)
-        return _refusal(status)
+        for detail in status.details:
+            if detail.Unpack(retry):
+                retry_after_s = retry.retry_delay.ToNanoseconds() / _NS_PER_S
+            elif not detail.Unpack(info):
+                detail.Unpack(request)
     except DecodeError:
         return Refusal()
-
-
-def _refusal(status: Status) -> Refusal:
-    info, request, retry = ErrorInfo(), BadRequest(), RetryInfo()
-    retry_after_s: float | None = None
-    for detail in status.details:
-        if detail.Unpack(retry):
-            retry_after_s = retry.retry_delay.ToNanoseconds() / _NS_PER_S
-        elif not detail.Unpack(info):
-            detail.Unpack(request)
     return Refusal(
         reason=info.reason if info.domain == DOMAIN else "",
         fields=tuple(violation.field for violation in request.field_violations),

@@ -1,15 +1,15 @@
 """The gRPC channel of a client: methods in, results or `GatewayError`s out. Belongs to one asyncio loop."""
 
 import asyncio
-from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
 import grpc
+from google.protobuf.message import DecodeError
 
 from console.client.credentials import Credentials
-from console.client.error_table import error_from, stream_error_from
-from console.client.errors import Cancelled, DeadlineExceeded, GatewayError
-from console.client.mapping.methods import METHODS, STREAMS, Method
+from console.client.error_table import error_from
+from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed, Unreachable
+from console.client.mapping.methods import Method
 from console.client.options import ClientOptions
 
 RequestT = TypeVar("RequestT")
@@ -41,8 +41,6 @@ class GrpcTransport:
             if encryption
             else grpc.aio.insecure_channel(target, options=arguments)
         )
-        self._calls = _by_name(self._channel.unary_unary, METHODS)
-        self._streams = _by_name(self._channel.unary_stream, STREAMS)
         self._closed = asyncio.Event()
 
     async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
@@ -53,17 +51,17 @@ class GrpcTransport:
         """
         self.check_open()
         try:
-            result: ResultT = await self._calls[method.name](
-                request, timeout=timeout_s, metadata=self._metadata
-            )
+            attempt: Any = self._channel.unary_unary(method.path, request_serializer=method.encode)
+            answer = await attempt(request, timeout=timeout_s, metadata=self._metadata)
         except grpc.RpcError as failure:
             raise error_from(failure, self._target, timeout_s) from None
         except asyncio.CancelledError:
             # gRPC raises it, too, when another task closed the channel under this call.
-            if not self._closed.is_set() or _being_cancelled():
+            task = asyncio.current_task()
+            if not self._closed.is_set() or (task and task.cancelling()):
                 raise
             raise Cancelled("this client was closed") from None
-        return result
+        return self.decode(method, answer)
 
     def open(self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool) -> "Responses":
         """Starts a server-streaming call.
@@ -77,8 +75,22 @@ class GrpcTransport:
             Cancelled: The client is closed.
         """
         self.check_open()
-        call = self._streams[method.name](request, metadata=self._metadata)
-        return Responses(call, self, newest_only=newest_only)
+        stream: Any = self._channel.unary_stream(method.path, request_serializer=method.encode)
+        call = stream(request, metadata=self._metadata)
+        return Responses(call, method, self, newest_only=newest_only)
+
+    def decode(self, method: Method[Any, ResultT], answer: bytes) -> ResultT:
+        """Returns the result of an answer.
+
+        Raises:
+            GatewayFailed: It is unreadable. As a deserializer of gRPC, `Method.decode` would lose its error.
+        """
+        try:
+            return method.decode(answer)
+        except DecodeError as error:
+            raise GatewayFailed(
+                f"the robot gateway at {self._target} sent an unreadable answer to {method.name}"
+            ) from error
 
     async def sleep(self, seconds: float) -> None:
         """Sleeps.
@@ -101,7 +113,10 @@ class GrpcTransport:
     def end_of_stream(self, failure: grpc.RpcError | None) -> GatewayError:
         """Returns the error for a stream that the other side ended; without failure, for an orderly end."""
         error = error_from(failure, self._target, 0.0) if failure else None
-        return stream_error_from(error, self._target)
+        if error is None or isinstance(error, Cancelled):
+            # A gateway that stops completes its streams or cancels them.
+            return Unreachable(f"no robot gateway reached at {self._target}: it ended the stream")
+        return error
 
     async def close(self) -> None:
         """Closes the channel. Pending calls and streams end with `Cancelled`."""
@@ -112,7 +127,10 @@ class GrpcTransport:
 class Responses:
     """The items of one server-streaming call, received by a task of its own."""
 
-    def __init__(self, call: Any, transport: GrpcTransport, *, newest_only: bool) -> None:
+    def __init__(
+        self, call: Any, method: Method[Any, Any], transport: GrpcTransport, *, newest_only: bool
+    ) -> None:
+        self._method = method
         self._transport = transport
         self._newest_only = newest_only
         self._queue: asyncio.Queue[Any] = asyncio.Queue(1 if newest_only else _MOST_WAITING)
@@ -141,13 +159,17 @@ class Responses:
     async def _receive(self, call: Any) -> None:
         error: GatewayError
         try:
-            async for item in call:
+            async for answer in call:
+                item = self._transport.decode(self._method, answer)
                 if self._newest_only and self._queue.full():
                     self._queue.get_nowait()
                 await self._queue.put(item)
             error = self._transport.end_of_stream(None)
         except grpc.RpcError as failure:
             error = self._transport.end_of_stream(failure)
+        except GatewayFailed as failure:
+            call.cancel()
+            error = failure
         except asyncio.CancelledError:
             call.cancel()
             # gRPC raises it, too, when the channel was closed under the call.
@@ -156,17 +178,3 @@ class Responses:
             error = Cancelled("this client was closed")
         # Behind the items that wait to be read.
         await self._queue.put(error)
-
-
-def _by_name(multicallable: Any, methods: tuple[Method[Any, Any], ...]) -> Mapping[str, Any]:
-    return {
-        method.name: multicallable(
-            method.path, request_serializer=method.encode, response_deserializer=method.decode
-        )
-        for method in methods
-    }
-
-
-def _being_cancelled() -> bool:
-    task = asyncio.current_task()
-    return task is not None and task.cancelling() > 0

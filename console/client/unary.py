@@ -7,7 +7,7 @@ from typing import Protocol, TypeVar
 
 from console.client.clock import Clock, Offset
 from console.client.errors import Unreachable
-from console.client.mapping.methods import GET_SYSTEM_STATUS, PING, SET_PREVIEW_MODE, Method, PreviewRequest
+from console.client.mapping.methods import GET_SYSTEM_STATUS, PING, SET_PREVIEW_MODE, DesiredPreview, Method
 from console.client.options import ClientOptions
 from console.client.results import PreviewChange, PreviewProfile, PreviewState, PreviewStatus
 
@@ -85,7 +85,7 @@ class UnaryCalls:
         assert offset is not None, "it has a reading now"  # noqa: S101  # just noted
         return offset
 
-    async def set_preview(self, request: PreviewRequest, settle_within_s: float) -> PreviewChange:
+    async def set_preview(self, request: DesiredPreview, settle_within_s: float) -> PreviewChange:
         """Sends a preview request, then polls the status until it is fulfilled, failed or time is up."""
         change = await self.call(SET_PREVIEW_MODE, request, self._options.preview_within_s)
         until = self._clock() + settle_within_s
@@ -96,7 +96,7 @@ class UnaryCalls:
         return change
 
 
-def _settled(preview: PreviewStatus, request: PreviewRequest) -> bool:
+def _settled(preview: PreviewStatus, request: DesiredPreview) -> bool:
     if not request.enabled:
         return preview.state is PreviewState.DISABLED
     if preview.state is PreviewState.RUNNING:

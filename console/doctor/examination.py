@@ -5,17 +5,7 @@ from collections.abc import Callable, Iterator
 
 from common.findings import Finding, Verdict, good, wrong
 from common.version import project_version
-from console.client import (
-    Credentials,
-    GatewayClient,
-    GatewayError,
-    GatewayInfo,
-    NotAllowed,
-    NotTrusted,
-    PreviewState,
-    SystemStatus,
-    Unsupported,
-)
+from console.client import Credentials, GatewayClient, PreviewState, SystemStatus, errors
 from console.doctor import network, robot
 
 
@@ -56,13 +46,13 @@ class Examination:
         with GatewayClient(self._target, credentials=self._credentials) as client:
             try:
                 status = client.status()
-            except (NotAllowed, NotTrusted) as error:
+            except (errors.NotAllowed, errors.NotTrusted) as error:
                 self.reached = True
                 yield wrong(
                     "access", error.what, "The gateway serves authenticated clients only", error.remedy
                 )
                 return
-            except GatewayError as error:
+            except errors.GatewayError as error:
                 yield wrong(
                     "grpc", error.what, "Something listens there, but it is not a gateway", error.remedy
                 )
@@ -76,17 +66,13 @@ class Examination:
         begin_s, asked_at_s = time.monotonic(), self._wall_clock()
         try:
             info = client.info()
-        except Unsupported:
+        except errors.Unsupported:
             yield robot.old_gateway_finding()
             return
         half_s = (time.monotonic() - begin_s) / 2
         yield robot.version_finding(info.gateway_version, project_version())
-        yield robot.clock_finding(_robot_unix_s(info), asked_at_s + half_s, half_s)
+        yield robot.clock_finding(info.wall_clock_unix_ms / 1000, asked_at_s + half_s, half_s)
         yield robot.calls_finding(info)
-
-
-def _robot_unix_s(info: GatewayInfo) -> float:
-    return info.wall_clock_unix_ms / 1000
 
 
 def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:

@@ -1,10 +1,10 @@
 """The network path to the robot, below gRPC: its name, its TCP port, the UDP port of its stream."""
 
+import queue
 import socket
+import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Final
+from typing import Any, Final
 
 from common.findings import Finding, good, wrong
 from console.doctor.srt_probe import answers_as_srt
@@ -20,20 +20,27 @@ def split(target: str) -> tuple[str, int]:
 
 def name_finding(host: str) -> Finding:
     """Checks whether the robot's name resolves."""
-    # The resolver takes no timeout: it is left behind in a thread of its own.
-    pool = ThreadPoolExecutor(max_workers=1)
+    outcome: queue.SimpleQueue[list[Any] | OSError | UnicodeError] = queue.SimpleQueue()
+
+    def resolve() -> None:
+        try:
+            outcome.put(socket.getaddrinfo(host, None, type=socket.SOCK_STREAM))
+        except (OSError, UnicodeError) as error:
+            outcome.put(error)
+
+    # The resolver takes no timeout. A daemon: the program ends without it.
+    threading.Thread(target=resolve, name="resolver", daemon=True).start()
     try:
-        found = pool.submit(socket.getaddrinfo, host, None, type=socket.SOCK_STREAM).result(_WITHIN_S)
-    except (OSError, UnicodeError, FutureTimeoutError) as error:
-        reason = f"no answer within {_WITHIN_S:g} s" if isinstance(error, FutureTimeoutError) else str(error)
+        found = outcome.get(timeout=_WITHIN_S)
+    except queue.Empty:
+        found = TimeoutError(f"no answer within {_WITHIN_S:g} s")
+    if isinstance(found, Exception):
         return wrong(
             "name",
-            f"'{host}' does not resolve: {reason}",
+            f"'{host}' does not resolve: {found}",
             "Without an address the robot can't be reached",
             f"Use the robot's address instead (--target ADDRESS), or look the name up: getent hosts {host}",
         )
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
     addresses = sorted({str(entry[4][0]) for entry in found})
     return good("name", f"{host} is {', '.join(addresses)}")
 

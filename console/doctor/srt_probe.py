@@ -26,12 +26,18 @@ _WAIT_S: Final = 0.3
 
 
 def answers_as_srt(host: str, port: int) -> bool:
-    """Returns whether an SRT listener answers there within about a second."""
-    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-    with socket.socket(family, kind, protocol) as probe:
-        probe.connect(address)
-        # UDP loses packets: one try is not enough to call a port dead.
-        return any(_ask(probe) for _ in range(_TRIES))
+    """Returns whether an SRT listener answers there within about a second.
+
+    Not at an address that is none: host and port are the robot's words.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.connect(address)
+            # UDP loses packets: one try is not enough to call a port dead.
+            return any(_ask(probe) for _ in range(_TRIES))
+    except (OSError, UnicodeError, OverflowError):
+        return False
 
 
 def induction() -> bytes:

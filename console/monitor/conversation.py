@@ -9,6 +9,7 @@ from typing import Final, Protocol
 from common.backoff import Backoff
 from console.client import (
     CaughtUp,
+    DesiredPreview,
     Event,
     EventGap,
     EventPosition,
@@ -24,7 +25,7 @@ from console.client import (
 from console.monitor.event_log import EventLine, line_of
 from console.monitor.latest_value import LatestValue
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState
+from console.monitor.monitor_state import MonitorState
 from console.monitor.snapshot_events import SnapshotEvents
 
 POLL_S: Final = 0.1

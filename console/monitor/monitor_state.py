@@ -2,21 +2,13 @@
 
 from dataclasses import dataclass, field
 
-from console.client import GatewayError, OverlaySnapshot, PreviewChange, PreviewProfile
+from console.client import DesiredPreview, GatewayError, OverlaySnapshot, PreviewChange
 from console.monitor.event_log import EventLog
 from console.monitor.link import Link, LinkState
 
 _MS_PER_S = 1000
 # A connection that is up may still be slow; an older snapshot is shown as outdated.
 _OUTDATED_AFTER_MS = 2000
-
-
-@dataclass(frozen=True, slots=True)
-class DesiredPreview:
-    """Desired state of the preview. `UNKNOWN` leaves the profile to the robot."""
-
-    enabled: bool
-    profile: PreviewProfile = PreviewProfile.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,36 +2,21 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 from console.client import GatewayError, PreviewProfile, PreviewState, PreviewStatus
 from console.monitor.link import LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
+from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.presentation.formatting import joined
+from console.presentation.preview_switch import SUCCESS_SHOWN_S, Note, PreviewSwitch, is_on
 from console.presentation.severity_style import PREVIEW_STYLES, SeverityStyle
 
-PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
-"""In the order of the keys 1 to 3."""
-_SUCCESS_SHOWN_S = 5.0
-_ON = (PreviewState.RUNNING, PreviewState.STARTING, PreviewState.FAULTED)
-
 
 @dataclass(frozen=True, slots=True)
-class Note:
-    """A sentence beside the controls."""
-
-    text: str
-    style: SeverityStyle
-
-
-@dataclass(frozen=True, slots=True)
-class Controls:
+class Controls(PreviewSwitch):
     """The controls at one moment.
 
     Args:
         enabled: whether they can be used.
-        on: whether the preview runs, starts or is faulted: the switch then turns it off.
-        profile: the one in force, or the one that the switch would request.
         mark: the preview's state in a word.
         style: colour and shape of the mark.
         summary: size, rate and encoder.
@@ -39,20 +24,10 @@ class Controls:
     """
 
     enabled: bool
-    on: bool
-    profile: PreviewProfile
     mark: str
     style: SeverityStyle
     summary: str
     notes: tuple[Note, ...]
-
-    def toggled(self) -> DesiredPreview:
-        """Returns the request of the switch."""
-        return DesiredPreview(False) if self.on else DesiredPreview(True, self.profile)
-
-    def with_profile(self, profile: PreviewProfile) -> DesiredPreview | None:
-        """Returns the request of a profile's button; None while off: it only selects the next profile."""
-        return DesiredPreview(True, profile) if self.on else None
 
 
 def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float) -> Controls:
@@ -65,7 +40,7 @@ def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float)
     """
     preview = state.snapshot.status.preview if state.snapshot else None
     current = PreviewState.UNKNOWN if preview is None or state.outdated(now_s) else preview.state
-    on = preview is not None and preview.state in _ON
+    on = preview is not None and is_on(preview)
     pending = state.request is not None and state.request.pending
     return Controls(
         enabled=preview is not None and state.link.state is LinkState.CONNECTED and not pending,
@@ -105,7 +80,7 @@ def _request_notes(request: PreviewRequest | None, now_s: float) -> Iterator[Not
         yield Note(f"Request failed: {outcome}", SeverityStyle.BAD)
     elif not outcome.accepted:
         yield Note(f"The robot refused: {outcome.message}", SeverityStyle.BAD)
-    elif outcome.preview.state is not PreviewState.FAULTED and now_s - request.ended_s < _SUCCESS_SHOWN_S:
+    elif outcome.preview.state is not PreviewState.FAULTED and now_s - request.ended_s < SUCCESS_SHOWN_S:
         # The reason of a fault is the robot's own note.
         yield Note(outcome.message, SeverityStyle.QUIET)
 
@@ -120,7 +95,7 @@ def _robot_notes(preview: PreviewStatus) -> Iterator[Note]:
         yield Note("The preview service on the robot does not answer the gateway", SeverityStyle.WARNING)
     if preview.encoder and preview.encoder.fallback_reason:
         yield Note(
-            f"Wanted {preview.encoder.wanted}: {preview.encoder.fallback_reason}", SeverityStyle.WARNING
+            f"Preferred {preview.encoder.wanted}: {preview.encoder.fallback_reason}", SeverityStyle.WARNING
         )
     if preview.bitrate_reason:
         yield Note(f"Bit rate: {preview.bitrate_reason}", SeverityStyle.WARNING)

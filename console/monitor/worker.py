@@ -8,12 +8,12 @@ from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import replace
 from typing import Final, TypeAlias
 
-from console.client import Backoff, ClientOptions, Credentials, GatewayFailed, parse_target
+from console.client import Backoff, ClientOptions, Credentials, DesiredPreview, GatewayFailed, parse_target
 from console.monitor.conversation import Conversation, RetryBackoff, RobotSession
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
 from console.monitor.latest_value import LatestValue
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
+from console.monitor.monitor_state import MonitorState, PreviewRequest
 
 # One attempt is short here: the conversation retries by itself, and reports each failure.
 _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_after_s=0.3))

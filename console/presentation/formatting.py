@@ -1,10 +1,12 @@
 """Values with their units, ages and sizes as text. "-" stands for an unknown value."""
 
+from datetime import datetime, tzinfo
 from typing import Final
 
 UNKNOWN: Final = "-"
 
 _SECOND_MS: Final = 1000
+_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S"
 _MINUTE_S: Final = 60
 _HOUR_S: Final = 3600
 _GIB: Final = 1 << 30
@@ -33,6 +35,17 @@ def age(age_ms: int | None) -> str:
     if seconds < _HOUR_S:
         return f"{int(seconds // _MINUTE_S)} min {int(seconds % _MINUTE_S):02} s"
     return f"{int(seconds // _HOUR_S)} h {int(seconds % _HOUR_S // _MINUTE_S):02} min"
+
+
+def wall_clock(unix_ms: int, zone: tzinfo | None = None, form: str = _CLOCK_FORM) -> str:
+    """Returns a time since 1970 UTC in a time zone, or this computer's: 2026-11-21 23:59:59.
+
+    One that the calendar does not have (a robot may send any number) is unknown.
+    """
+    try:
+        return datetime.fromtimestamp(unix_ms / _SECOND_MS).astimezone(zone).strftime(form)
+    except (ValueError, OverflowError, OSError):
+        return UNKNOWN
 
 
 def gibibytes(count: int | None) -> str:

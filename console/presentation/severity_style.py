@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from enum import Enum
-from types import MappingProxyType
 from typing import Final
 
 from console.client.results import FaultSeverity, Freshness, HealthState, PreviewState
@@ -17,35 +16,27 @@ class SeverityStyle(Enum):
     BAD = "bad"
 
 
-FAULT_STYLES: Final[Mapping[FaultSeverity, SeverityStyle]] = MappingProxyType(
-    {
-        FaultSeverity.ERROR: SeverityStyle.BAD,
-        FaultSeverity.WARNING: SeverityStyle.WARNING,
-        FaultSeverity.INFO: SeverityStyle.QUIET,
-        FaultSeverity.UNKNOWN: SeverityStyle.WARNING,
-    }
-)
-FRESHNESS_STYLES: Final[Mapping[Freshness, SeverityStyle]] = MappingProxyType(
-    {
-        Freshness.FRESH: SeverityStyle.GOOD,
-        Freshness.STALE: SeverityStyle.WARNING,
-        Freshness.MISSING: SeverityStyle.QUIET,
-    }
-)
-HEALTH_STYLES: Final[Mapping[HealthState, SeverityStyle]] = MappingProxyType(
-    {
-        HealthState.OK: SeverityStyle.GOOD,
-        HealthState.DEGRADED: SeverityStyle.WARNING,
-        HealthState.UNKNOWN: SeverityStyle.QUIET,
-    }
-)
-PREVIEW_STYLES: Final[Mapping[PreviewState, SeverityStyle]] = MappingProxyType(
-    {
-        PreviewState.RUNNING: SeverityStyle.GOOD,
-        PreviewState.STARTING: SeverityStyle.WARNING,
-        PreviewState.STOPPING: SeverityStyle.WARNING,
-        PreviewState.FAULTED: SeverityStyle.BAD,
-        PreviewState.DISABLED: SeverityStyle.QUIET,
-        PreviewState.UNKNOWN: SeverityStyle.QUIET,
-    }
-)
+FAULT_STYLES: Final[Mapping[FaultSeverity, SeverityStyle]] = {
+    FaultSeverity.ERROR: SeverityStyle.BAD,
+    FaultSeverity.WARNING: SeverityStyle.WARNING,
+    FaultSeverity.INFO: SeverityStyle.QUIET,
+    FaultSeverity.UNKNOWN: SeverityStyle.WARNING,
+}
+FRESHNESS_STYLES: Final[Mapping[Freshness, SeverityStyle]] = {
+    Freshness.FRESH: SeverityStyle.GOOD,
+    Freshness.STALE: SeverityStyle.WARNING,
+    Freshness.MISSING: SeverityStyle.QUIET,
+}
+HEALTH_STYLES: Final[Mapping[HealthState, SeverityStyle]] = {
+    HealthState.OK: SeverityStyle.GOOD,
+    HealthState.DEGRADED: SeverityStyle.WARNING,
+    HealthState.UNKNOWN: SeverityStyle.QUIET,
+}
+PREVIEW_STYLES: Final[Mapping[PreviewState, SeverityStyle]] = {
+    PreviewState.RUNNING: SeverityStyle.GOOD,
+    PreviewState.STARTING: SeverityStyle.WARNING,
+    PreviewState.STOPPING: SeverityStyle.WARNING,
+    PreviewState.FAULTED: SeverityStyle.BAD,
+    PreviewState.DISABLED: SeverityStyle.QUIET,
+    PreviewState.UNKNOWN: SeverityStyle.QUIET,
+}

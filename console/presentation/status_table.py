@@ -9,24 +9,8 @@ from dataclasses import dataclass
 from enum import Flag, auto
 from typing import Any, Final
 
-from console.client.results import (
-    Battery,
-    Compute,
-    Detections,
-    EffectiveCommand,
-    Freshness,
-    Mission,
-    Network,
-    Odometry,
-    PreviewMeasurement,
-    PreviewState,
-    PreviewStatus,
-    Sample,
-    SourceState,
-    SystemStatus,
-    TeleopState,
-    Vision,
-)
+from console.client import results
+from console.client.results import Freshness, PreviewProfile, PreviewState, SourceState, TeleopState
 from console.presentation.formatting import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
 from console.presentation.severity_style import (
     FAULT_STYLES,
@@ -78,9 +62,9 @@ class View:
         outdated: Whether that is so long that fresh values count as stale.
     """
 
-    status: SystemStatus
+    status: results.SystemStatus
     density: Density = Density.FULL
-    detections: Detections | None = None
+    detections: results.Detections | None = None
     silent_ms: int = 0
     outdated: bool = False
 
@@ -99,7 +83,7 @@ class View:
         """Returns the label as the density writes it."""
         return label.capitalize() if self.compact else label
 
-    def measured(self, label: str, sample: Sample, text: str) -> Row:
+    def measured(self, label: str, sample: results.Sample, text: str) -> Row:
         """Returns the row of a measured part: marked by its freshness, empty while it is missing."""
         freshness = sample.freshness
         if freshness is Freshness.FRESH and self.outdated:
@@ -119,12 +103,12 @@ def table_rows(view: View) -> list[Row]:
     return [row for entry in TABLE if view.density in entry.density for row in entry.rows(view)]
 
 
-def status_rows(status: SystemStatus) -> list[Row]:
+def status_rows(status: results.SystemStatus) -> list[Row]:
     """Returns all rows with their full texts."""
     return table_rows(View(status))
 
 
-def preview_rows(preview: PreviewStatus) -> Iterator[Row]:
+def preview_rows(preview: results.PreviewStatus) -> Iterator[Row]:
     """Yields the preview's state, then its error, fallback, figures and address as far as there are any."""
     yield Row(
         "preview", preview.state.value.upper(), PREVIEW_STYLES[preview.state], _preview_summary(preview)
@@ -132,7 +116,7 @@ def preview_rows(preview: PreviewStatus) -> Iterator[Row]:
     if preview.last_error:
         yield Row("", "error", SeverityStyle.BAD, preview.last_error)
     if preview.encoder and preview.encoder.fallback_reason:
-        reason = f"wanted {preview.encoder.wanted}, {preview.encoder.fallback_reason}"
+        reason = f"preferred {preview.encoder.wanted}, {preview.encoder.fallback_reason}"
         yield Row("", "fallback", SeverityStyle.WARNING, reason)
     if preview.bitrate_reason:
         yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
@@ -164,10 +148,6 @@ def _faults(view: View) -> Iterator[Row]:
             yield Row("fault", "cleared", SeverityStyle.QUIET, fault.message, cleared_age)
 
 
-def _preview(view: View) -> Iterator[Row]:
-    return preview_rows(view.status.preview)
-
-
 def _objects(view: View) -> Iterator[Row]:
     configured = {source.name for source in view.status.sources}
     # An older gateway does not list its sources.
@@ -182,6 +162,7 @@ def _access(view: View) -> Iterator[Row]:
 
 
 def _sources(view: View) -> Iterator[Row]:
+    faults = {fault.message for fault in view.status.faults if fault.active}
     for source in view.status.sources:
         if view.compact:
             # The other rows show that a value is missing; this one, that it can never come.
@@ -189,14 +170,10 @@ def _sources(view: View) -> Iterator[Row]:
                 style = SeverityStyle.WARNING if source.required else SeverityStyle.QUIET
                 label = view.label(source.name.replace("_", " "))
                 yield Row(label, "no data", style, source.detail, view.age(source.age_ms))
-        elif source.state is not SourceState.RECEIVING and source.detail not in _fault_messages(view.status):
+        elif source.state is not SourceState.RECEIVING and source.detail not in faults:
             mark = source.state.value.replace("_", " ")
             text = source.detail or source.name
             yield Row("source", mark, SeverityStyle.QUIET, text, view.age(source.age_ms))
-
-
-def _fault_messages(status: SystemStatus) -> set[str]:
-    return {fault.message for fault in status.faults if fault.active}
 
 
 def _gateway(view: View) -> Iterator[Row]:
@@ -227,7 +204,7 @@ def _teleop(view: View) -> Iterator[Row]:
     yield Row(view.label("teleop"), teleop.state.value.upper(), style, text, command_age)
 
 
-def _motion(odometry: Odometry, compact: bool) -> str:
+def _motion(odometry: results.Odometry, compact: bool) -> str:
     return joined(
         quantity(odometry.linear_speed_mps, "m/s", 2),
         "" if compact else f"forward {signed(odometry.vx_mps)} m/s",
@@ -236,7 +213,7 @@ def _motion(odometry: Odometry, compact: bool) -> str:
     )
 
 
-def _vision(vision: Vision, compact: bool) -> str:
+def _vision(vision: results.Vision, compact: bool) -> str:
     inference = f"inference {quantity(vision.last_infer_ms, 'ms')}"
     errors, fatal = vision.infer_error_count or 0, vision.capture_fatal_error_count or 0
     if compact:
@@ -254,7 +231,7 @@ def _vision(vision: Vision, compact: bool) -> str:
     )
 
 
-def _battery(battery: Battery, compact: bool) -> str:
+def _battery(battery: results.Battery, compact: bool) -> str:
     if battery.present is False:
         return "not installed"
     return joined(
@@ -265,7 +242,7 @@ def _battery(battery: Battery, compact: bool) -> str:
     )
 
 
-def _command(command: EffectiveCommand, compact: bool) -> str:
+def _command(command: results.EffectiveCommand, compact: bool) -> str:
     source = command.active_source or "unknown"
     forward, turning = f"{signed(command.vx_mps)} m/s", f"{signed(command.wz_rad_s)} rad/s"
     if compact:
@@ -274,11 +251,7 @@ def _command(command: EffectiveCommand, compact: bool) -> str:
     return joined(f"from {source}", f"forward {forward}", left, f"turning {turning}")
 
 
-def _mode(mission: Mission, _compact: bool) -> str:
-    return mission.mode or ""
-
-
-def _compute(compute: Compute, compact: bool) -> str:
+def _compute(compute: results.Compute, compact: bool) -> str:
     temperature, disk = compute.cpu_temperature_c, compute.disk_used_percent
     used, total = gibibytes(compute.ram_used_bytes), gibibytes(compute.ram_total_bytes)
     return joined(
@@ -290,7 +263,7 @@ def _compute(compute: Compute, compact: bool) -> str:
     )
 
 
-def _network(network: Network, compact: bool) -> str:
+def _network(network: results.Network, compact: bool) -> str:
     signal, quality = network.wifi_signal_dbm, network.link_quality_percent
     return joined(
         network.interface_name or ("" if compact else UNKNOWN),
@@ -300,7 +273,7 @@ def _network(network: Network, compact: bool) -> str:
     )
 
 
-def _video(measured: PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
+def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     return joined(
         quantity(measured.bitrate_kbps, "kbit/s", 0) + ("" if compact else f" of {target_kbps}"),
@@ -313,10 +286,10 @@ def _video(measured: PreviewMeasurement, compact: bool, target_kbps: int = 0) ->
     )
 
 
-def _preview_summary(preview: PreviewStatus) -> str:
+def _preview_summary(preview: results.PreviewStatus) -> str:
     encoder, video = preview.encoder, preview.video
     return joined(
-        preview.profile.value if preview.profile.value != "unknown" else "",
+        "" if preview.profile is PreviewProfile.UNKNOWN else preview.profile.value,
         f"{video.width_px}x{video.height_px} at {video.fps:g} fps" if video else "",
         f"{encoder.name} ({'hardware' if encoder.hardware else 'software'})" if encoder else "",
         "" if preview.service_reachable else "preview service not reachable",
@@ -344,7 +317,7 @@ class Entry:
 
 def _measured(
     label: str,
-    sample: Callable[[SystemStatus], Any],
+    sample: Callable[[results.SystemStatus], Any],
     text: Callable[[Any, bool], str],
     density: Density = BOTH,
     *,
@@ -367,10 +340,10 @@ TABLE: Final = (
     _measured("motion", lambda status: status.odometry, _motion),
     _measured("vision", lambda status: status.vision, _vision),
     Entry(_objects),
-    Entry(_preview, Density.FULL),
+    Entry(lambda view: preview_rows(view.status.preview), Density.FULL),
     _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
     _measured("command", lambda status: status.effective_command, _command, optional=True),
-    _measured("mode", lambda status: status.mission, _mode, optional=True),
+    _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),
     _measured("computer", lambda status: status.platform.compute, _compute, optional=True),
     _measured(
         "computer battery", lambda status: status.platform.power.onboard_battery, _battery, optional=True

@@ -4,6 +4,3 @@ from console.client import Credentials
 from console.robots.choice import choose
 from console.robots.credentials import read_credentials
 from console.robots.robots_file import Robot, RobotsFile, read_robots_file, robots_file_path
-
-read_book = read_robots_file
-"""The name that scripts know it by (docs/client.md)."""

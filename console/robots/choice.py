@@ -1,7 +1,7 @@
 """Which robot a command is for: from its options, the environment and the file of known robots."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from console.client import DEFAULT_TARGET
@@ -11,25 +11,12 @@ TARGET_VARIABLE: Final = "ROBOTCTL_TARGET"
 ROBOT_VARIABLE: Final = "ROBOTCTL_ROBOT"
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """The chosen robot.
-
-    Args:
-        robot: How to reach it.
-        name: Its name in the file; None when only an address was given.
-    """
-
-    robot: Robot
-    name: str | None = None
-
-
 def choose(
     target: str | None,
     name: str | None,
     environment: Mapping[str, str],
     read: Callable[[], RobotsFile] = read_robots_file,
-) -> Choice:
+) -> tuple[Robot, str | None]:
     """Returns the robot of --target, --robot, the environment (address, then name), the file, or localhost.
 
     The first of these decides. An address beside a name replaces the address alone: the credentials stay
@@ -47,10 +34,10 @@ def choose(
     """
     if name:
         robot = read().find(name)
-        return Choice(replace(robot, target=target) if target else robot, name)
+        return (replace(robot, target=target) if target else robot), name
     if address := target or environment.get(TARGET_VARIABLE):
-        return Choice(Robot(target=address))
+        return Robot(target=address), None
     known = read()
     if chosen := environment.get(ROBOT_VARIABLE) or known.default:
-        return Choice(known.find(chosen), chosen)
-    return Choice(Robot(target=DEFAULT_TARGET))
+        return known.find(chosen), chosen
+    return Robot(target=DEFAULT_TARGET), None

@@ -14,6 +14,7 @@ from console.robots.robots_file import Robot
 
 _TOKEN_CHARACTERS: Final = frozenset(string.ascii_letters + string.digits + "-._~+/=")
 """b64token of RFC 6750 2.1."""
+_LOGIN: Final = "Store the robot's login again: robotctl login NAME HOST:PORT FILE"
 _LARGEST_BYTES: Final = 1 << 20
 _FOR_OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
@@ -88,7 +89,7 @@ def _read_token(path: Path) -> str:
     text = _read_private(path, "token file").decode("ascii", errors="replace").strip()
     if not text or not _TOKEN_CHARACTERS.issuperset(text):
         # Never the text itself: it may be a token with a typing error in it.
-        raise _wrong(f"the token file {path} does not hold one token on one line", "Type: robotctl login")
+        raise _wrong(f"the token file {path} does not hold one token on one line", _LOGIN)
     return text
 
 
@@ -99,7 +100,7 @@ def _read(path: Path, what: str) -> tuple[bytes, os.stat_result]:
             status = os.fstat(file.fileno())
             content = file.read(_LARGEST_BYTES + 1)
     except OSError as error:
-        raise _wrong(f"the {what} {path} can't be read: {error.strerror}", "Type: robotctl login") from error
+        raise _wrong(f"the {what} {path} can't be read: {error.strerror}", _LOGIN) from error
     if len(content) > _LARGEST_BYTES:
         raise _wrong(f"the {what} {path} is larger than 1 MiB", "Name the right file")
     return content, status

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from common.private_files import write_private
 from console.client import Credentials
+from console.client.printable import printable
 from console.robots.credentials import credentials_directory
 from console.robots.robots_file import Robot, RobotsFile, robots_file_path
 from console.robots.robots_file_edit import put_robot
@@ -74,7 +74,7 @@ def parse_login(text: str) -> Login:
         client_key=pems.get("key"),
         token=words.get("token") or None,
     )
-    return Login(words.get("name", ""), words.get("role", ""), shown)
+    return Login(printable(words.get("name", "")), printable(words.get("role", "")), shown)
 
 
 def keep_login(name: str, target: str, credentials: Credentials, path: Path | None = None) -> RobotsFile:
@@ -90,23 +90,20 @@ def keep_login(name: str, target: str, credentials: Credentials, path: Path | No
         UserError: The name or the address is not allowed, or a file can't be written.
     """
     path = path or robots_file_path()
-    # First without any file: a wrong name or address is reported before a secret is written.
-    put_robot(name, Robot(target=target), path=path)
     directory = credentials_directory(path, name)
-    files = {
-        "ca_certificate_file": (directory / "ca.pem", credentials.ca_certificate),
-        "client_certificate_file": (directory / "client.pem", credentials.client_certificate),
-        "client_key_file": (directory / "client-key.pem", credentials.client_key),
-        "token_file": (directory / "token", credentials.token.encode() if credentials.token else None),
+    contents = {
+        "ca_certificate_file": ("ca.pem", credentials.ca_certificate),
+        "client_certificate_file": ("client.pem", credentials.client_certificate),
+        "client_key_file": ("client-key.pem", credentials.client_key),
+        "token_file": ("token", credentials.token.encode() if credentials.token else None),
     }
-    kept: dict[str, Path] = {}
-    for key, (file, content) in files.items():
-        if content is None:
-            file.unlink(missing_ok=True)
-        else:
-            write_private(file, content)
-            kept[key] = file
-    return put_robot(name, Robot(target=target, **kept), path=path)
+    stored = {key: (directory / file, content) for key, (file, content) in contents.items() if content}
+    robot = Robot(target=target, **{key: file for key, (file, _) in stored.items()})
+    known = put_robot(name, robot, path=path, contents=dict(stored.values()))
+    for file, content in contents.values():
+        if not content:
+            (directory / file).unlink(missing_ok=True)
+    return known
 
 
 def _not_a_login(why: str) -> UserError:

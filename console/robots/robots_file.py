@@ -16,7 +16,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 from common.errors import ExitCode, UserError
@@ -61,7 +60,7 @@ class RobotsFile:
     """
 
     path: Path
-    robots: Mapping[str, Robot] = field(default_factory=lambda: MappingProxyType({}))
+    robots: Mapping[str, Robot] = field(default_factory=dict)
     default: str | None = None
 
     def find(self, name: str) -> Robot:
@@ -118,7 +117,7 @@ def parse_robots_file(path: Path, text: str) -> RobotsFile:
     if default is not None and not (isinstance(default, str) and default in robots):
         known = ", ".join(robots) or "none"
         raise _wrong(path, f"default = {default!r} is not one of its robots", f"Known: {known}")
-    return RobotsFile(path, MappingProxyType(robots), default)
+    return RobotsFile(path, robots, default)
 
 
 def check_name(name: str) -> str:

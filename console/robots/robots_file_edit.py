@@ -1,10 +1,10 @@
 """Edits of the file of known robots, with its comments and layout kept."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from common.errors import UserError
 from common.private_files import directory_lock, write_private
@@ -21,34 +21,42 @@ from console.robots.robots_file import (
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
-    from tomlkit.items import Table
+
+NO_FILES: Final[Mapping[Path, bytes]] = {}
 
 
-def put_robot(name: str, robot: Robot, *, path: Path | None = None) -> RobotsFile:
-    """Adds a robot at the end of the file, or replaces its entry. The first robot becomes the default.
+def put_robot(
+    name: str, robot: Robot, *, path: Path | None = None, contents: Mapping[Path, bytes] = NO_FILES
+) -> RobotsFile:
+    """Adds a robot at the end of the file, or changes its entry. The first robot becomes the default.
 
     Args:
         name: Its name.
         robot: Its entry; paths in it are absolute.
         path: Another file than this user's own.
+        contents: Of files that the entry names. They are written before it, and only if it can be written:
+            an interruption leaves no entry without its files.
 
     Raises:
         UserError: The name or the address is not allowed, or the file is wrong or can't be written.
     """
+    import tomlkit  # noqa: PLC0415 - see _edit
+
     check_name(name)
     robot = replace(robot, target=parse_target(robot.target))
 
     def edit(before: RobotsFile, document: "TOMLDocument") -> RobotsFile:
         robots: Any = document.setdefault("robots", {})
-        if name in robots:
-            _hand_over_comments(robots, name)
-        robots[name] = _entry(robot, before.path.parent, robots.get(name))
+        if name not in robots:
+            robots[name] = tomlkit.table()
+        _hand_over_comments(robots, name)
+        _set_keys(robots[name], robot, before.path.parent)
         default = before.default
         if not before.robots:
             default = document["default"] = name
-        return replace(before, robots=MappingProxyType({**before.robots, name: robot}), default=default)
+        return replace(before, robots={**before.robots, name: robot}, default=default)
 
-    return _edit(path, edit)
+    return _edit(path, edit, contents)
 
 
 def drop_robot(name: str, *, path: Path | None = None) -> RobotsFile:
@@ -68,7 +76,7 @@ def drop_robot(name: str, *, path: Path | None = None) -> RobotsFile:
             default = None
             del document["default"]
         left = {other: robot for other, robot in before.robots.items() if other != name}
-        return replace(before, robots=MappingProxyType(left), default=default)
+        return replace(before, robots=left, default=default)
 
     return _edit(path, edit)
 
@@ -88,7 +96,11 @@ def set_default(name: str, *, path: Path | None = None) -> RobotsFile:
     return _edit(path, edit)
 
 
-def _edit(path: Path | None, edit: Callable[[RobotsFile, "TOMLDocument"], RobotsFile]) -> RobotsFile:
+def _edit(
+    path: Path | None,
+    edit: Callable[[RobotsFile, "TOMLDocument"], RobotsFile],
+    contents: Mapping[Path, bytes] = NO_FILES,
+) -> RobotsFile:
     import tomlkit  # noqa: PLC0415 - takes 50 ms, which commands that edit nothing need not spend
 
     path = path or robots_file_path()
@@ -104,6 +116,8 @@ def _edit(path: Path | None, edit: Callable[[RobotsFile, "TOMLDocument"], Robots
         # TOML has more notations than can be edited in place: the result is what was meant, or nothing.
         if not _means(path, edited, wanted):
             raise _not_editable(path)
+        for file, content in contents.items():
+            write_private(file, content)
         if edited != text:
             write_private(path, edited.encode())
     return wanted
@@ -123,20 +137,18 @@ def _not_editable(path: Path) -> UserError:
     )
 
 
-def _entry(robot: Robot, directory: Path, old: Any) -> "Table":
-    import tomlkit  # noqa: PLC0415 - see _edit
-
-    entry = tomlkit.table()
-    entry.add("target", robot.target)
+def _set_keys(entry: Any, robot: Robot, directory: Path) -> None:
+    """Gives an entry the keys of a robot; what stays keeps its place and the comment behind it."""
+    body = entry.value.body
+    blank = [body.pop() for _ in takewhile(lambda each: each[0] is None, reversed(tuple(body)))]
+    entry["target"] = robot.target
     for key in FILE_KEYS:
         if file := getattr(robot, key):
-            entry.add(key, str(file.relative_to(directory) if file.is_relative_to(directory) else file))
-    if old is not None:
-        # Comments and blank lines.
-        for key, item in old.value.body:
-            if key is None:
-                entry.add(item)
-    return entry
+            entry[key] = str(file.relative_to(directory) if file.is_relative_to(directory) else file)
+        elif key in entry:
+            del entry[key]
+    # Comments and blank lines at its end stay there.
+    body.extend(reversed(blank))
 
 
 def _hand_over_comments(robots: Any, name: str) -> None:

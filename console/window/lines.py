@@ -8,8 +8,8 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
 
-from console.monitor.preview_controls import Note
 from console.monitor.status_rows import FaultLine
+from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from console.window.labels import RIGHT, TOP, WrappedLabel, plain_label, set_bold, set_text, width_of

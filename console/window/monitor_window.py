@@ -11,8 +11,9 @@ from console.client import PreviewProfile
 from console.monitor.history import NOTHING, History, values_of
 from console.monitor.link import link_text
 from console.monitor.monitor_state import MonitorState
-from console.monitor.preview_controls import PROFILES, Controls, controls
+from console.monitor.preview_controls import Controls, controls
 from console.monitor.worker import Worker
+from console.presentation.preview_switch import PROFILES
 from console.window.handover import ThreadHandover
 from console.window.header import ConnectionBanner, Header
 from console.window.plot import Plots

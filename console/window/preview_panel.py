@@ -4,7 +4,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
-from console.monitor.preview_controls import PROFILES, Controls, Note
+from console.monitor.preview_controls import Controls
+from console.presentation.preview_switch import PROFILES, Note
 from console.presentation.severity_style import SeverityStyle
 from console.window.header import MarkedWord
 from console.window.labels import plain_label

@@ -122,10 +122,10 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     def Ping(self, _request: Any, context: Any) -> Never:  # noqa: N802
         _not_offered(context)
 
-    def WatchSystemStatus(self, _request: Any, context: Any) -> Never:  # noqa: N802
+    def WatchSystemStatus(self, _request: Any, context: Any) -> Any:  # noqa: N802
         _not_offered(context)
 
-    def SubscribeEvents(self, _request: Any, context: Any) -> Never:  # noqa: N802
+    def SubscribeEvents(self, _request: Any, context: Any) -> Any:  # noqa: N802
         _not_offered(context)
 
     def preview_service_dies(self) -> None:
@@ -202,6 +202,27 @@ def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:
 @contextmanager
 def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
     """Serves the double on 127.0.0.1 and yields the port; pings are allowed as by the real gateway."""
+    with _server(port) as (server, bound):
+        robot_gateway_pb2_grpc.add_RobotGatewayServicer_to_server(double, server)
+        server.start()
+        try:
+            yield bound
+        finally:
+            double.hold.set()
+            double.preview_answers.set()
+
+
+@contextmanager
+def serving_handlers(*handlers: grpc.GenericRpcHandler) -> Iterator[int]:
+    """Serves other handlers in the same way."""
+    with _server(0) as (server, bound):
+        server.add_generic_rpc_handlers(handlers)
+        server.start()
+        yield bound
+
+
+@contextmanager
+def _server(port: int) -> Iterator[tuple[grpc.Server, int]]:
     workers = futures.ThreadPoolExecutor(max_workers=8)
     server = grpc.server(
         workers,
@@ -211,13 +232,9 @@ def serving(double: GatewayDouble, port: int = 0) -> Iterator[int]:
             ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
         ],
     )
-    robot_gateway_pb2_grpc.add_RobotGatewayServicer_to_server(double, server)
     bound = server.add_insecure_port(f"127.0.0.1:{port}")
-    server.start()
     try:
-        yield bound
+        yield server, bound
     finally:
-        double.hold.set()
-        double.preview_answers.set()
         server.stop(0).wait(10)
         workers.shutdown()

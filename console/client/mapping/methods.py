@@ -1,35 +1,17 @@
-"""The contract's methods: request values to message bytes, message bytes to results.
-
-gRPC moves bytes; these tables are its serializers, so that the code above sees results only.
-"""
+"""The contract's methods: request values to message bytes, message bytes to results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Generic, TypeVar
 
-from google.protobuf.message import Message
+from google.protobuf.message_factory import GetMessageClass
 
+from console.client import results
 from console.client.mapping import enums
 from console.client.mapping.events import event_item
-from console.client.mapping.info import gateway_info
-from console.client.mapping.overlay import detections, overlay_snapshot
-from console.client.mapping.preview import preview
-from console.client.mapping.status import system_status
-from console.client.results import (
-    CaughtUp,
-    Event,
-    EventGap,
-    EventPosition,
-    FaultSeverity,
-    GatewayInfo,
-    OverlaySnapshot,
-    PreviewChange,
-    PreviewProfile,
-    RobotTime,
-    SystemStatus,
-    WatchedStatus,
-)
-from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
+from console.client.mapping.reader import read
+from console.client.results import EventPosition, FaultSeverity, PreviewProfile
 from omniseer.gateway.v1 import robot_gateway_pb2 as wire
 
 _SERVICE: Final = wire.DESCRIPTOR.services_by_name["RobotGateway"]
@@ -40,8 +22,8 @@ ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True, slots=True)
-class PreviewRequest:
-    """The desired state of the preview. A profile that is UNKNOWN keeps the current one."""
+class DesiredPreview:
+    """Desired state of the preview. UNKNOWN keeps the current profile."""
 
     enabled: bool
     profile: PreviewProfile = PreviewProfile.UNKNOWN
@@ -79,95 +61,69 @@ class Method(Generic[RequestT, ResultT]):
 
     Args:
         name: As in the schema.
-        request: Makes the request message.
-        answer: Class of the answer message.
         result: Reads the answer message.
+        fields: Returns the fields of the request message; a request of None has none.
         idempotent: Whether two calls have the effect of one, so that a call may be retried.
     """
 
     name: str
-    request: Callable[[RequestT], Message]
-    answer: type[Message]
     result: Callable[[Any], ResultT]
+    fields: Callable[[RequestT], dict[str, Any]] = lambda _: {}
     idempotent: bool = True
 
     @property
     def path(self) -> str:
         """The method's path in HTTP/2, as gRPC forms it: /package.Service/Method."""
-        return f"/{_SERVICE.full_name}/{_SERVICE.methods_by_name[self.name].name}"
+        return f"/{_SERVICE.full_name}/{self.name}"
 
     def encode(self, request: RequestT) -> bytes:
         """Returns the bytes of the request."""
-        return self.request(request).SerializeToString()
+        message = GetMessageClass(_SERVICE.methods_by_name[self.name].input_type)
+        return message(**self.fields(request)).SerializeToString()
 
     def decode(self, data: bytes) -> ResultT:
-        """Returns the result of the answer's bytes."""
-        return self.result(self.answer.FromString(data))
+        """Returns the result of the answer's bytes.
+
+        Raises:
+            DecodeError: They are not an answer of this method.
+        """
+        return self.result(GetMessageClass(_SERVICE.methods_by_name[self.name].output_type).FromString(data))
 
 
-def _preview_request(request: PreviewRequest) -> Message:
-    profile = enums.preview_profile.number(request.profile)
-    return wire.SetPreviewModeRequest(enabled=request.enabled, profile=profile)
+def _preview_fields(request: DesiredPreview) -> dict[str, Any]:
+    return {"enabled": request.enabled, "profile": enums.number(request.profile)}
 
 
-def _preview_change(answer: wire.SetPreviewModeResponse) -> PreviewChange:
-    return PreviewChange(accepted=answer.accepted, message=answer.message, preview=preview(answer.preview))
+def _watch_fields(request: WatchRequest) -> dict[str, Any]:
+    interval_ms = round(request.min_interval_s * _MS_PER_S)
+    return {"min_interval_ms": interval_ms, "include_detections": request.include_detections}
 
 
-def _watch_request(request: WatchRequest) -> Message:
-    return wire.WatchSystemStatusRequest(
-        min_interval_ms=round(request.min_interval_s * _MS_PER_S),
-        include_detections=request.include_detections,
-    )
+def _events_fields(request: EventsRequest) -> dict[str, Any]:
+    after = request.after
+    position = {"run_id": after.run_id, "sequence": after.sequence} if after else None
+    return {"after": position, "min_severity": enums.number(request.least)}
 
 
-def _watched_status(answer: wire.WatchSystemStatusResponse) -> WatchedStatus:
-    return WatchedStatus(
-        status=system_status(answer.status),
-        monotonic_ns=answer.monotonic_ns,
-        detections=detections(answer.detections) if answer.HasField("detections") else None,
-    )
-
-
-def _events_request(request: EventsRequest) -> Message:
-    message = wire.SubscribeEventsRequest(min_severity=enums.fault_severity.number(request.least))
-    if request.after is not None:
-        message.after.run_id, message.after.sequence = request.after.run_id, request.after.sequence
-    return message
-
-
-def _robot_time(answer: wire.PingResponse) -> RobotTime:
-    return RobotTime(
-        monotonic_ns=answer.monotonic_ns,
-        wall_clock_unix_ns=answer.wall_clock_unix_ns,
-        boot_id=answer.boot_id or None,
-    )
-
-
-GET_SYSTEM_STATUS: Final[Method[None, SystemStatus]] = Method(
-    "GetSystemStatus", lambda _: wire.GetSystemStatusRequest(), system_status_pb2.SystemStatus, system_status
+GET_SYSTEM_STATUS: Final[Method[None, results.SystemStatus]] = Method(
+    "GetSystemStatus", partial(read, results.SystemStatus)
 )
 # Idempotent, because a request names the desired state, not a change.
-SET_PREVIEW_MODE: Final[Method[PreviewRequest, PreviewChange]] = Method(
-    "SetPreviewMode", _preview_request, wire.SetPreviewModeResponse, _preview_change
+SET_PREVIEW_MODE: Final[Method[DesiredPreview, results.PreviewChange]] = Method(
+    "SetPreviewMode", partial(read, results.PreviewChange), _preview_fields
 )
-GET_OVERLAY_SNAPSHOT: Final[Method[None, OverlaySnapshot]] = Method(
-    "GetOverlaySnapshot",
-    lambda _: wire.GetOverlaySnapshotRequest(),
-    overlay_pb2.OverlaySnapshot,
-    overlay_snapshot,
+GET_OVERLAY_SNAPSHOT: Final[Method[None, results.OverlaySnapshot]] = Method(
+    "GetOverlaySnapshot", partial(read, results.OverlaySnapshot)
 )
-GET_GATEWAY_INFO: Final[Method[None, GatewayInfo]] = Method(
-    "GetGatewayInfo", lambda _: wire.GetGatewayInfoRequest(), wire.GetGatewayInfoResponse, gateway_info
+GET_GATEWAY_INFO: Final[Method[None, results.GatewayInfo]] = Method(
+    "GetGatewayInfo", partial(read, results.GatewayInfo)
 )
-PING: Final[Method[None, RobotTime]] = Method(
-    "Ping", lambda _: wire.PingRequest(), wire.PingResponse, _robot_time
+PING: Final[Method[None, results.RobotTime]] = Method("Ping", partial(read, results.RobotTime))
+WATCH_SYSTEM_STATUS: Final[Method[WatchRequest, results.WatchedStatus]] = Method(
+    "WatchSystemStatus", partial(read, results.WatchedStatus), _watch_fields
 )
-WATCH_SYSTEM_STATUS: Final[Method[WatchRequest, WatchedStatus]] = Method(
-    "WatchSystemStatus", _watch_request, wire.WatchSystemStatusResponse, _watched_status
-)
-SUBSCRIBE_EVENTS: Final[Method[EventsRequest, Event | EventGap | CaughtUp | None]] = Method(
-    "SubscribeEvents", _events_request, wire.SubscribeEventsResponse, event_item
+SUBSCRIBE_EVENTS: Final[Method[EventsRequest, results.Event | results.EventGap | results.CaughtUp | None]] = (
+    Method("SubscribeEvents", event_item, _events_fields)
 )
 METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT, GET_GATEWAY_INFO, PING)
 """The unary methods."""

@@ -17,7 +17,6 @@ from console.client.results.event import (
     PreviewEvent,
 )
 from console.client.results.fault import Fault, FaultSeverity
-from console.client.results.info import GatewayFacts, GatewayInfo, MethodCounts
 from console.client.results.overlay import (
     Detection,
     Detections,
@@ -40,12 +39,14 @@ from console.client.results.preview import (
     VideoCodec,
     VideoFormat,
 )
-from console.client.results.sample import Freshness, Sample
-from console.client.results.source import Source, SourceState
+from console.client.results.sample import Freshness, Sample, Source, SourceState
 from console.client.results.status import (
     EffectiveCommand,
+    GatewayFacts,
+    GatewayInfo,
     Health,
     HealthState,
+    MethodCounts,
     Mission,
     Odometry,
     RobotTime,

@@ -98,7 +98,7 @@ class VideoFormat:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewMeasurement(Sample):
-    """Measurements of the running stream, twice a second."""
+    """Measurements of the running stream, each over a window of 0.6 s."""
 
     fps: float | None
     bitrate_kbps: float | None

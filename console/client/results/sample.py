@@ -1,4 +1,4 @@
-"""Freshness of measured values."""
+"""Measured values, their freshness, and the sources that they come from."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -29,3 +29,37 @@ class Sample:
         if not self.available:
             return Freshness.MISSING
         return Freshness.STALE if self.stale else Freshness.FRESH
+
+
+class SourceState(Enum):
+    """State of a source."""
+
+    UNKNOWN = "unknown"
+    WAITING = "waiting"
+    """Nothing was received, and nothing on the robot publishes it."""
+    SILENT = "silent"
+    """It has a publisher, but nothing was received."""
+    RECEIVING = "receiving"
+    STALE = "stale"
+    """The newest value is too old."""
+    QOS_MISMATCH = "qos_mismatch"
+    """The publisher's QoS is incompatible with the gateway's: nothing can be received."""
+    WRONG_TYPE = "wrong_type"
+    """Published with another type than configured: nothing can be received."""
+    TYPE_MISSING = "type_missing"
+    """The gateway lacks the message type: nothing can be received."""
+    UNDECODABLE = "undecodable"
+    """Messages arrive, but the robot's type has other fields than the gateway's."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source(Sample):
+    """One source in the gateway's configuration."""
+
+    name: str
+    """What it measures: "odometry"."""
+    state: SourceState
+    required: bool
+    """Whether the robot is degraded without it."""
+    detail: str
+    """The state as a sentence. Empty while it is received."""

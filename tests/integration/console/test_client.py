@@ -4,6 +4,8 @@ The policy itself (pauses, deadlines, what is settled) is played by hand in the 
 it, and the clock is the wall's.
 """
 
+import asyncio
+import gc
 import socket
 import threading
 import time
@@ -23,7 +25,9 @@ from console.client import (
     Cancelled,
     ClientOptions,
     DeadlineExceeded,
+    GatewayClient,
     GatewayError,
+    GatewayFailed,
     Overloaded,
     PreviewProfile,
     PreviewState,
@@ -33,12 +37,12 @@ from console.client import (
 from console.client.error_table import ERRORS
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.client.results import Freshness, HealthState
-from omniseer.gateway.v1 import overlay_pb2, preview_pb2
+from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import Relay, black_hole
 from tests.support.clients import FACES, Blocking, Face
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving
+from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving, serving_handlers
 from tests.support.waiting import wait_until
 
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "the robot is starting")
@@ -408,6 +412,35 @@ def test_a_link_that_went_silent_between_calls_is_replaced(face: type[Face], por
         assert robot.retries == 0, "the call never met the dead connection"
 
 
+# --- answers that can't be read ---
+
+
+@pytest.fixture
+def gibberish() -> Iterator[int]:
+    """The port of a server that answers each method with bytes that are no message."""
+    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+    handlers: dict[str, grpc.RpcMethodHandler[Any, Any]] = {
+        method.name: grpc.unary_stream_rpc_method_handler(lambda _request, _context: iter([b"\xff"]))
+        if method.server_streaming
+        else grpc.unary_unary_rpc_method_handler(lambda _request, _context: b"\xff")
+        for method in service.methods
+    }
+    with serving_handlers(grpc.method_handlers_generic_handler(service.full_name, handlers)) as port:
+        yield port
+
+
+def test_an_unreadable_answer_says_so(face: type[Face], gibberish: int, ask: Ask) -> None:
+    with face(at(gibberish)) as robot, pytest.raises(GatewayFailed, match="sent an unreadable answer to"):
+        ask(robot)
+
+
+def test_an_unreadable_item_ends_the_stream(gibberish: int) -> None:
+    with GatewayClient(at(gibberish)) as robot:
+        for stream in (robot.events(), robot.watch_status()):
+            with pytest.raises(GatewayFailed, match="sent an unreadable answer to"):
+                next(stream)
+
+
 # --- nothing is left ---
 
 
@@ -440,6 +473,35 @@ def test_many_clients_leave_no_thread_and_no_socket(face: type[Face], port: int)
     wait_until(lambda: open_files() < files + 10, f"{files} open files before")
     wait_until(lambda: native_threads() < native + 10, f"{native} threads before")
     wait_until(lambda: threading.active_count() <= python, f"{python} Python threads before")
+
+
+def test_no_loop_of_a_closed_client_is_kept(port: int) -> None:
+    """Each loop that a channel was used in is kept by gRPC, as long as there is a channel."""
+    with Blocking(at(port)) as stays:
+        stays.status()
+        gc.collect()
+        before = loops()
+        for _ in range(5):
+            with Blocking(at(port)) as goes:
+                goes.status()
+        gc.collect()
+        assert loops() == before
+
+
+def loops() -> int:
+    return sum(isinstance(each, asyncio.AbstractEventLoop) for each in gc.get_objects())
+
+
+def test_a_client_that_is_not_closed_goes_with_its_last_reference(port: int) -> None:
+    with Blocking(at(port)) as stays:
+        stays.status()
+        abandoned = Blocking(at(port))
+        abandoned.status()
+        wait_until(lambda: connections_to(port) == 2, "both are connected")
+        del abandoned
+        gc.collect()
+        wait_until(lambda: connections_to(port) == 1, "the connection of the abandoned one is closed")
+        assert stays.status().gateway_name == "lab-1"
 
 
 def open_files() -> int:

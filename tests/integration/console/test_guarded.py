@@ -71,7 +71,7 @@ def test_a_login_that_is_revoked_ends_the_watching_with_one_line(robot: Guarded)
         assert screen.process.wait(ENDS_WITHIN_S) == 1
         (said,) = [line for line in screen.lines() if line.startswith("error: ")]
         assert "no longer valid" in said
-        assert said.endswith("then type: robotctl login")
+        assert said.endswith("then type: robotctl login NAME HOST:PORT FILE")
         assert screen.manners() == screen.manners_before
     again = robot.robotctl("--robot", ROBOT, "status")
     assert again.returncode == 1

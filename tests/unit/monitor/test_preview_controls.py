@@ -4,10 +4,18 @@ from dataclasses import replace
 
 import pytest
 
-from console.client import DeadlineExceeded, OverlaySnapshot, PreviewChange, PreviewProfile, Unreachable
+from console.client import (
+    DeadlineExceeded,
+    DesiredPreview,
+    OverlaySnapshot,
+    PreviewChange,
+    PreviewProfile,
+    Unreachable,
+)
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState, PreviewRequest
-from console.monitor.preview_controls import Controls, Note, controls
+from console.monitor.monitor_state import MonitorState, PreviewRequest
+from console.monitor.preview_controls import Controls, controls
+from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states

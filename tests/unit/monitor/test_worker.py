@@ -13,6 +13,7 @@ from common.backoff import Backoff
 from common.errors import UserError
 from console.client import (
     CaughtUp,
+    DesiredPreview,
     Event,
     EventGap,
     EventPosition,
@@ -30,7 +31,7 @@ from console.client import (
 from console.client.results import EventKind
 from console.monitor.conversation import RetryBackoff
 from console.monitor.link import LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState
+from console.monitor.monitor_state import MonitorState
 from console.monitor.worker import Worker
 from tests.support.snapshots import event, snapshot
 from tests.support.waiting import wait_until

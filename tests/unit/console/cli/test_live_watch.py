@@ -12,9 +12,9 @@ from console.cli.keyboard import Key, keys_in
 from console.cli.live_screen import Fitted
 from console.cli.preview_keys import PreviewKeys
 from console.client import (
+    DesiredPreview,
     PreviewChange,
     PreviewProfile,
-    PreviewRequest,
     PreviewState,
     PreviewStatus,
     Unreachable,
@@ -73,15 +73,15 @@ def test_what_is_typed(typed: str, keys: list[Key]) -> None:
 @pytest.mark.parametrize(
     ("state", "request_"),
     [
-        (PreviewState.DISABLED, PreviewRequest(True)),
-        (PreviewState.STOPPING, PreviewRequest(True)),
-        (PreviewState.UNKNOWN, PreviewRequest(True)),
-        (PreviewState.STARTING, PreviewRequest(False)),
-        (PreviewState.RUNNING, PreviewRequest(False)),
-        (PreviewState.FAULTED, PreviewRequest(False)),
+        (PreviewState.DISABLED, DesiredPreview(True)),
+        (PreviewState.STOPPING, DesiredPreview(True)),
+        (PreviewState.UNKNOWN, DesiredPreview(True)),
+        (PreviewState.STARTING, DesiredPreview(False)),
+        (PreviewState.RUNNING, DesiredPreview(False)),
+        (PreviewState.FAULTED, DesiredPreview(False)),
     ],
 )
-def test_p_requests_the_opposite(asking: PreviewKeys, state: PreviewState, request_: PreviewRequest) -> None:
+def test_p_requests_the_opposite(asking: PreviewKeys, state: PreviewState, request_: DesiredPreview) -> None:
     assert asking.press(Key.TOGGLE, preview(state)) == request_
     offered = {key: does for key, does, _ in PreviewKeys().help(preview(state))}
     assert offered[Key.TOGGLE] == ("preview on" if request_.enabled else "preview off")
@@ -90,12 +90,12 @@ def test_p_requests_the_opposite(asking: PreviewKeys, state: PreviewState, reque
 def test_a_profile_is_switched_while_it_runs_and_marked_while_it_does_not(asking: PreviewKeys) -> None:
     assert asking.press(Key.LOW_BW, preview(PreviewState.DISABLED)) is None
     assert [key for key, _, is_so in asking.help(preview(PreviewState.DISABLED)) if is_so] == [Key.LOW_BW]
-    assert asking.press(Key.TOGGLE, preview(PreviewState.DISABLED)) == PreviewRequest(
+    assert asking.press(Key.TOGGLE, preview(PreviewState.DISABLED)) == DesiredPreview(
         True, PreviewProfile.LOW_BW
     )
     running = preview(PreviewState.RUNNING, PreviewProfile.LOW_BW)
     asking.done(PreviewChange(accepted=True, message="preview is running", preview=running))
-    assert asking.press(Key.HIGH_QUALITY, running) == PreviewRequest(True, PreviewProfile.HIGH_QUALITY)
+    assert asking.press(Key.HIGH_QUALITY, running) == DesiredPreview(True, PreviewProfile.HIGH_QUALITY)
 
 
 def test_one_thing_at_a_time(asking: PreviewKeys) -> None:

@@ -85,14 +85,14 @@ def test_everything_a_gateway_can_report_has_a_line() -> None:
         assert part in text
 
 
-def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_wanted() -> None:
+def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_preferred() -> None:
     message = healthy_status()
     message.preview.state, message.preview.last_error = states.PREVIEW_FAULTED, "camera unplugged"
     message.preview.encoder.name, message.preview.encoder.wanted = "x264", "mpp-h265"
     message.preview.encoder.fallback_reason = "/dev/mpp_service is missing"
     rows = status_rows(decoded(message))
     assert any(row.style is SeverityStyle.BAD and row.text == "camera unplugged" for row in rows)
-    assert any(row.text == "wanted mpp-h265, /dev/mpp_service is missing" for row in rows)
+    assert any(row.text == "preferred mpp-h265, /dev/mpp_service is missing" for row in rows)
     assert "preview faulted (camera unplugged)" in status_line(decoded(message))
 
 

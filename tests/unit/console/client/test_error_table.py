@@ -18,6 +18,7 @@ from common.grpc_errors import STATUS_CODES, metadata_of, metadata_of_defect
 from common.reasons import Reason
 from console.client import errors
 from console.client.error_table import ERRORS, REASONS, error_from
+from tests.support.control_characters import CONTROL_CHARACTERS
 
 
 class Failure(grpc.RpcError):
@@ -189,3 +190,8 @@ def test_the_page_gives_every_reason_its_code_and_exception() -> None:
     for row in rows:
         code = fixed.get(Reason(row[0]))
         assert code is None or row[1] == code.name
+
+
+def test_what_a_server_says_holds_no_control_character() -> None:
+    error = said(grpc.StatusCode.FAILED_PRECONDITION, f"no{CONTROL_CHARACTERS}")
+    assert not set(error.what) & set(CONTROL_CHARACTERS)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from console.client.errors import Cancelled
-from console.client.loop_thread import LoopThread
+from console.client.loop_thread import LoopThread, SharedLoop
 
 
 @pytest.fixture
@@ -52,6 +52,22 @@ def test_a_stopped_one_says_so(loop: LoopThread) -> None:
     loop.stop()
     with pytest.raises(Cancelled, match="closed"):
         loop.run(seven())
+
+
+def test_its_users_share_one_loop() -> None:
+    shared = SharedLoop()
+    first, second = shared.acquire(), shared.acquire()
+    assert first is second
+    shared.release(first)
+    assert second.run(seven()) == 7
+    shared.release(second)
+    with pytest.raises(Cancelled, match="closed"):
+        second.run(seven())
+    third = shared.acquire()
+    assert third is not first
+    shared.release(first)
+    assert third.run(seven()) == 7, "a loop of the past has no users to release"
+    shared.release(third)
 
 
 def test_after_a_fork_it_says_what_to_do() -> None:

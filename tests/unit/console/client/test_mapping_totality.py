@@ -6,6 +6,7 @@ The tables below say where: a field goes to the attribute of its own name unless
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import partial
 from itertools import chain
 from math import isfinite
 from typing import Any, Final
@@ -15,6 +16,7 @@ from google.protobuf.descriptor import EnumDescriptor, FieldDescriptor
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 
+from console.client import results
 from console.client.mapping import enums
 from console.client.mapping.methods import (
     METHODS,
@@ -22,9 +24,9 @@ from console.client.mapping.methods import (
     STREAMS,
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
+    DesiredPreview,
     EventsRequest,
     Method,
-    PreviewRequest,
     WatchRequest,
 )
 from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
@@ -40,6 +42,7 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
+from tests.support.control_characters import CONTROL_CHARACTERS
 from tests.support.filled import alternatives, changes, fields_of, fill_distinctly, is_alternative
 
 FILES: Final = (
@@ -59,17 +62,17 @@ ALL_METHODS: Final[tuple[Method[Any, Any], ...]] = (*METHODS, *STREAMS)
 DECODERS: Final = {method.name: method.decode for method in ALL_METHODS}
 
 ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
-    "ControlResult": enums.control_result,
-    "EventGapReason": enums.gap_reason,
-    "PreviewState": enums.preview_state,
-    "SourceState": enums.source_state,
-    "FaultSeverity": enums.fault_severity,
-    "RobotHealthState": enums.health_state,
-    "TeleopState": enums.teleop_state,
-    "PreviewProfile": enums.preview_profile,
-    "VideoCodec": enums.video_codec,
-    "StreamTransport": enums.stream_transport,
-    "StreamContainer": enums.stream_container,
+    "ControlResult": partial(enums.member, results.ControlResult),
+    "EventGapReason": partial(enums.member, results.GapReason),
+    "PreviewState": partial(enums.member, results.PreviewState),
+    "SourceState": partial(enums.member, results.SourceState),
+    "FaultSeverity": partial(enums.member, results.FaultSeverity),
+    "RobotHealthState": partial(enums.member, results.HealthState),
+    "TeleopState": partial(enums.member, results.TeleopState),
+    "PreviewProfile": partial(enums.member, results.PreviewProfile),
+    "VideoCodec": partial(enums.member, results.VideoCodec),
+    "StreamTransport": partial(enums.member, results.StreamTransport),
+    "StreamContainer": partial(enums.member, results.StreamContainer),
 }
 
 LEFT_OUT: Final[Mapping[str, str]] = dict.fromkeys(
@@ -418,6 +421,29 @@ def test_every_value_of_an_answer_arrives_at_its_place_and_nowhere_else(
         )
 
 
+def fill_with_control_characters(message: Message) -> None:
+    """Puts every control character into every text that is set."""
+    for field, value in message.ListFields():
+        if field.message_type:
+            for item in value if field.is_repeated else [value]:
+                fill_with_control_characters(item)
+        elif field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
+            setattr(message, field.name, f"{value}{CONTROL_CHARACTERS}")
+
+
+@pytest.mark.parametrize(("method", "members"), [pytest.param(*case, id=case_id(*case)) for case in CASES])
+def test_no_text_of_an_answer_holds_a_control_character(method: str, members: tuple[str, ...]) -> None:
+    answer = filled_answer(method, members)
+    fill_with_control_characters(answer)
+    texts = {
+        place: value
+        for place, value in flatten(DECODERS[method](answer.SerializeToString())).items()
+        if isinstance(value, str)
+    }
+    texts["configuration_json"] = texts.get("configuration_json", "").replace("\n", "")
+    assert {place: text for place, text in texts.items() if set(text) & set(CONTROL_CHARACTERS)} == {}
+
+
 def fields_set(message: Message) -> Iterator[FieldDescriptor]:
     """All fields that are set in a message and below it."""
     for field, value in message.ListFields():
@@ -463,7 +489,7 @@ def test_the_tables_name_only_fields_of_answers() -> None:
 
 def test_every_field_of_a_preview_request_is_set() -> None:
     request = robot_gateway_pb2.SetPreviewModeRequest.FromString(
-        SET_PREVIEW_MODE.encode(PreviewRequest(True, PreviewProfile.HIGH_QUALITY))
+        SET_PREVIEW_MODE.encode(DesiredPreview(True, PreviewProfile.HIGH_QUALITY))
     )
     assert request.enabled
     assert request.profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
@@ -550,7 +576,7 @@ def test_a_number_from_a_newer_gateway_reads_unknown(name: str) -> None:
 
 
 def test_every_profile_can_be_asked_for() -> None:
-    numbers = {profile: enums.preview_profile.number(profile) for profile in PreviewProfile}
-    assert {number: enums.preview_profile(number) for number in numbers.values()} == {
+    numbers = {profile: enums.number(profile) for profile in PreviewProfile}
+    assert {number: enums.member(PreviewProfile, number) for number in numbers.values()} == {
         number: profile for profile, number in numbers.items()
     }

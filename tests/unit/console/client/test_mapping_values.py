@@ -5,7 +5,7 @@ import math
 import pytest
 
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STATUS
-from console.client.mapping.values import number
+from console.client.mapping.reader import number
 from console.client.results import Freshness, PreviewProfile, PreviewState, SystemStatus
 from omniseer.gateway.v1 import overlay_pb2, system_status_pb2
 

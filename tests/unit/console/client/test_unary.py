@@ -8,7 +8,7 @@ import pytest
 
 from console.client import Backoff, ClientOptions, PreviewChange, PreviewProfile, PreviewState, SystemStatus
 from console.client.errors import DeadlineExceeded, GatewayError, Refused, Unreachable
-from console.client.mapping.methods import GET_SYSTEM_STATUS, SET_PREVIEW_MODE, Method, PreviewRequest
+from console.client.mapping.methods import GET_SYSTEM_STATUS, SET_PREVIEW_MODE, DesiredPreview, Method
 from console.client.unary import UnaryCalls
 
 STATUS = GET_SYSTEM_STATUS.decode(b"")
@@ -118,7 +118,7 @@ async def test_what_must_not_happen_twice_is_not_asked_twice() -> None:
 
 async def test_enabling_watches_until_frames_leave() -> None:
     stage = Stage()
-    request = PreviewRequest(True, PreviewProfile.BALANCED)
+    request = DesiredPreview(True, PreviewProfile.BALANCED)
     change = await stage.play(
         stage.calls.set_preview(request, 10),
         preview_change(PreviewState.STARTING),
@@ -134,18 +134,18 @@ async def test_enabling_watches_until_frames_leave() -> None:
 @pytest.mark.parametrize(
     ("request_", "state", "profile", "settled"),
     [
-        (PreviewRequest(True), PreviewState.RUNNING, "low-bw", True),
-        (PreviewRequest(True, PreviewProfile.BALANCED), PreviewState.RUNNING, "balanced", True),
-        (PreviewRequest(True, PreviewProfile.BALANCED), PreviewState.RUNNING, "low-bw", False),
-        (PreviewRequest(True), PreviewState.FAULTED, "balanced", True),
-        (PreviewRequest(True), PreviewState.DISABLED, "balanced", False),
-        (PreviewRequest(False), PreviewState.DISABLED, "balanced", True),
-        (PreviewRequest(False), PreviewState.STOPPING, "balanced", False),
-        (PreviewRequest(False), PreviewState.RUNNING, "balanced", False),
+        (DesiredPreview(True), PreviewState.RUNNING, "low-bw", True),
+        (DesiredPreview(True, PreviewProfile.BALANCED), PreviewState.RUNNING, "balanced", True),
+        (DesiredPreview(True, PreviewProfile.BALANCED), PreviewState.RUNNING, "low-bw", False),
+        (DesiredPreview(True), PreviewState.FAULTED, "balanced", True),
+        (DesiredPreview(True), PreviewState.DISABLED, "balanced", False),
+        (DesiredPreview(False), PreviewState.DISABLED, "balanced", True),
+        (DesiredPreview(False), PreviewState.STOPPING, "balanced", False),
+        (DesiredPreview(False), PreviewState.RUNNING, "balanced", False),
     ],
 )
 async def test_when_a_request_is_settled(
-    request_: PreviewRequest, state: PreviewState, profile: str, settled: bool
+    request_: DesiredPreview, state: PreviewState, profile: str, settled: bool
 ) -> None:
     stage = Stage()
     await stage.play(
@@ -160,7 +160,7 @@ async def test_a_preview_that_never_settles_is_given_back_as_it_is() -> None:
     stage = Stage()
     starting = [with_preview(PreviewState.STARTING)] * 100
     change = await stage.play(
-        stage.calls.set_preview(PreviewRequest(True), 1.0), preview_change(PreviewState.STARTING), *starting
+        stage.calls.set_preview(DesiredPreview(True), 1.0), preview_change(PreviewState.STARTING), *starting
     )
     assert isinstance(change, PreviewChange)
     assert change.preview.state is PreviewState.STARTING
@@ -170,5 +170,5 @@ async def test_a_preview_that_never_settles_is_given_back_as_it_is() -> None:
 async def test_a_refused_request_is_not_watched() -> None:
     stage = Stage()
     refused = preview_change(PreviewState.DISABLED, accepted=False)
-    assert await stage.play(stage.calls.set_preview(PreviewRequest(True), 10), refused) is refused
+    assert await stage.play(stage.calls.set_preview(DesiredPreview(True), 10), refused) is refused
     assert len(stage.sends) == 1

@@ -1,6 +1,8 @@
 """The doctor's findings; the robot is a real server whose answers the test writes."""
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -196,3 +198,18 @@ def srt_listener() -> Iterator[int]:
             yield listener.getsockname()[1]
         finally:
             thread.join()
+
+
+def test_a_resolver_that_hangs_does_not_keep_the_program() -> None:
+    program = """
+import socket, sys, threading
+from console.doctor import network
+
+network._WITHIN_S = 0.1
+socket.getaddrinfo = lambda *_args, **_more: threading.Event().wait()
+print(network.name_finding("lab1.local").what)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert done.stdout == "'lab1.local' does not resolve: no answer within 0.1 s\n"

@@ -1,6 +1,8 @@
+from datetime import UTC
+
 import pytest
 
-from console.presentation.formatting import age, gibibytes, joined, plural, quantity, signed
+from console.presentation.formatting import age, gibibytes, joined, plural, quantity, signed, wall_clock
 
 
 @pytest.mark.parametrize(
@@ -47,3 +49,13 @@ def test_counts() -> None:
 
 def test_empty_parts_leave_no_comma() -> None:
     assert joined("a", "", "b") == "a, b"
+
+
+def test_a_time_of_day() -> None:
+    assert wall_clock(1_795_302_000_999, UTC) == "2026-11-21 23:00:00"
+    assert len(wall_clock(1_795_302_000_999)) == len("2026-11-21 23:00:00")
+
+
+@pytest.mark.parametrize("unix_ms", [2**64 - 1, 2**63, 2**62, 253_402_300_800_000, -(2**63)])
+def test_a_time_that_no_calendar_has(unix_ms: int) -> None:
+    assert wall_clock(unix_ms, UTC) == wall_clock(unix_ms) == "-"

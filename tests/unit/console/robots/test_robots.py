@@ -9,7 +9,6 @@ import pytest
 from common.errors import ExitCode, UserError
 from common.private_files import write_private
 from console.robots import Robot, RobotsFile, choose, read_credentials, read_robots_file
-from console.robots.choice import Choice
 from console.robots.credentials import credentials_directory, forget_credentials
 from console.robots.robots_file import parse_robots_file, robots_file_path
 from console.robots.robots_file_edit import drop_robot, put_robot, set_default
@@ -139,18 +138,16 @@ BOTH = {"ROBOTCTL_TARGET": "env:1", "ROBOTCTL_ROBOT": "two"}
 def test_who_speaks_first(
     target: str | None, name: str | None, environment: dict[str, str], meant: tuple[str, str | None]
 ) -> None:
-    choice = choose(target, name, environment, lambda: KNOWN)
-    assert (choice.robot.target, choice.name) == meant
+    robot, known_as = choose(target, name, environment, lambda: KNOWN)
+    assert (robot.target, known_as) == meant
 
 
 def test_without_anything_it_is_this_computer() -> None:
-    assert choose(None, None, {}, lambda: RobotsFile(Path("/b"))) == Choice(Robot(target="127.0.0.1:50051"))
+    assert choose(None, None, {}, lambda: RobotsFile(Path("/b"))) == (Robot(target="127.0.0.1:50051"), None)
 
 
 def test_an_address_beside_a_name_replaces_the_address_alone() -> None:
-    assert choose("tunnel:1", "two", {}, lambda: KNOWN).robot == Robot(
-        target="tunnel:1", token_file=Path("/t")
-    )
+    assert choose("tunnel:1", "two", {}, lambda: KNOWN)[0] == Robot(target="tunnel:1", token_file=Path("/t"))
 
 
 def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
@@ -159,7 +156,7 @@ def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
     def read() -> RobotsFile:
         raise AssertionError
 
-    assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read).robot == Robot(target="typed:1")
+    assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read)[0] == Robot(target="typed:1")
 
 
 def test_an_unknown_name() -> None:
@@ -239,8 +236,22 @@ def test_a_notation_that_can_not_be_edited_stays_as_it_is(path: Path) -> None:
     path.parent.mkdir()
     path.write_text(text := 'robots = { lab1 = { target = "a:1" } }\n')
     with pytest.raises(UserError, match="can't change"):
-        put_robot("lab1", Robot(target="b:1"), path=path)
+        put_robot("lab2", Robot(target="b:1"), path=path)
     assert path.read_text() == text
+    put_robot("lab1", Robot(target="b:1"), path=path)
+    assert path.read_text() == text.replace("a:1", "b:1")
+
+
+def test_comments_behind_values_stay(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text(
+        '[robots.lab1]\ntarget = "a:1"  # the cable\n\n# about lab2\n[robots.lab2]\ntarget = "b:1"\n'
+    )
+    put_robot("lab1", Robot(target="c:1", token_file=path.parent / "t"), path=path)
+    assert path.read_text() == (
+        '[robots.lab1]\ntarget = "c:1"  # the cable\ntoken_file = "t"\n\n'
+        '# about lab2\n[robots.lab2]\ntarget = "b:1"\n'
+    )
 
 
 def test_many_at_once_lose_nothing(path: Path) -> None:
