@@ -1,6 +1,6 @@
 """State of the monitor window, as one frozen value that a thread can hand to another."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from console.client import GatewayError, OverlaySnapshot, PreviewChange, PreviewProfile
 from console.monitor.event_log import EventLog
@@ -49,6 +49,8 @@ class MonitorState:
         received_s: when it came, on the monotonic clock.
         request: the latest request; None before the first.
         events: the log of events.
+        heard_s: when the robot last answered anything, on the monotonic clock. It streams its status on every
+            change, so that an answer of any kind shows that the snapshot still holds.
     """
 
     link: Link
@@ -56,6 +58,14 @@ class MonitorState:
     received_s: float = 0.0
     request: PreviewRequest | None = None
     events: EventLog = field(default_factory=EventLog)
+    heard_s: float = 0.0
+
+    def with_outcome(self, ended: PreviewRequest) -> "MonitorState":
+        """Returns the state after the end of the request; it carries the preview's newest status."""
+        snapshot, outcome = self.snapshot, ended.outcome
+        if snapshot and isinstance(outcome, PreviewChange) and outcome.accepted:
+            snapshot = replace(snapshot, status=replace(snapshot.status, preview=outcome.preview))
+        return replace(self, request=ended, snapshot=snapshot)
 
     def snapshot_age_ms(self, now_s: float) -> int:
         """Returns the time since the snapshot came; to be added to the ages in it."""

@@ -123,7 +123,7 @@ class Worker:
                 conversation.send_request()
             async with asyncio.TaskGroup() as tasks:
                 running = [
-                    tasks.create_task(conversation.poll_status()),
+                    tasks.create_task(conversation.follow_status()),
                     tasks.create_task(conversation.serve_requests()),
                     tasks.create_task(conversation.stream_events()),
                 ]

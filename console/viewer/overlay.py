@@ -8,7 +8,7 @@ from console.client.results import Detection, Detections
 from console.viewer.geometry import Box, on_frame
 
 _SILENT_AFTER_S: Final = 1.0
-"""Age of a snapshot from which on its boxes are not drawn: they may be wrong by then."""
+"""Silence of the robot after which its boxes are not drawn: they may be wrong by then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,11 +17,11 @@ class Overlay:
 
     Args:
         detections: as the robot reported them.
-        received_s: when they came, on `time.monotonic()`.
+        heard_s: when the robot last answered, on `time.monotonic()`: they held then.
     """
 
     detections: Detections
-    received_s: float
+    heard_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Mark:
 
 def marks(overlay: Overlay | None, frame: Box, now_s: float) -> list[Mark]:
     """Returns the boxes to draw on a frame that is shown at `frame`; none if the detections are stale."""
-    if overlay is None or now_s - overlay.received_s > _SILENT_AFTER_S:
+    if overlay is None or now_s - overlay.heard_s > _SILENT_AFTER_S:
         return []
     found = overlay.detections
     if not found.available or found.stale or not found.source_width_px or not found.source_height_px:

@@ -12,7 +12,7 @@ from console.viewer.session import VideoSession
 
 
 class RobotVideo:
-    """A gateway worker, and a video session that follows the status it polls.
+    """A gateway worker, and a video session that follows its status.
 
     Args:
         target: the robot's gateway, HOST:PORT.
@@ -47,7 +47,7 @@ class RobotVideo:
     def overlay(self) -> Overlay | None:
         """Returns the latest detections; None before the first status."""
         state = self.worker.latest()
-        return Overlay(state.snapshot.detections, state.received_s) if state.snapshot else None
+        return Overlay(state.snapshot.detections, state.heard_s) if state.snapshot else None
 
     def close(self, timeout_s: float) -> None:
         """Disconnects both, within `timeout_s` each, and closes the recording."""

@@ -15,7 +15,7 @@ from console.window.preview_panel import PreviewPanel
 from console.window.programs import monitor
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
 from tests.support.qt import keep_picture, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
@@ -51,9 +51,10 @@ class Desk:
         return [line.text.text() for line in self.preview.notes.shown if line.text.text()]
 
 
-@pytest.fixture
-def desk_work(desk: None) -> Iterator[Desk]:
-    gateway = GatewayDouble()
+@pytest.fixture(params=[StreamingGatewayDouble, GatewayDouble], ids=["streamed", "polled"])
+def desk_work(desk: None, request: pytest.FixtureRequest) -> Iterator[Desk]:
+    """In front of a gateway that streams its status, and of an older one, which is polled."""
+    gateway = request.param()
     with serving(gateway) as port, monitor(f"127.0.0.1:{port}") as window:
         window.activateWindow()
         made = Desk(window, gateway)
@@ -190,7 +191,7 @@ def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Des
 
 
 def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
-    gateway = GatewayDouble()
+    gateway = StreamingGatewayDouble()
     with serving(gateway) as port:
         with monitor(f"127.0.0.1:{port}") as window:
             until(window.preview.switch.isEnabled, "it is connected")

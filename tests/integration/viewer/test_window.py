@@ -14,7 +14,7 @@ from console.viewer.playback import PlaybackState
 from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
@@ -139,7 +139,7 @@ def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround
 
 
 def test_a_refusal_is_shown_in_the_robots_words() -> None:
-    double = GatewayDouble()
+    double = StreamingGatewayDouble()
     double.accept = False
     with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
         shows(view, PlaybackState.OFF)
@@ -156,7 +156,7 @@ def seeing(
 ) -> Iterator[tuple[ViewWindow, GatewayDouble]]:
     """A robot that shows `source` and detects `boxes` in a camera image of this shape."""
     settings = {"source": {"kind": "gst", "description": source}}
-    double = GatewayDouble()
+    double = StreamingGatewayDouble()
     found = double.overlay.detections
     found.available, found.source_width_px, found.source_height_px = True, *shape
     found.detection_count = len(boxes)

@@ -30,7 +30,7 @@ def overlay(*items: Detection, **changes: Any) -> Overlay:
         count=len(items),
         items=items,
     )
-    return Overlay(replace(found, **changes), received_s=100.0)
+    return Overlay(replace(found, **changes), heard_s=100.0)
 
 
 def test_a_detection_is_drawn_around_its_centre_with_name_track_and_score() -> None:
