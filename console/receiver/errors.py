@@ -34,15 +34,6 @@ class UndecodableError(StreamError):
     """The stream arrives, but this computer can't decode it."""
 
 
-class ReceiverClosedError(StreamError):
-    """The receiver was closed before or while a caller waited for a frame."""
-
-
-def closed() -> ReceiverClosedError:
-    """Returns the error of a call on a closed receiver."""
-    return ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
-
-
 def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamError:
     """Translates an error of the SRT source.
 

@@ -1,7 +1,6 @@
 """Widget of the video: the latest frame, boxes around detections, and a banner while it is not live."""
 
 import time
-from dataclasses import dataclass
 from typing import Final, Protocol
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
@@ -33,21 +32,6 @@ class OverlaySource(Protocol):
         """Returns the latest detections, without waiting: the painting thread calls it."""
 
 
-@dataclass(frozen=True, slots=True)
-class PaintableFrame:
-    """A frame as Qt paints it.
-
-    Args:
-        image: the pixels, in `memory`, which must live as long.
-        memory: four bytes a pixel.
-        frame: the decoded frame.
-    """
-
-    image: QImage
-    memory: bytes
-    frame: Frame
-
-
 class VideoView(QWidget):
     """Shows one session's video. Only the latest frame is kept, and nothing here blocks.
 
@@ -66,8 +50,9 @@ class VideoView(QWidget):
         self._session = session
         self._overlays = overlays
         self._overlay_shown = True
-        self._ready: PaintableFrame | None = None
-        self._painted: PaintableFrame | None = None
+        self._ready: tuple[QImage, bytes] | None = None
+        """The latest frame, and the memory of its pixels, which must live as long."""
+        self._painted: tuple[QImage, bytes] | None = None
         self._banner: Banner | None = banner(session.playback())
         self._handover = ThreadHandover()
         self._handover.delivered.connect(self.update)
@@ -104,8 +89,9 @@ class VideoView(QWidget):
         if shown is None:
             painter.fillRect(self.rect(), _GROUND)
         else:
-            box = fitted(shown.frame.width, shown.frame.height, Box(0, 0, self.width(), self.height()))
-            self._draw_frame(painter, shown, box, live)
+            image, _ = shown
+            box = fitted(image.width(), image.height(), Box(0, 0, self.width(), self.height()))
+            self._draw_frame(painter, image, box, live)
             if self._overlays and self._overlay_shown and live:
                 draw_marks(painter, marks(self._overlays.overlay(), box, now_s))
         if text := banner(playback):
@@ -115,12 +101,12 @@ class VideoView(QWidget):
             self._painted = shown
             self.painted.emit()
 
-    def _draw_frame(self, painter: QPainter, shown: PaintableFrame, box: Box, live: bool) -> None:
+    def _draw_frame(self, painter: QPainter, image: QImage, box: Box, live: bool) -> None:
         target = QRectF(box.x, box.y, box.width, box.height)
         if not target.contains(QRectF(self.rect())):
             painter.fillRect(self.rect(), _GROUND)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(target, shown.image)
+        painter.drawImage(target, image)
         if not live:
             painter.fillRect(target, _VEIL)
 
@@ -133,8 +119,7 @@ class VideoView(QWidget):
 
     def _make_ready(self, frame: Frame) -> None:
         """Copies a new frame and hands it over. In the session's thread."""
-        memory = frame.plane(0)
-        row_bytes = frame.planes[0].stride
-        image = QImage(memory, frame.width, frame.height, row_bytes, QImage.Format.Format_RGB32)
-        self._ready = PaintableFrame(image, memory, frame)
+        memory = frame.read()
+        image = QImage(memory, frame.width, frame.height, frame.stride, QImage.Format.Format_RGB32)
+        self._ready = (image, memory)
         self._handover.post()

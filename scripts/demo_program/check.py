@@ -156,10 +156,10 @@ def _video(preview: PreviewStatus) -> str:
     with Receiver(address, queue_size=FRAMES) as receiver:
         frame = receiver.next_frame(_FIRST_FRAME_WITHIN_S)
         first_s = time.monotonic() - began_s
-        pictures.add(hash(frame.plane(0)))
+        pictures.add(hash(frame.read()))
         for _ in range(FRAMES - 1):
             frame = receiver.next_frame(_FRAME_WITHIN_S)
-            pictures.add(hash(frame.plane(0)))
+            pictures.add(hash(frame.read()))
     if len(pictures) == 1:
         raise UserError(f"{FRAMES} frames came, but they all show the same picture")
     return (

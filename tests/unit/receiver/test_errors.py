@@ -7,7 +7,6 @@ from console.receiver.errors import (
     StreamEndedError,
     StreamError,
     StreamRefusedError,
-    closed,
     ended,
     from_srt,
     no_frame_within,
@@ -46,7 +45,7 @@ def test_an_error_of_the_source_in_plain_words(
     assert "gst" not in str(error)
 
 
-@pytest.mark.parametrize("error", [closed(), ended(OPEN), no_frame_within(OPEN, 2)])
+@pytest.mark.parametrize("error", [ended(OPEN), no_frame_within(OPEN, 2)])
 def test_they_all_mean_unreachable(error: StreamError) -> None:
     assert error.exit_code == ExitCode.UNREACHABLE
 

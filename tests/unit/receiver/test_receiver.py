@@ -1,11 +1,9 @@
 """The receiver with connections that the test plays."""
 
-import threading
-
 import pytest
 
 from console.receiver.address import StreamAddress
-from console.receiver.errors import ReceiverClosedError, StreamEndedError, ended
+from console.receiver.errors import StreamEndedError, ended
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 from console.receiver.receiver import Receiver
@@ -42,37 +40,4 @@ def test_the_end_is_raised_after_the_last_frame() -> None:
         for _ in range(2):
             with pytest.raises(StreamEndedError, match="lost"):
                 receiver.next_frame(1)
-    assert script.open == 0
-
-
-@pytest.mark.parametrize("steps", ["", "fe"])
-def test_a_closed_receiver_gives_no_frame(steps: str) -> None:
-    receiver = Receiver(ADDRESS, connect=Script(steps).connect)
-    receiver.close()
-    with pytest.raises(ReceiverClosedError):
-        receiver.next_frame(1)
-
-
-def test_closing_wakes_a_caller_that_waits_for_a_frame() -> None:
-    receiver = Receiver(ADDRESS, connect=Script("").connect)
-    caught: list[BaseException] = []
-
-    def wait() -> None:
-        try:
-            receiver.next_frame(1000)
-        except ReceiverClosedError as error:
-            caught.append(error)
-
-    waiting = threading.Thread(target=wait)
-    waiting.start()
-    receiver.close()
-    waiting.join(10)
-    assert len(caught) == 1
-
-
-def test_closing_twice_disconnects_once() -> None:
-    script = Script("f")
-    receiver = Receiver(ADDRESS, connect=script.connect)
-    receiver.close()
-    receiver.close()
     assert script.open == 0
