@@ -25,9 +25,8 @@ from console.client import (
     WatchedStatus,
 )
 from console.monitor.event_log import EventLine, line_of
-from console.monitor.latest_value import LatestValue
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import DesiredPreview, MonitorState
+from console.monitor.monitor_state import DesiredPreview, LatestState
 from console.monitor.snapshot_events import SnapshotEvents
 
 STATUS_INTERVAL_S: Final = 0.1
@@ -108,16 +107,16 @@ class RetryBackoff:
 
 
 class Conversation:
-    """Follows the status, streams events, sends requests. Belongs to the loop that made it.
+    """Follows the status, streams events, sends requests. Belongs to the loop that runs it.
 
     Args:
-        robot: the robot's client.
         latest: takes every change of the state.
         retry: the pauses between attempts; they never end by themselves.
     """
 
-    def __init__(self, robot: RobotSession, latest: LatestValue[MonitorState], retry: RetryBackoff) -> None:
-        self._robot = robot
+    _robot: RobotSession
+
+    def __init__(self, latest: LatestState, retry: RetryBackoff) -> None:
         self._latest = latest
         self._retry = retry
         self._snapshot_events: SnapshotEvents | None = None
@@ -133,11 +132,18 @@ class Conversation:
         """Sends the pending request of the state."""
         self._requested.set()
 
-    async def follow_status(self) -> None:
+    async def run(self, robot: RobotSession) -> None:
+        """Runs until cancelled. Raises only what is a defect of our own."""
+        self._robot = robot
+        async with asyncio.TaskGroup() as tasks:
+            for part in (self._follow_status(), self._stream_events(), self._serve_requests()):
+                tasks.create_task(part)
+
+    async def _follow_status(self) -> None:
         """Follows the status; while none comes, retries after a pause."""
         while True:
             try:
-                await _first_to_end(self._watch(), self._measure_round_trip())
+                await first_to_end(self._watch(), self._measure_round_trip())
                 # Only a gateway that is too old to stream its status with detections gets here.
                 await self._poll()
             except GatewayError as error:
@@ -146,7 +152,7 @@ class Conversation:
                 await self._wait_to_retry(pause_s)
                 self._latest.update(lambda state: replace(state, link=replace(state.link, next_try_s=None)))
 
-    async def stream_events(self) -> None:
+    async def _stream_events(self) -> None:
         """Logs each event once. A gateway that can't stream them lists the newest in its snapshots."""
         position: EventPosition | None = None
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
@@ -166,7 +172,7 @@ class Conversation:
                 await asyncio.sleep(backoff.next_s())
                 await self._answering.wait()
 
-    async def serve_requests(self) -> None:
+    async def _serve_requests(self) -> None:
         """Sends requests, one at a time; their effect on the preview shows in the next snapshots."""
         while True:
             await self._requested.wait()
@@ -264,7 +270,7 @@ class Conversation:
         self._latest.update(lambda state: replace(state, events=state.events.with_lines(lines)))
 
 
-async def _first_to_end(*parts: Coroutine[Any, Any, None]) -> None:
+async def first_to_end(*parts: Coroutine[Any, Any, object]) -> None:
     """Runs coroutines until one ends, then cancels the others. Raises the error of the one that ended."""
     tasks = [asyncio.create_task(part) for part in parts]
     try:

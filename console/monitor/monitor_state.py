@@ -1,5 +1,7 @@
 """State of the monitor window, as one frozen value that a thread can hand to another."""
 
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from console.client import GatewayError, OverlaySnapshot, PreviewChange, PreviewProfile
@@ -74,3 +76,32 @@ class MonitorState:
     def outdated(self, now_s: float) -> bool:
         """Whether the snapshot is too old, or its connection lost, to count as the robot's present state."""
         return self.link.state is not LinkState.CONNECTED or self.snapshot_age_ms(now_s) > _OUTDATED_AFTER_MS
+
+
+class LatestState:
+    """The latest state. Thread-safe: each change replaces the frozen value at once.
+
+    Args:
+        first: the initial state.
+        on_change: called by `update` after each change; must only hand over.
+    """
+
+    def __init__(self, first: MonitorState, on_change: Callable[[], None]) -> None:
+        self._state = first
+        self._on_change = on_change
+        self._lock = threading.Lock()
+
+    def get(self) -> MonitorState:
+        """Returns the latest state."""
+        return self._state
+
+    def change(self, change: Callable[[MonitorState], MonitorState]) -> bool:
+        """Replaces the state without a report. Returns whether it is another object now."""
+        with self._lock:
+            before, self._state = self._state, change(self._state)
+            return self._state is not before
+
+    def update(self, change: Callable[[MonitorState], MonitorState]) -> None:
+        """Replaces the state and reports it. For one thread only: the reports are then in order."""
+        self.change(change)
+        self._on_change()

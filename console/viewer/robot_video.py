@@ -19,7 +19,7 @@ class RobotVideo:
         load: reads the stored credentials; by default there are none.
         pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; closed together with the session.
-        on_change: called after each change of the status, mostly in the worker's thread; must only hand over.
+        on_change: called after each change of the status, in the worker's thread; must only hand over.
 
     Raises:
         UserError: the target is not an address, or the credentials can't be used.

@@ -277,6 +277,16 @@ def test_a_request_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> No
         wait_until(lambda: robot.requests[-1] == DesiredPreview(False), "the next one")
 
 
+def test_changes_are_reported_by_one_thread_alone(robot: PlayedRobot) -> None:
+    threads: set[str] = set()
+    with following(robot, lambda: threads.add(threading.current_thread().name)) as worker:
+        reached(worker, LinkState.CONNECTED)
+        worker.switch(DesiredPreview(True))
+        assert worker.latest().request, "the request is in the state at once"
+        wait_until(lambda: robot.requests, "the request")
+    assert threads == {"gateway-worker"}
+
+
 def test_one_request_at_a_time(robot: PlayedRobot) -> None:
     robot.requests_hang = True
     with following(robot) as worker:
