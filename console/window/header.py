@@ -7,7 +7,15 @@ from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN, joined
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
-from console.window.labels import ElidedLabel, WrappedLabel, plain_label, scale_font, set_bold, set_text
+from console.window.labels import (
+    ElidedLabel,
+    WrappedLabel,
+    plain_label,
+    scale_font,
+    set_bold,
+    set_text,
+    set_tool_tip,
+)
 from console.window.lines import TintedLine
 from console.window.theme import DimLabel, Marker
 
@@ -42,7 +50,7 @@ class Header(QWidget):
             return
         status, health = state.snapshot.status, state.snapshot.status.health
         set_text(self.name, status.gateway_name or "robot")
-        self.target.setToolTip(f"Gateway {status.gateway_version or UNKNOWN}")
+        set_tool_tip(self.target, f"Gateway {status.gateway_version or UNKNOWN}")
         if state.outdated(now_s):
             last = joined(f"last known: {health.state.value.upper()}", health.summary)
             self.health.show_word(SeverityStyle.QUIET, "not known", last)

@@ -1,10 +1,11 @@
 """Labels that are updated ten times a second, and lay out only changed texts."""
 
+from html import escape
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 TOP: Final = Qt.AlignmentFlag.AlignTop
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -36,7 +37,7 @@ class ElidedLabel(QLabel):
     def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
         """Changes the text and the tool tip."""
         super().setText(text)
-        self.setToolTip(text)
+        set_tool_tip(self, text)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Draws the elided text."""
@@ -63,6 +64,11 @@ def set_text(label: QLabel, text: str) -> None:
     """Changes a text; laying out the same one again would cost time."""
     if label.text() != text:
         label.setText(text)
+
+
+def set_tool_tip(widget: QWidget, text: str) -> None:
+    """Changes a tool tip, as plain text: Qt itself takes a text that looks like markup for markup."""
+    widget.setToolTip(f"<span>{escape(text)}</span>" if text else "")
 
 
 def set_bold(label: QLabel, bold: bool) -> None:

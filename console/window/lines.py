@@ -12,7 +12,16 @@ from console.monitor.preview_controls import Note
 from console.monitor.status_rows import FaultLine
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
-from console.window.labels import RIGHT, TOP, WrappedLabel, plain_label, set_bold, set_text, width_of
+from console.window.labels import (
+    RIGHT,
+    TOP,
+    WrappedLabel,
+    plain_label,
+    set_bold,
+    set_text,
+    set_tool_tip,
+    width_of,
+)
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 
 _LONGEST_LABEL = "Computer battery"
@@ -167,4 +176,4 @@ class NoteLine(ItemLine):
         """Shows one note."""
         self.show_style(item.style, blank=not item.text)
         set_text(self.text, item.text)
-        self.text.setToolTip(item.text)
+        set_tool_tip(self.text, item.text)

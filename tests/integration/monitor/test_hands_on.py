@@ -3,19 +3,23 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QPushButton, QStyledItemDelegate, QWidget
 
 from console.client import PreviewProfile
+from console.monitor.event_log import EventLine, EventLog
+from console.window.event_list import EventList
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import PreviewPanel
 from console.window.programs import monitor
-from omniseer.gateway.v1 import preview_pb2
+from omniseer.gateway.v1 import preview_pb2, system_status_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
+from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
 from tests.support.qt import keep_picture, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
@@ -204,14 +208,31 @@ def test_closing_ends_everything_although_the_gateway_hangs(desk: None) -> None:
         gateway.hold.set()
 
 
-def test_what_the_robot_says_is_never_markup(desk_work: Desk) -> None:
-    text = "<h1>low</h1><img src='x'>"
-    desk_work.gateway.status.faults.add(
-        id="x", severity=3, component="<b>battery</b>", message=text, remedy="<a href='x'>y</a>", active=True
-    )
-    faults = desk_work.window.side.faults
-    until(lambda: text in faults.shown[0].message.text(), "the fault")
-    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText
+@pytest.mark.parametrize("state", [states.PREVIEW_DISABLED, states.PREVIEW_FAULTED])
+def test_what_the_robot_says_is_never_markup(desk_work: Desk, state: Any) -> None:
+    status = system_status_pb2.SystemStatus()
+    mark_up(status)
+    for fault in status.faults:
+        fault.severity, fault.active = 3, True
+    # An address that is none would be reported as this computer's own finding.
+    status.preview.endpoint.Clear()
+    status.preview.state = state
+    desk_work.gateway.status.CopyFrom(status)
+    window = desk_work.window
+    until(lambda: MARKUP in window.side.faults.shown[0].message.text(), "the fault")
+    until(desk_work.notes, "the robot's notes")
+    assert MARKUP in window.header.name.text()
+    assert MARKUP in shown_by_qt(window.header.target.toolTip())
+    assert any(MARKUP in shown_by_qt(line.text.toolTip()) for line in window.preview.notes.shown)
+    no_widget_takes_markup(window)
+    assert type(window.side.events.itemDelegate()) is QStyledItemDelegate, "Qt's own one draws plain text"
+
+
+def test_events_of_impossible_times_are_listed(desk: None) -> None:
+    events = EventList()
+    times_s = (1e19, -1e19, 1e308, 253_402_300_799.0)
+    events.show_log(EventLog().with_lines(EventLine(at_s, "gone far") for at_s in times_s))
+    assert events.lines[1:] == ["--:--:--  gone far"] * 3
 
 
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:

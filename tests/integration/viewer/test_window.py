@@ -15,6 +15,7 @@ from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
+from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
@@ -267,6 +268,17 @@ def test_stale_boxes_are_not_painted(tmp_path: Path) -> None:
         until(lambda: yellow_is_there(video), "the box")
         double.overlay.detections.stale = True
         until(lambda: not yellow_is_there(video), "no box")
+
+
+def test_what_the_robot_says_is_never_markup() -> None:
+    double = StreamingGatewayDouble()
+    mark_up(double.status)
+    double.status.preview.endpoint.Clear()
+    double.status.preview.state = states.PREVIEW_FAULTED
+    with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
+        until(lambda: MARKUP in view.notes.text(), "the robot's notes")
+        assert MARKUP in shown_by_qt(view.notes.toolTip())
+        no_widget_takes_markup(view)
 
 
 def yellow_is_there(widget: QWidget) -> bool:
