@@ -18,10 +18,6 @@ class StreamError(UserError):
         self.final = final
 
 
-class NoFrameError(StreamError):
-    """No frame came before the caller's timeout. The receiver goes on; asking again is fine."""
-
-
 class StreamEndedError(StreamError):
     """The robot ended the connection, or it was lost."""
 
@@ -68,9 +64,9 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
-def no_frame_within(address: StreamAddress, timeout_s: float) -> NoFrameError:
+def no_frame_within(address: StreamAddress, timeout_s: float) -> StreamError:
     """Returns the error of a timeout."""
-    return NoFrameError(
+    return StreamError(
         f"no frame from {address.uri} within {timeout_s:g} s",
         "Check robotctl status: is the preview RUNNING, does it encode frames, is a passphrase needed",
     )

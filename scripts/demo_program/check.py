@@ -9,12 +9,12 @@ from common.errors import UserError
 from console.client import GatewayClient, PreviewProfile, PreviewState, PreviewStatus, SystemStatus
 from console.client.results import Freshness
 from console.receiver.address import StreamAddress
-from console.receiver.receiver import Receiver
 from demo_program.ground import Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
 from simrobot.control import ask
 from tests.support.free import udp_port_is_free
+from tests.support.receiver import Receiver
 
 FRAMES: Final = 60
 _SPEEDS_MPS: Final = (0.8, 0.3)

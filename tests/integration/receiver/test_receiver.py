@@ -8,13 +8,12 @@ import pytest
 
 from console.receiver.address import StreamAddress
 from console.receiver.errors import (
-    NoFrameError,
     StreamEndedError,
     StreamRefusedError,
     UndecodableError,
 )
-from console.receiver.receiver import Receiver
 from tests.support.free import free_udp_port
+from tests.support.receiver import NoFrameError, Receiver
 from tests.support.streams import SrtSender, encode
 from tests.support.waiting import wait_until
 
