@@ -9,8 +9,8 @@ from console.presentation.formatting import UNKNOWN, joined
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
 from console.window.labels import (
     ElidedLabel,
+    PlainLabel,
     WrappedLabel,
-    plain_label,
     scale_font,
     set_bold,
     set_text,
@@ -29,8 +29,8 @@ class Header(QWidget):
 
     def __init__(self, target: str) -> None:
         super().__init__()
-        self.name, self.target = plain_label("robot"), DimLabel(target)
-        self.health, self.link = MarkedWord(), MarkedWord(plain_label())
+        self.name, self.target = PlainLabel("robot"), DimLabel(target)
+        self.health, self.link = MarkedWord(), MarkedWord(PlainLabel())
         set_bold(self.name, True)
         scale_font(self.name, 1.4)
         layout = QHBoxLayout(self)
@@ -67,7 +67,7 @@ class MarkedWord(QWidget):
 
     def __init__(self, detail: QLabel | None = None) -> None:
         super().__init__()
-        self.marker, self.word, self.detail = Marker(), plain_label(), detail or ElidedLabel()
+        self.marker, self.word, self.detail = Marker(), PlainLabel(), detail or ElidedLabel()
         set_bold(self.word, True)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -102,10 +102,10 @@ class ConnectionBanner(TintedLine):
         self.grid.setColumnStretch(1, 1)
         self.setVisible(False)
 
-    def show_link(self, link: LinkText) -> None:
+    def show_item(self, item: LinkText) -> None:
         """Shows the latest text."""
-        self.setVisible(bool(link.banner))
-        if link.banner:
-            self.show_style(link.style)
-            set_text(self.text, link.banner)
-            set_text(self.next_try, link.retry)
+        self.setVisible(bool(item.banner))
+        if item.banner:
+            self.show_style(item.style)
+            set_text(self.text, item.banner)
+            set_text(self.next_try, item.retry)

@@ -11,12 +11,19 @@ TOP: Final = Qt.AlignmentFlag.AlignTop
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
-class WrappedLabel(QLabel):
-    """Sentences from the robot, on as many lines as they need: selectable, never markup."""
+class PlainLabel(QLabel):
+    """Plain text, never markup: the base of all labels that show a robot's texts."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+
+
+class WrappedLabel(PlainLabel):
+    """Sentences on as many lines as they need; selectable."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setWordWrap(True)
         self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -26,12 +33,11 @@ class WrappedLabel(QLabel):
         return QSize(0, self.fontMetrics().height())
 
 
-class ElidedLabel(QLabel):
+class ElidedLabel(PlainLabel):
     """One line that is elided where there is little room; the tool tip has the whole text."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
@@ -46,16 +52,9 @@ class ElidedLabel(QLabel):
         painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, fitting)
 
 
-def plain_label(text: str = "") -> QLabel:
-    """Returns a label for one line of plain text."""
-    label = QLabel(text)
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    return label
-
-
 def width_of(text: str, *, bold: bool = False) -> int:
     """Returns the width of a text in the desktop's font, in pixels."""
-    label = plain_label(text)
+    label = PlainLabel(text)
     set_bold(label, bold)
     return label.sizeHint().width()
 

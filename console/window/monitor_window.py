@@ -4,7 +4,7 @@ import time
 from functools import partial
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QShortcut
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
@@ -15,6 +15,7 @@ from console.monitor.preview_controls import PROFILES, Controls, controls
 from console.monitor.worker import Worker
 from console.window.handover import ThreadHandover
 from console.window.header import ConnectionBanner, Header
+from console.window.keys import bind_keys
 from console.window.plot import Plots
 from console.window.preview_panel import PreviewPanel
 from console.window.side_panel import SidePanel
@@ -64,7 +65,7 @@ class MonitorWindow(QWidget):
         state, now_s = self._worker.latest(), time.monotonic()
         link = link_text(state.link, self._worker.target, now_s)
         self.header.show_state(state, link, now_s)
-        self.banner.show_link(link)
+        self.banner.show_item(link)
         self.preview.show_controls(self._controls(state, now_s))
         self.side.show_state(state, now_s)
 
@@ -104,12 +105,8 @@ class MonitorWindow(QWidget):
         self.preview.switched.connect(self._switch)
         self.preview.chosen.connect(self._choose)
         self.banner.retry.connect(self._worker.retry_now)
-        QShortcut("P", self, self._switch)
-        QShortcut("Q", self, self.close)
-        QShortcut("F11", self, self._toggle_full_screen)
-        QShortcut("Esc", self, self._leave_full_screen)
-        for key, profile in enumerate(PROFILES, start=1):
-            QShortcut(str(key), self, partial(self._choose, profile))
+        profiles = {str(key): partial(self._choose, profile) for key, profile in enumerate(PROFILES, start=1)}
+        bind_keys(self, {"P": self._switch, "Q": self.close, **profiles})
 
     def _tick(self) -> None:
         state, now_s = self._worker.latest(), time.monotonic()
@@ -139,13 +136,3 @@ class MonitorWindow(QWidget):
         else:
             self._selected = profile
         self.refresh()
-
-    def _toggle_full_screen(self) -> None:
-        if self.isFullScreen():
-            self.showNormal()
-        else:
-            self.showFullScreen()
-
-    def _leave_full_screen(self) -> None:
-        if self.isFullScreen():
-            self.showNormal()

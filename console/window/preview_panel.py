@@ -7,7 +7,7 @@ from console.client import PreviewProfile
 from console.monitor.preview_controls import PROFILES, Controls, Note
 from console.presentation.severity_style import SeverityStyle
 from console.window.header import MarkedWord
-from console.window.labels import plain_label
+from console.window.labels import PlainLabel
 from console.window.lines import LineList, NoteLine
 
 _TITLES = {
@@ -74,7 +74,7 @@ class PreviewPanel(QWidget):
     def _lay_out(self) -> None:
         row = QHBoxLayout()
         row.setSpacing(6)
-        row.addWidget(plain_label("Preview"))
+        row.addWidget(PlainLabel("Preview"))
         row.addWidget(self.state, 1)
         row.addWidget(self.switch)
         row.addSpacing(8)

@@ -1,7 +1,8 @@
 """Widget of the video: the latest frame, boxes around detections, and a banner while it is not live."""
 
 import time
-from typing import Final, Protocol
+from collections.abc import Callable
+from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
@@ -25,13 +26,6 @@ _VEIL: Final = QColor(0, 0, 0, 115)
 """Over a frame that is not live: at a glance it differs from live video of a still scene."""
 
 
-class OverlaySource(Protocol):
-    """Source of detections."""
-
-    def overlay(self) -> Overlay | None:
-        """Returns the latest detections, without waiting: the painting thread calls it."""
-
-
 class VideoView(QWidget):
     """Shows one session's video. Only the latest frame is kept, and nothing here blocks.
 
@@ -39,17 +33,18 @@ class VideoView(QWidget):
 
     Args:
         session: source of frames (in BGRx); its owner starts and closes it.
-        overlays: source of detections; None draws none.
+        overlay: returns the latest detections without waiting; the painting thread calls it.
     """
 
     painted = Signal()
     """A frame has just been painted for the first time."""
 
-    def __init__(self, session: VideoSession, overlays: OverlaySource | None = None) -> None:
+    def __init__(self, session: VideoSession, overlay: Callable[[], Overlay | None]) -> None:
         super().__init__()
         self._session = session
-        self._overlays = overlays
-        self._overlay_shown = True
+        self._overlay = overlay
+        self.overlay_shown = True
+        """Whether boxes are drawn."""
         self._ready: tuple[QImage, bytes] | None = None
         """The latest frame, and the memory of its pixels, which must live as long."""
         self._painted: tuple[QImage, bytes] | None = None
@@ -69,14 +64,9 @@ class VideoView(QWidget):
         """Returns the size of the usual frame."""
         return _USUAL_SIZE
 
-    @property
-    def overlay_shown(self) -> bool:
-        """Whether boxes are drawn."""
-        return self._overlay_shown
-
     def show_overlay(self, shown: bool) -> None:
         """Shows or hides the boxes."""
-        self._overlay_shown = shown
+        self.overlay_shown = shown
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
@@ -92,8 +82,8 @@ class VideoView(QWidget):
             image, _ = shown
             box = fitted(image.width(), image.height(), Box(0, 0, self.width(), self.height()))
             self._draw_frame(painter, image, box, live)
-            if self._overlays and self._overlay_shown and live:
-                draw_marks(painter, marks(self._overlays.overlay(), box, now_s))
+            if self.overlay_shown and live:
+                draw_marks(painter, marks(self._overlay(), box, now_s))
         if text := banner(playback):
             draw_banner(painter, QRectF(self.rect()), text, over_frame=shown is not None)
         painter.end()
