@@ -169,6 +169,6 @@ def _with_ipv4(address: StreamAddress) -> StreamAddress:
 def _undecodable(address: StreamAddress, content: str) -> UndecodableError:
     return UndecodableError(
         f"{address.uri} sends {content}, which this receiver can't decode",
-        "It takes H.264 and H.265 in an MPEG transport stream: is this the robot's preview port",
+        "Check that this is the robot's preview port: H.264 or H.265 in an MPEG transport stream is expected",
         final=True,
     )

@@ -44,7 +44,7 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
             f"{address.uri} did not accept the passphrase"
             if address.passphrase
             else f"{address.uri} asks for a passphrase",
-            "Take this session's from the endpoint that an authenticated client gets",
+            "Type: robotctl login. The robot gives each session's passphrase to authenticated clients only",
             final=True,
         )
     if had_data:
