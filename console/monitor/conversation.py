@@ -8,22 +8,7 @@ from dataclasses import replace
 from typing import Any, Final, NoReturn, Protocol
 
 from common.backoff import Backoff
-from console.client import (
-    CaughtUp,
-    Event,
-    EventGap,
-    EventPosition,
-    GatewayError,
-    NotAllowed,
-    NotTrusted,
-    Offset,
-    Outage,
-    OverlaySnapshot,
-    PreviewChange,
-    PreviewProfile,
-    Unsupported,
-    WatchedStatus,
-)
+from console.client import GatewayError, NotAllowed, NotTrusted, Offset, Outage, Unsupported, results
 from console.monitor.event_log import EventLine, line_of
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import DesiredPreview, LatestState
@@ -47,26 +32,26 @@ class RobotClient(Protocol):
 
     def watch_status(
         self, min_interval_s: float = ..., *, include_detections: bool = ...
-    ) -> AsyncGenerator[WatchedStatus | Outage]:
+    ) -> AsyncGenerator[results.WatchedStatus | Outage]:
         """Streams the status with its detections."""
 
     async def ping(self) -> Offset:
         """Makes the lightest call there is."""
 
-    async def overlay(self) -> OverlaySnapshot:
+    async def overlay(self) -> results.OverlaySnapshot:
         """Returns status, detections and the newest events."""
 
     def events(
-        self, after: EventPosition | None = ...
-    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        self, after: results.EventPosition | None = ...
+    ) -> AsyncIterator[results.Event | results.EventGap | results.CaughtUp | Outage]:
         """Streams events, each one once."""
 
     async def enable_preview(
-        self, profile: PreviewProfile = ..., *, settle_within_s: float = ...
-    ) -> PreviewChange:
+        self, profile: results.PreviewProfile = ..., *, settle_within_s: float = ...
+    ) -> results.PreviewChange:
         """Turns the preview on, or changes its profile."""
 
-    async def disable_preview(self, *, settle_within_s: float = ...) -> PreviewChange:
+    async def disable_preview(self, *, settle_within_s: float = ...) -> results.PreviewChange:
         """Turns the preview off."""
 
 
@@ -154,7 +139,7 @@ class Conversation:
 
     async def _stream_events(self) -> None:
         """Logs each event once. A gateway that can't stream them lists the newest in its snapshots."""
-        position: EventPosition | None = None
+        position: results.EventPosition | None = None
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while True:
             try:
@@ -180,7 +165,7 @@ class Conversation:
             request = self._latest.get().request
             assert request is not None
             try:
-                outcome: PreviewChange | GatewayError = await self._set_preview(request.desired)
+                outcome: results.PreviewChange | GatewayError = await self._set_preview(request.desired)
             except GatewayError as error:
                 outcome = error
             done = replace(request, outcome=outcome, ended_s=time.monotonic())
@@ -201,7 +186,7 @@ class Conversation:
                     return
                 # The first one comes at once: how long it took is an answer's time, like a ping's later.
                 answer_ms = self._latest.get().link.answer_ms or (time.monotonic() - asked_s) * _MS_PER_S
-                snapshot = OverlaySnapshot(status=item.status, detections=item.detections, events=())
+                snapshot = results.OverlaySnapshot(status=item.status, detections=item.detections, events=())
                 self._on_snapshot(snapshot, answer_ms)
 
     async def _poll(self) -> NoReturn:
@@ -225,7 +210,7 @@ class Conversation:
             link = replace(self._latest.get().link, answer_ms=(now_s - asked_s) * _MS_PER_S)
             self._latest.update(lambda state: replace(state, link=link, heard_s=now_s))  # noqa: B023 - called at once
 
-    async def _set_preview(self, desired: DesiredPreview) -> PreviewChange:
+    async def _set_preview(self, desired: DesiredPreview) -> results.PreviewChange:
         if desired.enabled:
             return await self._robot.client.enable_preview(desired.profile, settle_within_s=0)
         return await self._robot.client.disable_preview(settle_within_s=0)
@@ -241,7 +226,7 @@ class Conversation:
             if await self._robot.refresh() or self._retry_now.is_set() or time.monotonic() >= ends_s:
                 return
 
-    def _on_snapshot(self, snapshot: OverlaySnapshot, answer_ms: float) -> None:
+    def _on_snapshot(self, snapshot: results.OverlaySnapshot, answer_ms: float) -> None:
         self._answering.set()
         self._retry.reset()
         now_s, before = time.monotonic(), self._latest.get().link

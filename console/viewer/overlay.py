@@ -46,15 +46,11 @@ def marks(overlay: Overlay | None, frame: Box, now_s: float) -> list[Mark]:
         return []
     drawn = []
     for item in found.items:
-        box = on_frame(_box(item), found.source_width_px, found.source_height_px, frame)
-        if box:
-            drawn.append(Mark(box, _label(item)))
+        left, top = item.center_x_px - item.width_px / 2, item.center_y_px - item.height_px / 2
+        box = Box(left, top, item.width_px, item.height_px)
+        if visible := on_frame(box, found.source_width_px, found.source_height_px, frame):
+            drawn.append(Mark(visible, _label(item)))
     return drawn
-
-
-def _box(item: Detection) -> Box:
-    left, top = item.center_x_px - item.width_px / 2, item.center_y_px - item.height_px / 2
-    return Box(left, top, item.width_px, item.height_px)
 
 
 def _label(item: Detection) -> str:

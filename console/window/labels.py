@@ -5,7 +5,7 @@ from typing import Final
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QWidget
 
 TOP: Final = Qt.AlignmentFlag.AlignTop
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -59,7 +59,7 @@ def width_of(text: str, *, bold: bool = False) -> int:
     return label.sizeHint().width()
 
 
-def set_text(label: QLabel, text: str) -> None:
+def set_text(label: QLabel | QPushButton, text: str) -> None:
     """Changes a text; laying out the same one again would cost time."""
     if label.text() != text:
         label.setText(text)
