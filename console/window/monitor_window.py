@@ -5,7 +5,7 @@ from functools import partial
 
 from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
 from console.monitor.history import NOTHING, History, values_of
@@ -91,9 +91,7 @@ class MonitorWindow(QWidget):
         self.splitter.setStretchFactor(1, 0)
         self.splitter.setSizes(_FIRST_DIVISION)
         whole = QVBoxLayout(self)
-        top = QHBoxLayout()
-        top.addWidget(self.header, 1)
-        whole.addLayout(top)
+        whole.addWidget(self.header)
         whole.addWidget(self.banner)
         whole.addWidget(self.splitter, 1)
 

@@ -59,7 +59,9 @@ def monitor(target: str, load: LoadCredentials | None = None) -> Iterator[Monito
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
     robot = RobotVideo(target, load, on_change=changes.post)
-    window = MonitorWindow(robot.worker, changes, VideoView(robot.session, robot.overlay), WindowSettings())
+    window = MonitorWindow(
+        robot.worker, changes, VideoView(robot.session, robot.detections), WindowSettings()
+    )
     with _open(window, robot):
         yield window
 
@@ -71,7 +73,7 @@ def viewing(
     """Opens the window of the video with its background threads; closes them at the end of the block."""
     robot = RobotVideo(target, load, recording=recording)
     robot.session.add_frame_listener(counter.count)
-    window = ViewWindow(robot, VideoView(robot.session, robot.overlay))
+    window = ViewWindow(robot, VideoView(robot.session, robot.detections))
     with _open(window, robot):
         yield window
 

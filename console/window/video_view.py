@@ -1,6 +1,5 @@
 """Widget of the video: the latest frame, boxes around detections, and a banner while it is not live."""
 
-import time
 from collections.abc import Callable
 from typing import Final
 
@@ -8,10 +7,11 @@ from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from console.client.results import Detections
 from console.receiver.frame import Frame
 from console.viewer.formatting import Banner, banner
 from console.viewer.geometry import Box, fitted
-from console.viewer.overlay import Overlay, marks
+from console.viewer.overlay import marks
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from console.window.handover import ThreadHandover
@@ -33,16 +33,16 @@ class VideoView(QWidget):
 
     Args:
         session: source of frames (in BGRx); its owner starts and closes it.
-        overlay: returns the latest detections without waiting; the painting thread calls it.
+        detections: returns the latest ones without waiting; the painting thread calls it.
     """
 
     painted = Signal()
     """A frame has just been painted for the first time."""
 
-    def __init__(self, session: VideoSession, overlay: Callable[[], Overlay | None]) -> None:
+    def __init__(self, session: VideoSession, detections: Callable[[], Detections | None]) -> None:
         super().__init__()
         self._session = session
-        self._overlay = overlay
+        self._detections = detections
         self.overlay_shown = True
         """Whether boxes are drawn."""
         self._ready: tuple[QImage, bytes] | None = None
@@ -71,7 +71,7 @@ class VideoView(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paints frame, boxes and banner."""
-        now_s, playback = time.monotonic(), self._session.playback()
+        playback = self._session.playback()
         live = playback.state is PlaybackState.LIVE
         # No frame is shown once the session has dropped its latest one.
         shown = self._ready if self._session.latest_frame() else None
@@ -83,7 +83,7 @@ class VideoView(QWidget):
             box = fitted(image.width(), image.height(), Box(0, 0, self.width(), self.height()))
             self._draw_frame(painter, image, box, live)
             if self.overlay_shown and live:
-                draw_marks(painter, marks(self._overlay(), box, now_s))
+                draw_marks(painter, marks(self._detections(), box))
         if text := banner(playback):
             draw_banner(painter, QRectF(self.rect()), text, over_frame=shown is not None)
         painter.end()
