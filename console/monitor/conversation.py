@@ -220,9 +220,10 @@ class Conversation:
         self._retry_now.clear()
         ends_s = time.monotonic() + pause_s
         while True:
+            left_s = max(0.0, min(ends_s - time.monotonic(), _CREDENTIAL_POLL_S))
             with suppress(TimeoutError):
-                left_s = max(0.0, min(ends_s - time.monotonic(), _CREDENTIAL_POLL_S))
-                await asyncio.wait_for(self._retry_now.wait(), left_s)
+                async with asyncio.timeout(left_s):
+                    await self._retry_now.wait()
             if await self._robot.refresh() or self._retry_now.is_set() or time.monotonic() >= ends_s:
                 return
 
