@@ -128,7 +128,13 @@ class Conversation:
         """Follows the status; while none comes, retries after a pause."""
         while True:
             try:
-                await first_to_end(self._watch(), self._measure_round_trip())
+                try:
+                    await first_to_end(self._watch(), self._measure_round_trip())
+                except NotAllowed:
+                    # The end of an open stream says less about the login than the refusal of a call.
+                    if self._answering.is_set():
+                        await self._robot.client.ping()
+                    raise
                 # Only a gateway that is too old to stream its status with detections gets here.
                 await self._poll()
             except GatewayError as error:

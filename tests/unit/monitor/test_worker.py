@@ -236,6 +236,15 @@ def test_a_gateway_that_answers_no_ping_is_lost_although_its_stream_is_open() ->
         wait_until(lambda: robot.watching == 0, "its stream is closed")
 
 
+def test_a_stream_that_ends_because_of_the_login_is_explained_by_a_call() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        reached(worker, LinkState.CONNECTED)
+        robot.ping_error = NotAllowed("the token of anna was revoked")
+        robot.error = NotAllowed("the credential that opened this stream is no longer valid")
+        assert reached(worker, LinkState.LOST).link.error is robot.ping_error
+
+
 def test_the_operator_need_not_wait_for_the_next_attempt(robot: PlayedRobot) -> None:
     robot.error = Unreachable("gone")
     with following(robot, pause_s=NEVER_S) as worker:
