@@ -100,7 +100,7 @@ def _window(robot: product.Robot) -> Iterator[VideoView]:
     _app = QApplication.instance() or QApplication(["bench"])
     session = VideoSession()
     session.start()
-    view = VideoView(session)
+    view = VideoView(session, lambda: None)
     try:
         view.resize(WIDTH_PX, HEIGHT_PX)
         view.show()

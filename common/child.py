@@ -8,16 +8,20 @@ from typing import Final
 _PR_SET_PDEATHSIG: Final = 1
 
 
-def end_with_parent(at_most_s: int) -> None:
+def end_with_parent(at_most_s: int, parent: int | None = None) -> None:
     """Makes the kernel kill this process when the thread that started it ends, or after `at_most_s` seconds.
 
     Must be called first. Both limits work while the interpreter is stuck in native code: prctl(2)
     PR_SET_PDEATHSIG sends SIGKILL, and alarm(2) SIGALRM, whose default action ends the process.
 
+    Args:
+        at_most_s: lifetime in seconds.
+        parent: process ID of the one that started it; None trusts that it still runs.
+
     Raises:
         OSError: the kernel refuses the parent-death signal.
     """
-    parent = os.getppid()
+    parent = parent or os.getppid()
     signal.alarm(at_most_s)
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL):

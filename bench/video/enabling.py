@@ -5,10 +5,10 @@ import time
 from pathlib import Path
 
 from bench.rows import Row
-from bench.video import product, stamp
+from bench.video import product
 from bench.video.camera import camera
 from bench.video.progress import tell
-from bench.video.viewing import PATIENCE_S
+from bench.video.viewing import PATIENCE_S, capture_time
 
 ROUNDS = 7
 LATENCY_MS = 125
@@ -36,7 +36,7 @@ def _once(robot: product.Robot) -> float:
         answered_s = time.monotonic()
         with robot.viewer() as viewer:
             frame = viewer.next_frame(PATIENCE_S)
-    captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
+    captured_s = capture_time(frame)
     steps = [
         ("SetPreviewMode answered, preview RUNNING, viewer calls", answered_s),
         ("first frame captured", captured_s),

@@ -7,8 +7,8 @@ import time
 from bench.video.viewing import Glance, watch
 from common.backoff import Backoff
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoFrameError, StreamError
-from console.receiver.receiver import Receiver
+from console.receiver.errors import StreamError
+from tests.support.receiver import NoFrameError, Receiver
 
 
 def main() -> None:

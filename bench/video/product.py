@@ -13,8 +13,8 @@ from bench.video import foreign
 from bench.video.camera import Camera
 from console.client import GatewayClient, PreviewProfile, PreviewState, Unreachable
 from console.receiver.address import StreamAddress
-from console.receiver.receiver import Receiver
 from tests.support.free import free_tcp_port, free_udp_port
+from tests.support.receiver import Receiver
 
 _UP_WITHIN_S = 20.0
 _PROGRAMS = Path(sys.executable).parent

@@ -4,6 +4,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
@@ -11,7 +12,7 @@ from bench.video import foreign
 from bench.video.camera import HEIGHT_PX, WIDTH_PX, Camera
 from common.gst import Gst
 from console.receiver.errors import StreamEndedError
-from console.receiver.frame import Frame, Plane
+from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 
 PLAIN_X264 = "x264enc tune=zerolatency speed-preset=veryfast bitrate=2500 key-int-max=30"
@@ -65,8 +66,6 @@ class PlainViewer:
     def _on_sample(self, sink: Any) -> Any:
         arrival_s = time.monotonic()
         buffer = sink.emit("pull-sample").get_buffer()
-        luma, chroma = Plane(0, WIDTH_PX, HEIGHT_PX), Plane(0, 0, 0)
-        self._queue.put(
-            Frame(WIDTH_PX, HEIGHT_PX, "h264", None, arrival_s, False, (luma, chroma, chroma), buffer)
-        )
+        luma = partial(buffer.extract_dup, 0, WIDTH_PX * HEIGHT_PX)
+        self._queue.put(Frame(WIDTH_PX, HEIGHT_PX, "h264", None, arrival_s, False, WIDTH_PX, luma))
         return Gst.FlowReturn.OK

@@ -39,13 +39,19 @@ class Glance:
         return (self.decoded_s - self.captured_s) * 1000
 
 
+def capture_time(frame: Frame) -> float | None:
+    """When it was captured, on `time.monotonic()`; None when its stamp can't be read."""
+    middle = stamp.BLOCK_PX // 2 * frame.stride
+    return stamp.read(frame.read()[middle : middle + frame.stride])
+
+
 def watch(viewer: Viewer, seconds: float) -> list[Glance]:
     """What comes in the next `seconds`; frames whose stamp can't be read are left out."""
     until_s = time.monotonic() + seconds
     glances = []
     while time.monotonic() < until_s:
         frame = viewer.next_frame(PATIENCE_S)
-        captured_s = stamp.read(frame.luma_rows(stamp.BLOCK_PX // 2, 1))
+        captured_s = capture_time(frame)
         if captured_s is not None:
             glances.append(Glance(captured_s, frame.arrival_s, frame.corrupt))
     return glances

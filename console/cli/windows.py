@@ -73,11 +73,11 @@ def view(
             from console.window.programs import run_view  # noqa: PLC0415 - Qt is needed here only
     # A login that can't be used is reported before a file is made.
     session.credentials()
-    recording = Recording(record) if record else None
     if headless:
+        recording = Recording(record) if record else None
         summary = _view_headless(session, address, frames, patience_s, recording)
     else:
-        summary = run_view(address, recording, session.credentials)
+        summary, recording = run_view(address, record, session.credentials)
     if session.as_json:
         print_json(session.out, json_form(summary))
     elif headless or recording:

@@ -1,6 +1,6 @@
 """The asyncio client. The blocking one (blocking.py) is a facade over it."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from typing import Self
 
 from console.client import results
@@ -110,7 +110,7 @@ class AsyncGatewayClient:
 
     def watch_status(
         self, min_interval_s: float = 0.1, *, include_detections: bool = False
-    ) -> AsyncIterator[results.WatchedStatus | Outage]:
+    ) -> AsyncGenerator[results.WatchedStatus | Outage]:
         """Yields the status at once, on every change, and once a second without one. Never ends.
 
         A slow reader gets the newest next. A broken connection is made again; meanwhile an `Outage` comes
@@ -130,7 +130,7 @@ class AsyncGatewayClient:
         after: results.EventPosition | None = None,
         *,
         least: results.FaultSeverity = results.FaultSeverity.UNKNOWN,
-    ) -> AsyncIterator[results.Event | results.EventGap | results.CaughtUp | Outage]:
+    ) -> AsyncGenerator[results.Event | results.EventGap | results.CaughtUp | Outage]:
         """Yields each event once and in order; events that are not available any more, as an `EventGap`.
 
         `CaughtUp` comes after the last past event, and then as a keepalive. Every item but an `Outage` has

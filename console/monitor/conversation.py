@@ -2,34 +2,31 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Coroutine
+from contextlib import aclosing, suppress
 from dataclasses import replace
-from typing import Final, Protocol
+from typing import Any, Final, NoReturn, Protocol
 
 from common.backoff import Backoff
 from console.client import (
-    CaughtUp,
     DesiredPreview,
-    Event,
-    EventGap,
-    EventPosition,
     GatewayError,
     NotAllowed,
     NotTrusted,
+    Offset,
     Outage,
-    OverlaySnapshot,
-    PreviewChange,
-    PreviewProfile,
     Unsupported,
+    results,
 )
 from console.monitor.event_log import EventLine, line_of
-from console.monitor.latest_value import LatestValue
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import MonitorState
+from console.monitor.monitor_state import LatestState
 from console.monitor.snapshot_events import SnapshotEvents
 
-POLL_S: Final = 0.1
-"""Period of the status: boxes over the video are at most so much older than they need be."""
+STATUS_INTERVAL_S: Final = 0.1
+"""Least time between two statuses: boxes over the video are at most so much older than they need be."""
+_PING_S: Final = 0.5
+"""Period of measuring the round trip. An answer also shows that the latest status still holds."""
 _CREDENTIAL_POLL_S: Final = 0.5
 """Period, while the robot does not answer, of checking for other stored credentials."""
 _FIRST_PAUSE_S: Final = 0.5
@@ -42,21 +39,26 @@ _MS_PER_S: Final = 1000
 class RobotClient(Protocol):
     """The calls of `console.client.AsyncGatewayClient` that the monitor makes."""
 
-    async def overlay(self) -> OverlaySnapshot:
+    def watch_status(
+        self, min_interval_s: float = ..., *, include_detections: bool = ...
+    ) -> AsyncGenerator[results.WatchedStatus | Outage]:
+        """Streams the status with its detections."""
+
+    async def ping(self) -> Offset:
+        """Makes the lightest call there is."""
+
+    async def overlay(self) -> results.OverlaySnapshot:
         """Returns status, detections and the newest events."""
 
     def events(
-        self, after: EventPosition | None = ...
-    ) -> AsyncIterator[Event | EventGap | CaughtUp | Outage]:
+        self, after: results.EventPosition | None = ...
+    ) -> AsyncIterator[results.Event | results.EventGap | results.CaughtUp | Outage]:
         """Streams events, each one once."""
 
-    async def enable_preview(
-        self, profile: PreviewProfile = ..., *, settle_within_s: float = ...
-    ) -> PreviewChange:
-        """Turns the preview on, or changes its profile."""
-
-    async def disable_preview(self, *, settle_within_s: float = ...) -> PreviewChange:
-        """Turns the preview off."""
+    async def set_preview(
+        self, desired: DesiredPreview, *, settle_within_s: float = ...
+    ) -> results.PreviewChange:
+        """Turns the preview on or off, or changes its profile."""
 
 
 class RobotSession(Protocol):
@@ -96,23 +98,22 @@ class RetryBackoff:
 
 
 class Conversation:
-    """Polls the status, streams events, sends requests. Belongs to the loop that made it.
+    """Follows the status, streams events, sends requests. Belongs to the loop that runs it.
 
     Args:
-        robot: the robot's client.
         latest: takes every change of the state.
         retry: the pauses between attempts; they never end by themselves.
     """
 
-    def __init__(self, robot: RobotSession, latest: LatestValue[MonitorState], retry: RetryBackoff) -> None:
-        self._robot = robot
+    _robot: RobotSession
+
+    def __init__(self, latest: LatestState, retry: RetryBackoff) -> None:
         self._latest = latest
         self._retry = retry
         self._snapshot_events: SnapshotEvents | None = None
         self._answering = asyncio.Event()
         self._retry_now = asyncio.Event()
         self._requested = asyncio.Event()
-        self._poll_now = asyncio.Event()
 
     def retry_now(self) -> None:
         """Ends the pause before the next attempt."""
@@ -122,26 +123,35 @@ class Conversation:
         """Sends the pending request of the state."""
         self._requested.set()
 
-    async def poll_status(self) -> None:
-        """Polls snapshots; while none comes, retries after a pause."""
+    async def run(self, robot: RobotSession) -> None:
+        """Runs until cancelled. Raises only what is a defect of our own."""
+        self._robot = robot
+        async with asyncio.TaskGroup() as tasks:
+            for part in (self._follow_status(), self._stream_events(), self._serve_requests()):
+                tasks.create_task(part)
+
+    async def _follow_status(self) -> None:
+        """Follows the status; while none comes, retries after a pause."""
         while True:
             try:
-                self._poll_now.clear()
-                asked_s = time.monotonic()
-                snapshot = await self._robot.client.overlay()
-                took_s = time.monotonic() - asked_s
-                self._on_snapshot(snapshot, took_s * _MS_PER_S)
-                # After a slow answer the next poll follows at once; missed ones are not made up for.
-                await _pause(POLL_S - took_s, self._poll_now)
+                try:
+                    await first_to_end(self._watch(), self._measure_round_trip())
+                except NotAllowed:
+                    # The end of an open stream says less about the login than the refusal of a call.
+                    if self._answering.is_set():
+                        await self._robot.client.ping()
+                    raise
+                # Only a gateway that is too old to stream its status with detections gets here.
+                await self._poll()
             except GatewayError as error:
                 pause_s = self._retry.next_s(error)
                 self._on_error(error, pause_s)
                 await self._wait_to_retry(pause_s)
                 self._latest.update(lambda state: replace(state, link=replace(state.link, next_try_s=None)))
 
-    async def stream_events(self) -> None:
+    async def _stream_events(self) -> None:
         """Logs each event once. A gateway that can't stream them lists the newest in its snapshots."""
-        position: EventPosition | None = None
+        position: results.EventPosition | None = None
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while True:
             try:
@@ -159,7 +169,7 @@ class Conversation:
                 await asyncio.sleep(backoff.next_s())
                 await self._answering.wait()
 
-    async def serve_requests(self) -> None:
+    async def _serve_requests(self) -> None:
         """Sends requests, one at a time; their effect on the preview shows in the next snapshots."""
         while True:
             await self._requested.wait()
@@ -167,34 +177,74 @@ class Conversation:
             request = self._latest.get().request
             assert request is not None  # noqa: S101  # set before the event is
             try:
-                outcome: PreviewChange | GatewayError = await self._set_preview(request.desired)
+                outcome: results.PreviewChange | GatewayError = await self._robot.client.set_preview(
+                    request.desired, settle_within_s=0
+                )
             except GatewayError as error:
                 outcome = error
             done = replace(request, outcome=outcome, ended_s=time.monotonic())
-            self._latest.update(lambda state: replace(state, request=done))  # noqa: B023 - called at once
-            self._poll_now.set()
+            self._latest.update(lambda state: state.with_outcome(done))  # noqa: B023 - called at once
 
-    async def _set_preview(self, desired: DesiredPreview) -> PreviewChange:
-        if desired.enabled:
-            return await self._robot.client.enable_preview(desired.profile, settle_within_s=0)
-        return await self._robot.client.disable_preview(settle_within_s=0)
+    async def _watch(self) -> None:
+        """Streams the status. Returns if the gateway is too old to stream it with its detections.
+
+        An outage is an error here: the operator sees when the next attempt is, and need not wait for it.
+        """
+        asked_s = time.monotonic()
+        watched = self._robot.client.watch_status(STATUS_INTERVAL_S, include_detections=True)
+        async with aclosing(watched):
+            async for item in watched:
+                if isinstance(item, Outage):
+                    raise item.error
+                if item.detections is None:
+                    return
+                # The first one comes at once: how long it took is an answer's time, like a ping's later.
+                answer_ms = self._latest.get().link.answer_ms or (time.monotonic() - asked_s) * _MS_PER_S
+                snapshot = results.OverlaySnapshot(status=item.status, detections=item.detections, events=())
+                self._on_snapshot(snapshot, answer_ms)
+
+    async def _poll(self) -> NoReturn:
+        """Polls the status of an older gateway."""
+        while True:
+            asked_s = time.monotonic()
+            snapshot = await self._robot.client.overlay()
+            took_s = time.monotonic() - asked_s
+            self._on_snapshot(snapshot, took_s * _MS_PER_S)
+            # After a slow answer the next poll follows at once; missed ones are not made up for.
+            await asyncio.sleep(max(0.0, STATUS_INTERVAL_S - took_s))
+
+    async def _measure_round_trip(self) -> NoReturn:
+        """Pings the gateway while it streams its status."""
+        await self._answering.wait()
+        while True:
+            await asyncio.sleep(_PING_S)
+            asked_s = time.monotonic()
+            await self._robot.client.ping()
+            now_s = time.monotonic()
+            link = replace(self._latest.get().link, answer_ms=(now_s - asked_s) * _MS_PER_S)
+            self._latest.update(lambda state: replace(state, link=link, heard_s=now_s))  # noqa: B023 - called at once
 
     async def _wait_to_retry(self, pause_s: float) -> None:
         """Waits for the end of the pause, the operator's request, or other stored credentials."""
         self._retry_now.clear()
         ends_s = time.monotonic() + pause_s
         while True:
-            await _pause(min(ends_s - time.monotonic(), _CREDENTIAL_POLL_S), self._retry_now)
+            left_s = max(0.0, min(ends_s - time.monotonic(), _CREDENTIAL_POLL_S))
+            with suppress(TimeoutError):
+                async with asyncio.timeout(left_s):
+                    await self._retry_now.wait()
             if await self._robot.refresh() or self._retry_now.is_set() or time.monotonic() >= ends_s:
                 return
 
-    def _on_snapshot(self, snapshot: OverlaySnapshot, answer_ms: float) -> None:
+    def _on_snapshot(self, snapshot: results.OverlaySnapshot, answer_ms: float) -> None:
         self._answering.set()
         self._retry.reset()
         now_s, before = time.monotonic(), self._latest.get().link
         since_s = before.since_s if before.state is LinkState.CONNECTED else now_s
         link = Link(state=LinkState.CONNECTED, since_s=since_s, answer_ms=answer_ms)
-        self._latest.update(lambda state: replace(state, link=link, snapshot=snapshot, received_s=now_s))
+        self._latest.update(
+            lambda state: replace(state, link=link, snapshot=snapshot, received_s=now_s, heard_s=now_s)
+        )
         if self._snapshot_events and (lines := self._snapshot_events.new_lines(snapshot)):
             self._log(lines)
 
@@ -204,7 +254,7 @@ class Conversation:
         before = state.link
         link = Link(
             state=LinkState.LOST,
-            since_s=state.received_s if before.state is LinkState.CONNECTED else before.since_s,
+            since_s=state.heard_s if before.state is LinkState.CONNECTED else before.since_s,
             error=error,
             attempts=before.attempts + 1,
             next_try_s=time.monotonic() + pause_s,
@@ -215,10 +265,14 @@ class Conversation:
         self._latest.update(lambda state: replace(state, events=state.events.with_lines(lines)))
 
 
-async def _pause(seconds: float, unless: asyncio.Event) -> None:
-    """Sleeps; ends early when the event is set."""
+async def first_to_end(*parts: Coroutine[Any, Any, object]) -> None:
+    """Runs coroutines until one ends, then cancels the others. Raises the error of the one that ended."""
+    tasks = [asyncio.create_task(part) for part in parts]
     try:
-        async with asyncio.timeout(max(0.0, seconds)):
-            await unless.wait()
-    except TimeoutError:
-        pass
+        ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in ended:
+            task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -68,7 +68,10 @@ def line_of(item: Event | EventGap | CaughtUp | Outage, now_s: float) -> EventLi
             style = _STYLES.get(item.severity, SeverityStyle.QUIET)
             return EventLine(item.wall_clock_unix_ms / _MS_PER_S, _text(item), style)
         case EventGap():
-            return EventLine(now_s, _gap_text(item), SeverityStyle.WARNING, own=True)
+            text = "The gateway was restarted: its events begin anew"
+            if item.reason is not GapReason.NEW_RUN:
+                text = f"{plural(item.missed_count, 'event')} missed: more came than the gateway keeps"
+            return EventLine(now_s, text, SeverityStyle.WARNING, own=True)
         case CaughtUp() | Outage():
             # The window's header shows the state of the connection.
             return None
@@ -83,9 +86,3 @@ def _text(event: Event) -> str:
     # The message may contain its own prefix.
     prefix = [word for word in (severity, event.component) if word and word not in event.message]
     return ": ".join([*prefix, event.message])
-
-
-def _gap_text(gap: EventGap) -> str:
-    if gap.reason is GapReason.NEW_RUN:
-        return "The gateway was restarted: its events begin anew"
-    return f"{plural(gap.missed_count, 'event')} missed: more came than the gateway keeps"

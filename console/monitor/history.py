@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from console.client import SystemStatus
-from console.client.results import Sample
+from console.client.results import Freshness
 
 SPAN_S: Final = 120.0
 STEP_S: Final = 0.5
@@ -46,9 +46,12 @@ NOTHING: Final[Values] = (None,) * len(METRICS)
 def values_of(status: SystemStatus) -> Values:
     """Returns the metrics of one status; stale ones are None."""
     measured, compute = status.preview.measured, status.platform.compute
-    video = (measured.fps, measured.bitrate_kbps, measured.worst_rtt_ms) if _fresh(measured) else (None,) * 3
-    computer = (compute.cpu_percent, compute.cpu_temperature_c) if _fresh(compute) else (None,) * 2
-    return (*video, *computer)
+    video = (measured.fps, measured.bitrate_kbps, measured.worst_rtt_ms)
+    computer = (compute.cpu_percent, compute.cpu_temperature_c)
+    return (
+        *(video if measured.freshness is Freshness.FRESH else (None,) * 3),
+        *(computer if compute.freshness is Freshness.FRESH else (None,) * 2),
+    )
 
 
 class History:
@@ -83,7 +86,3 @@ def top_of_scale(metric: Metric, series: Sequence[float | None]) -> float:
             if step * digit >= highest:
                 return step * digit
         step *= 10
-
-
-def _fresh(sample: Sample) -> bool:
-    return sample.available and not sample.stale

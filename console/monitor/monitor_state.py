@@ -1,6 +1,8 @@
 """State of the monitor window, as one frozen value that a thread can hand to another."""
 
-from dataclasses import dataclass, field
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 from console.client import DesiredPreview, GatewayError, OverlaySnapshot, PreviewChange
 from console.monitor.event_log import EventLog
@@ -41,6 +43,8 @@ class MonitorState:
         received_s: when it came, on the monotonic clock.
         request: the latest request; None before the first.
         events: the log of events.
+        heard_s: when the robot last answered anything, on the monotonic clock. It streams its status on every
+            change, so that an answer of any kind shows that the snapshot still holds.
     """
 
     link: Link
@@ -48,6 +52,14 @@ class MonitorState:
     received_s: float = 0.0
     request: PreviewRequest | None = None
     events: EventLog = field(default_factory=EventLog)
+    heard_s: float = 0.0
+
+    def with_outcome(self, ended: PreviewRequest) -> "MonitorState":
+        """Returns the state after the end of the request; it carries the preview's newest status."""
+        snapshot, outcome = self.snapshot, ended.outcome
+        if snapshot and isinstance(outcome, PreviewChange) and outcome.accepted:
+            snapshot = replace(snapshot, status=replace(snapshot.status, preview=outcome.preview))
+        return replace(self, request=ended, snapshot=snapshot)
 
     def snapshot_age_ms(self, now_s: float) -> int:
         """Returns the time since the snapshot came; to be added to the ages in it."""
@@ -56,3 +68,32 @@ class MonitorState:
     def outdated(self, now_s: float) -> bool:
         """Whether the snapshot is too old, or its connection lost, to count as the robot's present state."""
         return self.link.state is not LinkState.CONNECTED or self.snapshot_age_ms(now_s) > _OUTDATED_AFTER_MS
+
+
+class LatestState:
+    """The latest state. Thread-safe: each change replaces the frozen value at once.
+
+    Args:
+        first: the initial state.
+        on_change: called by `update` after each change; must only hand over.
+    """
+
+    def __init__(self, first: MonitorState, on_change: Callable[[], None]) -> None:
+        self._state = first
+        self._on_change = on_change
+        self._lock = threading.Lock()
+
+    def get(self) -> MonitorState:
+        """Returns the latest state."""
+        return self._state
+
+    def change(self, change: Callable[[MonitorState], MonitorState]) -> bool:
+        """Replaces the state without a report. Returns whether it is another object now."""
+        with self._lock:
+            before, self._state = self._state, change(self._state)
+            return self._state is not before
+
+    def update(self, change: Callable[[MonitorState], MonitorState]) -> None:
+        """Replaces the state and reports it. For one thread only: the reports are then in order."""
+        self.change(change)
+        self._on_change()

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 
 from console.client import OverlaySnapshot
-from console.client.results import OperatorEvent
 from console.monitor.event_log import EventLine
 from console.presentation.formatting import plural
 
@@ -37,7 +36,7 @@ class SnapshotEvents:
                 lines.append(
                     self._own(f"{plural(missed, 'event')} {'was' if missed == 1 else 'were'} missed")
                 )
-            lines += [self._line(event) for event in fresh]
+            lines += [EventLine(self._clock() - each.age_ms / _MS_PER_S, each.message) for each in fresh]
             self._last = fresh[-1].sequence
         return lines
 
@@ -53,6 +52,3 @@ class SnapshotEvents:
 
     def _own(self, message: str) -> EventLine:
         return EventLine(self._clock(), message, own=True)
-
-    def _line(self, event: OperatorEvent) -> EventLine:
-        return EventLine(self._clock() - event.age_ms / _MS_PER_S, event.message)

@@ -9,11 +9,10 @@ from dataclasses import replace
 from typing import Final, TypeAlias
 
 from console.client import Backoff, ClientOptions, Credentials, DesiredPreview, GatewayFailed, parse_target
-from console.monitor.conversation import Conversation, RetryBackoff, RobotSession
+from console.monitor.conversation import Conversation, RetryBackoff, RobotSession, first_to_end
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
-from console.monitor.latest_value import LatestValue
 from console.monitor.link import Link, LinkState
-from console.monitor.monitor_state import MonitorState, PreviewRequest
+from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
 
 # One attempt is short here: the conversation retries by itself, and reports each failure.
 _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_after_s=0.3))
@@ -37,7 +36,7 @@ class Worker:
 
     Args:
         target: HOST:PORT.
-        on_change: called after each change of `latest()`, mostly in the worker's thread; must only hand over.
+        on_change: called after each change of `latest()`, in the worker's thread; must only hand over.
         connect: makes the client, inside the worker's loop; by default one without credentials.
         retry: the pauses between attempts.
 
@@ -54,13 +53,12 @@ class Worker:
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(state=LinkState.CONNECTING, since_s=time.monotonic()))
-        self._latest = LatestValue(first, on_change)
+        self._latest = LatestState(first, on_change)
         self._connect = connect or connecting()
-        self._retry = retry or RetryBackoff()
         self._thread = threading.Thread(target=self._run, name="gateway-worker", daemon=True)
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
-        self._conversation: Conversation | None = None
+        self._conversation = Conversation(self._latest, retry or RetryBackoff())
 
     def start(self) -> None:
         """Starts the thread."""
@@ -80,12 +78,12 @@ class Worker:
             pending = state.request is not None and state.request.pending
             return state if pending else replace(state, request=PreviewRequest(desired))
 
-        if self._latest.update(begin):
-            self._order(Conversation.send_request)
+        if self._latest.change(begin):
+            self._call_soon(self._conversation.send_request)
 
     def retry_now(self) -> None:
         """Ends the pause before the next attempt."""
-        self._order(Conversation.retry_now)
+        self._call_soon(self._conversation.retry_now)
 
     def close(self, timeout_s: float = 1.0) -> bool:
         """Disconnects, cancelling pending calls. Returns whether the thread ended in time."""
@@ -95,9 +93,6 @@ class Worker:
             return True
         self._thread.join(timeout_s)
         return not self._thread.is_alive()
-
-    def _order(self, give: Callable[[Conversation], None]) -> None:
-        self._call_soon(lambda: give(self._conversation) if self._conversation else None)
 
     def _call_soon(self, act: Callable[[], object]) -> None:
         # A closed loop takes no more calls, and has nothing left to do.
@@ -118,15 +113,4 @@ class Worker:
 
     async def _converse(self) -> None:
         async with self._connect(self.target) as robot:
-            self._conversation = conversation = Conversation(robot, self._latest, self._retry)
-            if self.latest().request:
-                conversation.send_request()
-            async with asyncio.TaskGroup() as tasks:
-                running = [
-                    tasks.create_task(conversation.poll_status()),
-                    tasks.create_task(conversation.serve_requests()),
-                    tasks.create_task(conversation.stream_events()),
-                ]
-                await self._closing.wait()
-                for task in running:
-                    task.cancel()
+            await first_to_end(self._conversation.run(robot), self._closing.wait())

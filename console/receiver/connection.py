@@ -3,6 +3,7 @@
 import socket
 import threading
 from collections import deque
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from common.gst import GLib, Gst
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.errors import UndecodableError, ended, from_srt
-from console.receiver.file_branch import FileBranch
+from console.receiver.file_branch import add_file_branch
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
@@ -39,10 +40,11 @@ class Connection:
         self._address = address
         self._queue = queue
         self._options = options
-        self._file: FileBranch | None = None
         self._had_data = False
         self._branches: dict[str, DecodingBranch] = {}
         self._removed: deque[DecodingBranch] = deque()
+        self._handlers = ExitStack()
+        """Disconnects the handlers of GStreamer's signals."""
         self._pipeline = Gst.Pipeline.new(None)
         self._build()
         self._bus_reader = threading.Thread(target=self._read_bus, name="receiver-bus", daemon=True)
@@ -59,12 +61,9 @@ class Connection:
         for branch in (*self._branches.values(), *self._removed):
             branch.detach(self._pipeline)
         self._branches.clear()
-        if self._file:
-            self._file.detach()
         if self._probe is not None:
             self._source_pad.remove_probe(self._probe)
-        for handler in self._handlers:
-            self._demuxer.disconnect(handler)
+        self._handlers.close()
 
     def _build(self) -> None:
         # The URI first: setting it resets the source's other properties.
@@ -81,18 +80,15 @@ class Connection:
                 source.set_property(name, value)
         self._source_pad = source.get_static_pad("src")
         self._probe: int | None = self._source_pad.add_probe(Gst.PadProbeType.BUFFER, self._on_first_data)
-        self._demuxer = demuxer = element("tsdemux", latency=0)
-        self._handlers = [
-            demuxer.connect("pad-added", self._on_pad_added),
-            demuxer.connect("pad-removed", self._on_pad_removed),
-        ]
+        demuxer = element("tsdemux", latency=0)
+        for signal, handler in (("pad-added", self._on_pad_added), ("pad-removed", self._on_pad_removed)):
+            self._handlers.callback(demuxer.disconnect, demuxer.connect(signal, handler))
         self._pipeline.add(source)
         self._pipeline.add(demuxer)
         if self._options.recording:
-            self._file = FileBranch(self._options.recording)
-            self._file.attach(self._pipeline, source).link(demuxer)
-        else:
-            source.link(demuxer)
+            source, release = add_file_branch(self._pipeline, source, self._options.recording)
+            self._handlers.callback(release)
+        source.link(demuxer)
 
     # On GStreamer's thread.
 
@@ -169,6 +165,6 @@ def _with_ipv4(address: StreamAddress) -> StreamAddress:
 def _undecodable(address: StreamAddress, content: str) -> UndecodableError:
     return UndecodableError(
         f"{address.uri} sends {content}, which this receiver can't decode",
-        "It takes H.264 and H.265 in an MPEG transport stream: is this the robot's preview port",
+        "Check that this is the robot's preview port: H.264 or H.265 in an MPEG transport stream is expected",
         final=True,
     )

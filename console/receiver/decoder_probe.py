@@ -5,6 +5,7 @@ So a decoder counts only after it decoded a clip correctly, without holding anyt
 """
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -35,7 +36,7 @@ def proven_decoder(codec: str) -> str | None:
 
 def objection(element: str, codec: str, timeout_s: float = TRIAL_TIMEOUT_S) -> str:
     """Returns why a decoder fails its trial; empty if it passes."""
-    command = [sys.executable, "-m", "console.receiver.decoder_trial", element, codec]
+    command = [sys.executable, "-m", "console.receiver.decoder_trial", element, codec, str(os.getpid())]
     try:
         done = subprocess.run(  # noqa: S603  # this program, and names from our own table
             command,

@@ -1,9 +1,11 @@
 """Trial of one decoder, in a process that may crash or hang: `python -m console.receiver.decoder_trial`.
 
-The arguments are GStreamer's element and the codec. It decodes a clip, access unit by access unit, as a robot
-sends them, and prints one JSON object: {"reason": why the decoder is rejected, or empty}. The parent process
-sets the deadline.
+The arguments are GStreamer's element, the codec and the parent's process ID. It decodes a clip, access unit
+by access unit, as a robot sends them, and prints one JSON object: {"reason": why the decoder is rejected, or
+empty}. The parent process sets the deadline.
 """
+
+# ruff: noqa: E402 - the process is bound to its parent before it loads GStreamer.
 
 import json
 import os
@@ -13,12 +15,17 @@ from itertools import pairwise
 from typing import Any, Final
 
 from common.child import end_with_parent
+
+_LIFETIME_S: Final = 30
+"""More than any parent waits."""
+if __name__ == "__main__":
+    # Before GStreamer: loading its plugins takes a while, and may hang.
+    end_with_parent(_LIFETIME_S, int(sys.argv.pop()))
+
 from common.errors import UserError
 from common.gst import GLib, Gst
 from console.receiver import clips
 
-_LIFETIME_S: Final = 30
-"""More than any parent waits: bounds an orphan whose parent was killed between its start and ours."""
 _FIRST_FRAME_TIMEOUT_S: Final = 1.5
 """A driver may have to wake up."""
 _NEXT_FRAME_TIMEOUT_S: Final = 0.3
@@ -30,7 +37,6 @@ _FRAME_S: Final = 1 / 30
 
 def main() -> None:
     """Runs one trial."""
-    end_with_parent(_LIFETIME_S)
     element, codec = sys.argv[1:]
     try:
         # Kept until the end: a pipeline that is dropped while it plays is torn down badly.

@@ -1,12 +1,13 @@
 """Decodes one compressed stream into frames without waiting for the next one."""
 
 import time
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 from common.errors import UserError
 from common.gst import Gst, GstVideo
-from console.receiver.frame import Frame, PixelFormat, Plane
+from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
@@ -49,25 +50,6 @@ def element(factory: str, **properties: Any) -> Any:
         else:
             made.set_property(dashed, value)
     return made
-
-
-class _Memory:
-    """The memory of a GStreamer buffer."""
-
-    def __init__(self, buffer: Any) -> None:
-        self._buffer = buffer
-
-    def extract_dup(self, offset: int, size: int, /) -> bytes:
-        """Copies a part, or all of it: mapping the whole buffer takes a quarter of the time."""
-        if (offset, size) != (0, self._buffer.get_size()):
-            return bytes(self._buffer.extract_dup(offset, size))
-        mapped, content = self._buffer.map(Gst.MapFlags.READ)
-        if not mapped:
-            raise RuntimeError("a decoded frame can't be read")
-        try:
-            return bytes(content.data)
-        finally:
-            self._buffer.unmap(content)
 
 
 class DecodingBranch:
@@ -147,14 +129,19 @@ class DecodingBranch:
             pts_ns=None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts,
             arrival_s=arrival_s,
             corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
-            planes=_planes(info, self._pixels),
-            pixels=_Memory(buffer),
+            stride=info.stride[0],
+            read=partial(_pixels, buffer),
             pixel_format=self._pixels,
             decoder=self._decoder,
         )
 
 
-def _planes(info: Any, pixels: PixelFormat) -> tuple[Plane, ...]:
-    half = (info.height + 1) // 2
-    rows = (info.height,) if pixels is PixelFormat.BGRX else (info.height, half, half)
-    return tuple(Plane(info.offset[i], info.stride[i], count) for i, count in enumerate(rows))
+def _pixels(buffer: Any) -> bytes:
+    """Copies a buffer's memory: mapping it takes a quarter of the time of Gst.Buffer.extract_dup."""
+    mapped, content = buffer.map(Gst.MapFlags.READ)
+    if not mapped:
+        raise RuntimeError("a decoded frame can't be read")
+    try:
+        return bytes(content.data)
+    finally:
+        buffer.unmap(content)

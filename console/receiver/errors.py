@@ -18,10 +18,6 @@ class StreamError(UserError):
         self.final = final
 
 
-class NoFrameError(StreamError):
-    """No frame came before the caller's timeout. The receiver goes on; asking again is fine."""
-
-
 class StreamEndedError(StreamError):
     """The robot ended the connection, or it was lost."""
 
@@ -32,15 +28,6 @@ class StreamRefusedError(StreamError):
 
 class UndecodableError(StreamError):
     """The stream arrives, but this computer can't decode it."""
-
-
-class ReceiverClosedError(StreamError):
-    """The receiver was closed before or while a caller waited for a frame."""
-
-
-def closed() -> ReceiverClosedError:
-    """Returns the error of a call on a closed receiver."""
-    return ReceiverClosedError("the receiver is closed", "Make a new one", final=True)
 
 
 def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamError:
@@ -57,7 +44,7 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
             f"{address.uri} did not accept the passphrase"
             if address.passphrase
             else f"{address.uri} asks for a passphrase",
-            "Take this session's from the endpoint that an authenticated client gets",
+            "Type: robotctl login. The robot gives each session's passphrase to authenticated clients only",
             final=True,
         )
     if had_data:
@@ -77,9 +64,9 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
-def no_frame_within(address: StreamAddress, timeout_s: float) -> NoFrameError:
+def no_frame_within(address: StreamAddress, timeout_s: float) -> StreamError:
     """Returns the error of a timeout."""
-    return NoFrameError(
+    return StreamError(
         f"no frame from {address.uri} within {timeout_s:g} s",
         "Check robotctl status: is the preview RUNNING, does it encode frames, is a passphrase needed",
     )

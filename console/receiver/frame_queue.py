@@ -19,16 +19,10 @@ class FrameQueue:
         self._frames: deque[Frame] = deque(maxlen=size)
         self._end: StreamError | None = None
         self._changed = threading.Condition()
-        self.received = 0
-        """Frames put in so far."""
-        self.dropped = 0
-        """Frames dropped before they were taken."""
 
     def put(self, frame: Frame) -> None:
         """Appends the newest frame."""
         with self._changed:
-            self.dropped += len(self._frames) == self._frames.maxlen
-            self.received += 1
             self._frames.append(frame)
             self._changed.notify_all()
 

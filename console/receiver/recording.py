@@ -6,7 +6,7 @@ import stat
 import threading
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, Self
+from typing import Final
 
 from common.errors import ExitCode, UserError
 
@@ -49,12 +49,6 @@ class Recording:
         self._closed = False
         self._writer = threading.Thread(target=self._write_all, name="recording", daemon=True)
         self._writer.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self.close()
 
     def add_gap(self) -> None:
         """Counts a lost part. Thread-safe."""

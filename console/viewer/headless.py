@@ -41,7 +41,7 @@ def watch_headless(
     Raises:
         GatewayError: the gateway was never reached.
         UserError: the preview is off, no frame came, this computer can't show the stream, or the recording
-        failed.
+            failed.
     """
     counter = FrameCounter()
     robot = RobotVideo(target, load, pixels=PixelFormat.I420, recording=recording)

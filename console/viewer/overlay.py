@@ -1,27 +1,10 @@
-"""Detections over the video: which boxes to draw, where, and until when."""
+"""Detections over the video: which boxes to draw, and where."""
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
-from console.client.results import Detection, Detections
+from console.client.results import Detection, Detections, Freshness
 from console.viewer.geometry import Box, on_frame
-
-_SILENT_AFTER_S: Final = 1.0
-"""Age of a snapshot from which on its boxes are not drawn: they may be wrong by then."""
-
-
-@dataclass(frozen=True, slots=True)
-class Overlay:
-    """The latest detections.
-
-    Args:
-        detections: as the robot reported them.
-        received_s: when they came, on `time.monotonic()`.
-    """
-
-    detections: Detections
-    received_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +20,19 @@ class Mark:
     label: str
 
 
-def marks(overlay: Overlay | None, frame: Box, now_s: float) -> list[Mark]:
+def marks(found: Detections | None, frame: Box) -> list[Mark]:
     """Returns the boxes to draw on a frame that is shown at `frame`; none if the detections are stale."""
-    if overlay is None or now_s - overlay.received_s > _SILENT_AFTER_S:
+    if not found or found.freshness is not Freshness.FRESH:
         return []
-    found = overlay.detections
-    if not found.available or found.stale or not found.source_width_px or not found.source_height_px:
+    if not found.source_width_px or not found.source_height_px:
         return []
     drawn = []
     for item in found.items:
-        box = on_frame(_box(item), found.source_width_px, found.source_height_px, frame)
-        if box:
-            drawn.append(Mark(box, _label(item)))
+        left, top = item.center_x_px - item.width_px / 2, item.center_y_px - item.height_px / 2
+        box = Box(left, top, item.width_px, item.height_px)
+        if visible := on_frame(box, found.source_width_px, found.source_height_px, frame):
+            drawn.append(Mark(visible, _label(item)))
     return drawn
-
-
-def _box(item: Detection) -> Box:
-    left, top = item.center_x_px - item.width_px / 2, item.center_y_px - item.height_px / 2
-    return Box(left, top, item.width_px, item.height_px)
 
 
 def _label(item: Detection) -> str:

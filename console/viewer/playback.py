@@ -61,8 +61,9 @@ class Playback:
         state: state of the video.
         frame_age_s: age of the latest frame; None without one.
         reason: why there is no live video; empty if unknown. Beside live video: why the gateway does not
-        answer. remedy: what to do; may be empty. redials: connections beyond the first since the viewer was
-        opened.
+            answer.
+        remedy: what to do; may be empty.
+        redials: connections beyond the first since the viewer was opened.
     """
 
     state: PlaybackState

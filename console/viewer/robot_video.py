@@ -1,25 +1,30 @@
 """One robot's status and video together: what every viewer, with or without a window, runs."""
 
+import time
 from collections.abc import Callable
+from typing import Final
 
+from console.client.results import Detections
 from console.monitor.credential_refresh import LoadCredentials
 from console.monitor.link import LinkState
 from console.monitor.worker import Worker, connecting
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
-from console.viewer.overlay import Overlay
 from console.viewer.session import VideoSession
+
+_SILENT_AFTER_S: Final = 1.0
+"""Silence of the robot after which its boxes are not drawn: they may be wrong by then."""
 
 
 class RobotVideo:
-    """A gateway worker, and a video session that follows the status it polls.
+    """A gateway worker, and a video session that follows its status.
 
     Args:
         target: the robot's gateway, HOST:PORT.
         load: reads the stored credentials; by default there are none.
         pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; closed together with the session.
-        on_change: called after each change of the status, mostly in the worker's thread; must only hand over.
+        on_change: called after each change of the status, in the worker's thread; must only hand over.
 
     Raises:
         UserError: the target is not an address, or the credentials can't be used.
@@ -44,10 +49,11 @@ class RobotVideo:
         self.session.start()
         self.worker.start()
 
-    def overlay(self) -> Overlay | None:
-        """Returns the latest detections; None before the first status."""
+    def detections(self) -> Detections | None:
+        """Returns the latest detections; None before the first status, and while the robot is silent."""
         state = self.worker.latest()
-        return Overlay(state.snapshot.detections, state.received_s) if state.snapshot else None
+        silent = time.monotonic() - state.heard_s > _SILENT_AFTER_S
+        return state.snapshot.detections if state.snapshot and not silent else None
 
     def close(self, timeout_s: float) -> None:
         """Disconnects both, within `timeout_s` each, and closes the recording."""

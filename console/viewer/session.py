@@ -3,25 +3,54 @@
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
-from typing import Final, TypeAlias
+from typing import Final, Protocol, TypeAlias
 
 from common.errors import UserError
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoFrameError, StreamError, UndecodableError
+from console.receiver.errors import StreamError, UndecodableError, no_frame_within
 from console.receiver.frame import Frame, PixelFormat
+from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
-from console.receiver.receiver import Connect, Receiver, open_connection
 from console.receiver.recording import Recording
 from console.viewer.decoders import Decoders
 from console.viewer.playback import Playback, PlaybackInputs, playback
-from console.viewer.redial import BLOCKED_PAUSE_S, address_of, deadline_s, redial_backoff
+from console.viewer.redial import (
+    BLOCKED_PAUSE_S,
+    FIRST_FRAME_TIMEOUT_S,
+    address_of,
+    deadline_s,
+    redial_backoff,
+)
 
 _POLL_S: Final = 0.1
 """Period, while no frame comes, of checking whether the connection is still needed."""
 
 FrameListener: TypeAlias = Callable[[Frame], None]
+
+
+class OpenConnection(Protocol):
+    """A connection that is established or under way."""
+
+    def close(self) -> None:
+        """Disconnects; afterwards nothing reaches the queue."""
+
+
+Connect: TypeAlias = Callable[[StreamAddress, FrameQueue, ReceiverOptions], OpenConnection]
+
+
+def open_connection(address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> OpenConnection:
+    """Opens a connection over SRT.
+
+    Raises:
+        UserError: GStreamer or one of its elements is not installed.
+    """
+    # Imported here so that a program without GStreamer fails only when it receives video.
+    from console.receiver.connection import Connection  # noqa: PLC0415
+
+    return Connection(address, queue, options)
 
 
 class VideoSession:
@@ -142,31 +171,31 @@ class VideoSession:
 
     def _receive(self, address: StreamAddress) -> UserError:
         """Takes the frames of one connection, and returns why it ended."""
+        queue = FrameQueue(1)
         options = ReceiverOptions(self._pixels, self._decoders.chosen(), self._recording)
         try:
-            with Receiver(address, queue_size=1, options=options, connect=self._connect) as receiver:
-                return self._take_frames(receiver, address)
-        except UndecodableError as error:
-            return self._decoders.after_undecodable(error)
+            connection = self._connect(address, queue, options)
         except UserError as error:
             return error
+        with closing(connection):
+            end = self._take_frames(queue, address)
+        return self._decoders.after_undecodable(end) if isinstance(end, UndecodableError) else end
 
-    def _take_frames(self, receiver: Receiver, address: StreamAddress) -> UserError:
+    def _take_frames(self, queue: FrameQueue, address: StreamAddress) -> StreamError:
         connected_s, frame_s = time.monotonic(), None
-        while True:
-            if self._closing or address != self._address:
-                return StreamError("this stream is not needed any more", "")
-            try:
-                frame = receiver.next_frame(_POLL_S)
-            except NoFrameError as silence:
-                if time.monotonic() > deadline_s(connected_s, frame_s):
+        while not self._closing and address == self._address:
+            match queue.take(time.monotonic() + _POLL_S):
+                case Frame() as frame:
+                    frame_s = frame.arrival_s
+                    self._take(frame)
+                case StreamError() as end:
+                    return end
+                case None if time.monotonic() > deadline_s(connected_s, frame_s):
                     if frame_s:
                         return StreamError(f"the stream from {address.uri} fell silent", "")
                     self._decoders.after_no_frame()
-                    return silence
-            else:
-                frame_s = frame.arrival_s
-                self._take(frame)
+                    return no_frame_within(address, FIRST_FRAME_TIMEOUT_S)
+        return StreamError("this stream is not needed any more", "")
 
     def _take(self, frame: Frame) -> None:
         with self._changed:

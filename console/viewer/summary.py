@@ -85,7 +85,9 @@ class FrameCounter:
 
     def summary(self, redials: int, recording: Recording | None) -> ViewSummary:
         """Returns the summary of all frames so far."""
-        kept = _kept(recording) if recording else None
+        kept: dict[str, Any] | None = None
+        if recording:
+            kept = {"file": str(recording.file), "bytes": recording.size_bytes, "gaps": recording.gaps}
         with self.changed:
             frame, duration_s = self._latest, self._last_s - self._first_s
             if frame is None:
@@ -102,10 +104,6 @@ class FrameCounter:
                 redials=redials,
                 recording=kept,
             )
-
-
-def _kept(recording: Recording) -> dict[str, Any]:
-    return {"file": str(recording.file), "bytes": recording.size_bytes, "gaps": recording.gaps}
 
 
 def _recording_text(recording: dict[str, Any] | None) -> str:

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import NoReturn
 
 from PySide6.QtCore import QMessageLogContext, QTimer, QtMsgType, qInstallMessageHandler
 from PySide6.QtWidgets import QApplication
@@ -62,11 +61,8 @@ def _check_display() -> None:
 def _on_qt_message(kind: QtMsgType, _context: QMessageLogContext, text: str) -> None:
     """Prints Qt's messages to standard error; a fatal one ends the program with one line, not an abort."""
     if kind is QtMsgType.QtFatalMsg:
-        _end_at_once(UserError(f"Qt can't show a window: {text}", "Check DISPLAY and Qt's libraries"))
+        error = UserError(f"Qt can't show a window: {text}", "Check DISPLAY and Qt's libraries")
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        os._exit(int(ExitCode.FAILED))
     if kind in (QtMsgType.QtCriticalMsg, QtMsgType.QtSystemMsg):
         print(f"Qt: {text}", file=sys.stderr)
-
-
-def _end_at_once(error: UserError) -> NoReturn:
-    print(f"error: {error}", file=sys.stderr, flush=True)
-    os._exit(int(ExitCode.FAILED))

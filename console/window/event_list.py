@@ -40,10 +40,17 @@ class EventList(QListWidget):
 
 
 def _item(event: EventLine) -> QListWidgetItem:
-    at = datetime.fromtimestamp(event.at_s).astimezone().strftime("%H:%M:%S")
-    item = QListWidgetItem(f"{at}  {event.text}")
+    item = QListWidgetItem(f"{_clock(event.at_s)}  {event.text}")
     font = item.font()
     font.setItalic(event.own)
     font.setBold(event.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
     item.setFont(font)
     return item
+
+
+def _clock(at_s: float) -> str:
+    """Returns the time of day; dashes for a time beyond the calendar, which a robot may well send."""
+    try:
+        return datetime.fromtimestamp(at_s).astimezone().strftime("%H:%M:%S")
+    except (ValueError, OverflowError, OSError):
+        return "--:--:--"

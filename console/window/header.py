@@ -7,7 +7,15 @@ from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN, joined
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
-from console.window.labels import ElidedLabel, WrappedLabel, plain_label, scale_font, set_bold, set_text
+from console.window.labels import (
+    ElidedLabel,
+    PlainLabel,
+    WrappedLabel,
+    scale_font,
+    set_bold,
+    set_text,
+    set_tool_tip,
+)
 from console.window.lines import TintedLine
 from console.window.theme import DimLabel, Marker
 
@@ -21,8 +29,8 @@ class Header(QWidget):
 
     def __init__(self, target: str) -> None:
         super().__init__()
-        self.name, self.target = plain_label("robot"), DimLabel(target)
-        self.health, self.link = MarkedWord(), MarkedWord(plain_label())
+        self.name, self.target = PlainLabel("robot"), DimLabel(target)
+        self.health, self.link = MarkedWord(), MarkedWord(PlainLabel())
         set_bold(self.name, True)
         scale_font(self.name, 1.4)
         layout = QHBoxLayout(self)
@@ -42,7 +50,7 @@ class Header(QWidget):
             return
         status, health = state.snapshot.status, state.snapshot.status.health
         set_text(self.name, status.gateway_name or "robot")
-        self.target.setToolTip(f"Gateway {status.gateway_version or UNKNOWN}")
+        set_tool_tip(self.target, f"Gateway {status.gateway_version or UNKNOWN}")
         if state.outdated(now_s):
             last = joined(f"last known: {health.state.value.upper()}", health.summary)
             self.health.show_word(SeverityStyle.QUIET, "not known", last)
@@ -59,7 +67,7 @@ class MarkedWord(QWidget):
 
     def __init__(self, detail: QLabel | None = None) -> None:
         super().__init__()
-        self.marker, self.word, self.detail = Marker(), plain_label(), detail or ElidedLabel()
+        self.marker, self.word, self.detail = Marker(), PlainLabel(), detail or ElidedLabel()
         set_bold(self.word, True)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -94,10 +102,10 @@ class ConnectionBanner(TintedLine):
         self.grid.setColumnStretch(1, 1)
         self.setVisible(False)
 
-    def show_link(self, link: LinkText) -> None:
+    def show_item(self, item: LinkText) -> None:
         """Shows the latest text."""
-        self.setVisible(bool(link.banner))
-        if link.banner:
-            self.show_style(link.style)
-            set_text(self.text, link.banner)
-            set_text(self.next_try, link.retry)
+        self.setVisible(bool(item.banner))
+        if item.banner:
+            self.show_style(item.style)
+            set_text(self.text, item.banner)
+            set_text(self.next_try, item.retry)

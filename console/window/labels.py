@@ -1,21 +1,29 @@
 """Labels that are updated ten times a second, and lay out only changed texts."""
 
+from html import escape
 from typing import Final
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy
+from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QWidget
 
 TOP: Final = Qt.AlignmentFlag.AlignTop
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
-class WrappedLabel(QLabel):
-    """Sentences from the robot, on as many lines as they need: selectable, never markup."""
+class PlainLabel(QLabel):
+    """Plain text, never markup: the base of all labels that show a robot's texts."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__(text)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+
+
+class WrappedLabel(PlainLabel):
+    """Sentences on as many lines as they need; selectable."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setWordWrap(True)
         self.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -25,18 +33,17 @@ class WrappedLabel(QLabel):
         return QSize(0, self.fontMetrics().height())
 
 
-class ElidedLabel(QLabel):
+class ElidedLabel(PlainLabel):
     """One line that is elided where there is little room; the tool tip has the whole text."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
 
     def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
         """Changes the text and the tool tip."""
         super().setText(text)
-        self.setToolTip(text)
+        set_tool_tip(self, text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Draws the elided text."""
@@ -45,24 +52,22 @@ class ElidedLabel(QLabel):
         painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, fitting)
 
 
-def plain_label(text: str = "") -> QLabel:
-    """Returns a label for one line of plain text."""
-    label = QLabel(text)
-    label.setTextFormat(Qt.TextFormat.PlainText)
-    return label
-
-
 def width_of(text: str, *, bold: bool = False) -> int:
     """Returns the width of a text in the desktop's font, in pixels."""
-    label = plain_label(text)
+    label = PlainLabel(text)
     set_bold(label, bold)
     return label.sizeHint().width()
 
 
-def set_text(label: QLabel, text: str) -> None:
+def set_text(label: QLabel | QPushButton, text: str) -> None:
     """Changes a text; laying out the same one again would cost time."""
     if label.text() != text:
         label.setText(text)
+
+
+def set_tool_tip(widget: QWidget, text: str) -> None:
+    """Changes a tool tip, as plain text: Qt itself takes a text that looks like markup for markup."""
+    widget.setToolTip(f"<span>{escape(text)}</span>" if text else "")
 
 
 def set_bold(label: QLabel, bold: bool) -> None:

@@ -12,7 +12,16 @@ from console.monitor.status_rows import FaultLine
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
-from console.window.labels import RIGHT, TOP, WrappedLabel, plain_label, set_bold, set_text, width_of
+from console.window.labels import (
+    RIGHT,
+    TOP,
+    PlainLabel,
+    WrappedLabel,
+    set_bold,
+    set_text,
+    set_tool_tip,
+    width_of,
+)
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 
 _LONGEST_LABEL = "Computer battery"
@@ -22,7 +31,7 @@ _LONGEST_SEVERITY = "warning"
 
 
 class TintedLine(QFrame):
-    """A line whose ground takes the colour of its style, behind a marker of the style's shape."""
+    """A line that shows one item. Its ground has the colour of the item's style, the marker its shape."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,6 +42,10 @@ class TintedLine(QFrame):
         self.grid.setHorizontalSpacing(8)
         self.grid.setVerticalSpacing(1)
         self.grid.addWidget(self.marker, 0, 0, TOP)
+
+    @abstractmethod
+    def show_item(self, item: Any) -> None:
+        """Shows an item of the line's own type."""
 
     def show_style(self, style: SeverityStyle, *, blank: bool = False) -> None:
         """Changes shape and ground; a blank shape keeps its place."""
@@ -54,15 +67,7 @@ class TintedLine(QFrame):
             self.setPalette(palette)
 
 
-class ItemLine(TintedLine):
-    """A line that shows one item."""
-
-    @abstractmethod
-    def show_item(self, item: Any) -> None:
-        """Shows an item of the line's own type."""
-
-
-LineT = TypeVar("LineT", bound=ItemLine)
+LineT = TypeVar("LineT", bound=TintedLine)
 
 
 class LineList(QWidget, Generic[LineT]):
@@ -98,12 +103,12 @@ class LineList(QWidget, Generic[LineT]):
         self._shown = len(items)
 
 
-class ComponentLine(ItemLine):
+class ComponentLine(TintedLine):
     """A part of the robot: marker, name, mark, values, age."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.name, self.mark = plain_label(), plain_label()
+        self.name, self.mark = PlainLabel(), PlainLabel()
         self.values, self.age = WrappedLabel(), DimLabel()
         self.name.setFixedWidth(width_of(_LONGEST_LABEL))
         self.mark.setFixedWidth(width_of(_LONGEST_MARK, bold=True))
@@ -126,12 +131,12 @@ class ComponentLine(ItemLine):
         self.setAccessibleName(f"{item.label}: {item.mark}. {item.text}. {item.age}")
 
 
-class FaultWidget(ItemLine):
+class FaultWidget(TintedLine):
     """A fault: marker, severity, message, duration; below it the remedy."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.mark, self.message = plain_label(), WrappedLabel()
+        self.mark, self.message = PlainLabel(), WrappedLabel()
         self.remedy, self.since = WrappedLabel(), DimLabel()
         self.mark.setFixedWidth(width_of(_LONGEST_SEVERITY, bold=True))
         self.since.setAlignment(RIGHT)
@@ -154,7 +159,7 @@ class FaultWidget(ItemLine):
         self.setAccessibleName(f"{item.mark}: {item.message}. {item.remedy}")
 
 
-class NoteLine(ItemLine):
+class NoteLine(TintedLine):
     """A note below the preview's controls: marker and text."""
 
     def __init__(self) -> None:
@@ -167,4 +172,4 @@ class NoteLine(ItemLine):
         """Shows one note."""
         self.show_style(item.style, blank=not item.text)
         set_text(self.text, item.text)
-        self.text.setToolTip(item.text)
+        set_tool_tip(self.text, item.text)

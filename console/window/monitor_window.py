@@ -4,8 +4,8 @@ import time
 from functools import partial
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QShortcut
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
 from console.monitor.history import NOTHING, History, values_of
@@ -16,6 +16,7 @@ from console.monitor.worker import Worker
 from console.presentation.preview_switch import PROFILES
 from console.window.handover import ThreadHandover
 from console.window.header import ConnectionBanner, Header
+from console.window.keys import bind_keys
 from console.window.plot import Plots
 from console.window.preview_panel import PreviewPanel
 from console.window.side_panel import SidePanel
@@ -65,7 +66,7 @@ class MonitorWindow(QWidget):
         state, now_s = self._worker.latest(), time.monotonic()
         link = link_text(state.link, self._worker.target, now_s)
         self.header.show_state(state, link, now_s)
-        self.banner.show_link(link)
+        self.banner.show_item(link)
         self.preview.show_controls(self._controls(state, now_s))
         self.side.show_state(state, now_s)
 
@@ -91,9 +92,7 @@ class MonitorWindow(QWidget):
         self.splitter.setStretchFactor(1, 0)
         self.splitter.setSizes(_FIRST_DIVISION)
         whole = QVBoxLayout(self)
-        top = QHBoxLayout()
-        top.addWidget(self.header, 1)
-        whole.addLayout(top)
+        whole.addWidget(self.header)
         whole.addWidget(self.banner)
         whole.addWidget(self.splitter, 1)
 
@@ -105,12 +104,8 @@ class MonitorWindow(QWidget):
         self.preview.switched.connect(self._switch)
         self.preview.chosen.connect(self._choose)
         self.banner.retry.connect(self._worker.retry_now)
-        QShortcut("P", self, self._switch)
-        QShortcut("Q", self, self.close)
-        QShortcut("F11", self, self._toggle_full_screen)
-        QShortcut("Esc", self, self._leave_full_screen)
-        for key, profile in enumerate(PROFILES, start=1):
-            QShortcut(str(key), self, partial(self._choose, profile))
+        profiles = {str(key): partial(self._choose, profile) for key, profile in enumerate(PROFILES, start=1)}
+        bind_keys(self, {"P": self._switch, "Q": self.close, **profiles})
 
     def _tick(self) -> None:
         state, now_s = self._worker.latest(), time.monotonic()
@@ -140,13 +135,3 @@ class MonitorWindow(QWidget):
         else:
             self._selected = profile
         self.refresh()
-
-    def _toggle_full_screen(self) -> None:
-        if self.isFullScreen():
-            self.showNormal()
-        else:
-            self.showFullScreen()
-
-    def _leave_full_screen(self) -> None:
-        if self.isFullScreen():
-            self.showNormal()

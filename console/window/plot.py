@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
+from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
@@ -83,21 +83,16 @@ class Plot(QWidget):
         painter.drawLine(box.bottomLeft(), box.bottomRight())
         painter.drawLine(box.topLeft(), box.topRight())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setBrush(mixed(ground, colour, _FILL))
         for points in self._pieces(box):
-            self._paint_piece(painter, points, box.bottom(), colour, mixed(ground, colour, _FILL))
-
-    def _paint_piece(
-        self, painter: QPainter, points: list[QPointF], bottom: float, colour: QColor, fill: QColor
-    ) -> None:
-        ends = [QPointF(points[-1].x(), bottom), QPointF(points[0].x(), bottom)]
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(fill)
-        painter.drawPolygon(QPolygonF(points + ends))
-        painter.setPen(QPen(colour, 1.5))
-        if len(points) == 1:
-            painter.drawPoint(points[0])
-        else:
-            painter.drawPolyline(QPolygonF(points))
+            ends = [QPointF(points[-1].x(), box.bottom()), QPointF(points[0].x(), box.bottom())]
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.drawPolygon(QPolygonF(points + ends))
+            painter.setPen(QPen(colour, 1.5))
+            if len(points) == 1:
+                painter.drawPoint(points[0])
+            else:
+                painter.drawPolyline(QPolygonF(points))
 
     def _pieces(self, box: QRectF) -> Iterator[list[QPointF]]:
         """Yields the curve between its gaps, in the box's coordinates."""

@@ -8,7 +8,7 @@ from console.monitor.preview_controls import Controls
 from console.presentation.preview_switch import PROFILES, Note
 from console.presentation.severity_style import SeverityStyle
 from console.window.header import MarkedWord
-from console.window.labels import plain_label
+from console.window.labels import PlainLabel, set_text
 from console.window.lines import LineList, NoteLine
 
 _TITLES = {
@@ -42,7 +42,7 @@ class PreviewPanel(QWidget):
     def show_controls(self, now: Controls) -> None:
         """Shows the latest controls."""
         self.state.show_word(now.style, now.mark, now.summary)
-        _set_button_text(self.switch, "&Stop preview" if now.on else "&Start preview")
+        set_text(self.switch, "&Stop preview" if now.on else "&Start preview")
         for profile, button in self.profiles.items():
             _check(button, profile, profile is now.profile)
         self._set_enabled(now.enabled)
@@ -75,7 +75,7 @@ class PreviewPanel(QWidget):
     def _lay_out(self) -> None:
         row = QHBoxLayout()
         row.setSpacing(6)
-        row.addWidget(plain_label("Preview"))
+        row.addWidget(PlainLabel("Preview"))
         row.addWidget(self.state, 1)
         row.addWidget(self.switch)
         row.addSpacing(8)
@@ -92,11 +92,5 @@ class PreviewPanel(QWidget):
 def _check(button: QPushButton, profile: PreviewProfile, checked: bool) -> None:
     """Checks a button, with a tick besides the style's own sign, which is faint in dark colours."""
     title, _ = _TITLES[profile]
-    _set_button_text(button, f"\u2713 {title}" if checked else title)
+    set_text(button, f"\u2713 {title}" if checked else title)
     button.setChecked(checked)
-
-
-def _set_button_text(button: QPushButton, text: str) -> None:
-    """Changes a text; laying out the same one again would cost time."""
-    if button.text() != text:
-        button.setText(text)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from console.monitor.credential_refresh import LoadCredentials
 from console.receiver.recording import Recording
@@ -32,16 +33,25 @@ def run_monitor(target: str, load: LoadCredentials | None = None) -> None:
         app.exec()
 
 
-def run_view(target: str, recording: Recording | None, load: LoadCredentials | None = None) -> ViewSummary:
-    """Shows the video until its window is closed; returns the summary of the run.
+def run_view(
+    target: str, record: Path | None, load: LoadCredentials | None = None
+) -> tuple[ViewSummary, Recording | None]:
+    """Shows the video until its window is closed; returns the summary of the run, and the closed recording.
+
+    Args:
+        target: the robot's gateway.
+        record: a new file for the encoded stream. It is not made where there is no display.
+        load: reads the stored credentials.
 
     Raises:
-        UserError: as `run_monitor`.
+        UserError: as `run_monitor`, or the file can't be written.
     """
     counter = FrameCounter()
-    with application("Robot view") as app, viewing(target, recording, counter, load) as window:
-        app.exec()
-    return counter.summary(window.robot.session.redials, recording)
+    with application("Robot view") as app:
+        recording = Recording(record) if record else None
+        with viewing(target, recording, counter, load) as window:
+            app.exec()
+    return counter.summary(window.robot.session.redials, recording), recording
 
 
 @contextmanager
@@ -49,7 +59,9 @@ def monitor(target: str, load: LoadCredentials | None = None) -> Iterator[Monito
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
     robot = RobotVideo(target, load, on_change=changes.post)
-    window = MonitorWindow(robot.worker, changes, VideoView(robot.session, robot), WindowSettings())
+    window = MonitorWindow(
+        robot.worker, changes, VideoView(robot.session, robot.detections), WindowSettings()
+    )
     with _open(window, robot):
         yield window
 
@@ -61,7 +73,7 @@ def viewing(
     """Opens the window of the video with its background threads; closes them at the end of the block."""
     robot = RobotVideo(target, load, recording=recording)
     robot.session.add_frame_listener(counter.count)
-    window = ViewWindow(robot, VideoView(robot.session, robot))
+    window = ViewWindow(robot, VideoView(robot.session, robot.detections))
     with _open(window, robot):
         yield window
 

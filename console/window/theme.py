@@ -5,9 +5,10 @@ from typing import Final
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from console.presentation.severity_style import SeverityStyle
+from console.window.labels import PlainLabel
 
 COLOURS: Final[Mapping[SeverityStyle, QColor]] = {
     SeverityStyle.GOOD: QColor("#009E73"),
@@ -52,12 +53,11 @@ def dim_text(palette: QPalette) -> QColor:
     return mixed(text, ground, _DIM)
 
 
-class DimLabel(QLabel):
+class DimLabel(PlainLabel):
     """Secondary text, in the desktop's light or dark colours, also when these change."""
 
     def __init__(self, text: str = "") -> None:
         super().__init__(text)
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self._colour()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name

@@ -8,7 +8,6 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from console.viewer.formatting import Banner
-from console.viewer.geometry import Box
 from console.viewer.overlay import Mark
 from console.window.theme import COLOURS
 
@@ -36,7 +35,7 @@ def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
     for pen in (_HALO, _LINE):
         painter.setPen(pen)
         for mark in marks:
-            painter.drawRect(_rect(mark.box))
+            painter.drawRect(QRectF(mark.box.x, mark.box.y, mark.box.width, mark.box.height))
     for mark in marks:
         if mark.label:
             _draw_label(painter, mark)
@@ -52,25 +51,19 @@ def draw_banner(painter: QPainter, whole: QRectF, text: Banner, *, over_frame: b
     title = _extent(title_font, room, text.title)
     detail = _extent(font, room, text.detail)
     # As wide as its text, in steps; the next second of "frozen for 9.9 s" does not change it.
-    room.setWidth(min(room.width(), _in_steps(max(title.width(), detail.width()))))
+    steps = math.ceil(max(title.width(), detail.width()) / _STEP + 0.25)
+    room.setWidth(min(room.width(), steps * _STEP))
     width = room.width() + beside
     height = title.height() + (detail.height() + _GAP if text.detail else 0) + 2 * _MARGIN
     top = whole.bottom() - _MARGIN - height if over_frame else whole.center().y() - height / 2
     card = QRectF(whole.center().x() - width / 2, max(whole.top(), top), width, height)
-    _draw_card(painter, card, COLOURS.get(text.style, _QUIET))
+    painter.fillRect(card, _PAPER)
+    stripe = QRectF(card.left(), card.top(), _STRIPE, card.height())
+    painter.fillRect(stripe, COLOURS.get(text.style, _QUIET))
     room.moveTo(card.left() + _STRIPE + _MARGIN, card.top() + _MARGIN)
     _write(painter, title_font, _INK, room, text.title)
     room.translate(0, title.height() + _GAP)
     _write(painter, font, _DIM_INK, room, text.detail)
-
-
-def _in_steps(width: float) -> float:
-    return math.ceil(width / _STEP + 0.25) * _STEP
-
-
-def _draw_card(painter: QPainter, card: QRectF, colour: QColor) -> None:
-    painter.fillRect(card, _PAPER)
-    painter.fillRect(QRectF(card.left(), card.top(), _STRIPE, card.height()), colour)
 
 
 def _extent(font: QFont, room: QRectF, text: str) -> QRectF:
@@ -92,7 +85,3 @@ def _draw_label(painter: QPainter, mark: Mark) -> None:
     painter.fillRect(ground, _LABEL_GROUND)
     painter.setPen(_LABEL_INK)
     painter.drawText(QPointF(ground.left() + _PAD, ground.top() + _PAD / 2 + metrics.ascent()), mark.label)
-
-
-def _rect(box: Box) -> QRectF:
-    return QRectF(box.x, box.y, box.width, box.height)

@@ -1,17 +1,17 @@
 """Widget of the video: the latest frame, boxes around detections, and a banner while it is not live."""
 
-import time
-from dataclasses import dataclass
-from typing import Final, Protocol
+from collections.abc import Callable
+from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from console.client.results import Detections
 from console.receiver.frame import Frame
 from console.viewer.formatting import Banner, banner
 from console.viewer.geometry import Box, fitted
-from console.viewer.overlay import Overlay, marks
+from console.viewer.overlay import marks
 from console.viewer.playback import PlaybackState
 from console.viewer.session import VideoSession
 from console.window.handover import ThreadHandover
@@ -26,28 +26,6 @@ _VEIL: Final = QColor(0, 0, 0, 115)
 """Over a frame that is not live: at a glance it differs from live video of a still scene."""
 
 
-class OverlaySource(Protocol):
-    """Source of detections."""
-
-    def overlay(self) -> Overlay | None:
-        """Returns the latest detections, without waiting: the painting thread calls it."""
-
-
-@dataclass(frozen=True, slots=True)
-class PaintableFrame:
-    """A frame as Qt paints it.
-
-    Args:
-        image: the pixels, in `memory`, which must live as long.
-        memory: four bytes a pixel.
-        frame: the decoded frame.
-    """
-
-    image: QImage
-    memory: bytes
-    frame: Frame
-
-
 class VideoView(QWidget):
     """Shows one session's video. Only the latest frame is kept, and nothing here blocks.
 
@@ -55,19 +33,21 @@ class VideoView(QWidget):
 
     Args:
         session: source of frames (in BGRx); its owner starts and closes it.
-        overlays: source of detections; None draws none.
+        detections: returns the latest ones without waiting; the painting thread calls it.
     """
 
     painted = Signal()
     """A frame has just been painted for the first time."""
 
-    def __init__(self, session: VideoSession, overlays: OverlaySource | None = None) -> None:
+    def __init__(self, session: VideoSession, detections: Callable[[], Detections | None]) -> None:
         super().__init__()
         self._session = session
-        self._overlays = overlays
-        self._overlay_shown = True
-        self._ready: PaintableFrame | None = None
-        self._painted: PaintableFrame | None = None
+        self._detections = detections
+        self.overlay_shown = True
+        """Whether boxes are drawn."""
+        self._ready: tuple[QImage, bytes] | None = None
+        """The latest frame, and the memory of its pixels, which must live as long."""
+        self._painted: tuple[QImage, bytes] | None = None
         self._banner: Banner | None = banner(session.playback())
         self._handover = ThreadHandover()
         self._handover.delivered.connect(self.update)
@@ -84,19 +64,14 @@ class VideoView(QWidget):
         """Returns the size of the usual frame."""
         return _USUAL_SIZE
 
-    @property
-    def overlay_shown(self) -> bool:
-        """Whether boxes are drawn."""
-        return self._overlay_shown
-
     def show_overlay(self, shown: bool) -> None:
         """Shows or hides the boxes."""
-        self._overlay_shown = shown
+        self.overlay_shown = shown
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paints frame, boxes and banner."""
-        now_s, playback = time.monotonic(), self._session.playback()
+        playback = self._session.playback()
         live = playback.state is PlaybackState.LIVE
         # No frame is shown once the session has dropped its latest one.
         shown = self._ready if self._session.latest_frame() else None
@@ -104,10 +79,11 @@ class VideoView(QWidget):
         if shown is None:
             painter.fillRect(self.rect(), _GROUND)
         else:
-            box = fitted(shown.frame.width, shown.frame.height, Box(0, 0, self.width(), self.height()))
-            self._draw_frame(painter, shown, box, live)
-            if self._overlays and self._overlay_shown and live:
-                draw_marks(painter, marks(self._overlays.overlay(), box, now_s))
+            image, _ = shown
+            box = fitted(image.width(), image.height(), Box(0, 0, self.width(), self.height()))
+            self._draw_frame(painter, image, box, live)
+            if self.overlay_shown and live:
+                draw_marks(painter, marks(self._detections(), box))
         if text := banner(playback):
             draw_banner(painter, QRectF(self.rect()), text, over_frame=shown is not None)
         painter.end()
@@ -115,12 +91,12 @@ class VideoView(QWidget):
             self._painted = shown
             self.painted.emit()
 
-    def _draw_frame(self, painter: QPainter, shown: PaintableFrame, box: Box, live: bool) -> None:
+    def _draw_frame(self, painter: QPainter, image: QImage, box: Box, live: bool) -> None:
         target = QRectF(box.x, box.y, box.width, box.height)
         if not target.contains(QRectF(self.rect())):
             painter.fillRect(self.rect(), _GROUND)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        painter.drawImage(target, shown.image)
+        painter.drawImage(target, image)
         if not live:
             painter.fillRect(target, _VEIL)
 
@@ -133,8 +109,7 @@ class VideoView(QWidget):
 
     def _make_ready(self, frame: Frame) -> None:
         """Copies a new frame and hands it over. In the session's thread."""
-        memory = frame.plane(0)
-        row_bytes = frame.planes[0].stride
-        image = QImage(memory, frame.width, frame.height, row_bytes, QImage.Format.Format_RGB32)
-        self._ready = PaintableFrame(image, memory, frame)
+        memory = frame.read()
+        image = QImage(memory, frame.width, frame.height, frame.stride, QImage.Format.Format_RGB32)
+        self._ready = (image, memory)
         self._handover.post()

@@ -2,14 +2,15 @@
 
 import time
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QShortcut
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from console.monitor.preview_controls import controls
 from console.viewer.formatting import figures_line, live_note, recording_line
 from console.viewer.robot_video import RobotVideo
-from console.window.labels import ElidedLabel, plain_label, set_text
+from console.window.keys import bind_keys
+from console.window.labels import ElidedLabel, PlainLabel, set_text
 from console.window.theme import DimLabel
 from console.window.video_view import VideoView
 
@@ -30,22 +31,19 @@ class ViewWindow(QWidget):
         self.robot = robot
         self._counted = (time.monotonic(), 0)
         self.video = video
-        self.figures, self.notes = plain_label(), ElidedLabel()
+        self.figures, self.notes = PlainLabel(), ElidedLabel()
         self._lay_out()
         # The frame's own size where there is room: Qt alone would take two thirds of the screen.
         self.resize(self.sizeHint().boundedTo(self.screen().availableSize()))
         self._timer = QTimer(self, interval=_TICK_MS)
         self._timer.timeout.connect(self._refresh)
         self._timer.start()
-        for key, act in (
-            ("P", self._switch),
-            ("O", lambda: self.video.show_overlay(not self.video.overlay_shown)),
-            ("F", self._toggle_full_screen),
-            ("F11", self._toggle_full_screen),
-            ("Esc", self._leave_full_screen),
-            ("Q", self.close),
-        ):
-            QShortcut(key, self, act)
+        keys = {
+            "P": self._switch,
+            "O": lambda: self.video.show_overlay(not self.video.overlay_shown),
+            "Q": self.close,
+        }
+        bind_keys(self, keys, full_screen=("F", "F11"))
         self.setWindowTitle(robot.worker.target)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
@@ -87,14 +85,8 @@ class ViewWindow(QWidget):
         if now.enabled:
             self.robot.worker.switch(now.toggled())
 
-    def _toggle_full_screen(self) -> None:
-        full = not self.isFullScreen()
-        self._below.setVisible(not full)
-        if full:
-            self.showFullScreen()
-        else:
-            self.showNormal()
-
-    def _leave_full_screen(self) -> None:
-        if self.isFullScreen():
-            self._toggle_full_screen()
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """Leaves the whole screen to the video."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.WindowStateChange:
+            self._below.setVisible(not self.isFullScreen())

@@ -15,11 +15,6 @@ class WindowSettings:
             QSettings.Format.IniFormat, QSettings.Scope.UserScope, "robot-gateway", "monitor"
         )
 
-    @property
-    def file(self) -> str:
-        """Path of the settings file."""
-        return self._settings.fileName()
-
     def restore(self, window: QWidget, splitter: QSplitter) -> None:
         """Restores the saved settings; Qt ignores invalid ones."""
         for key, restore in ((_GEOMETRY, window.restoreGeometry), (_DIVISION, splitter.restoreState)):

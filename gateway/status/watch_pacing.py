@@ -1,8 +1,8 @@
 """When each watcher of the status is due: a count of ticks, without clock or timer.
 
-One snapshot is taken every TICK_MS, however many clients watch. A watcher with a minimum interval is due that
-many ticks after its last message if the status has changed, and HEARTBEAT_MS after it in any case, so that
-its ages stay current.
+At most one snapshot is taken every TICK_MS, however many clients watch; none while no message can be due. A
+watcher with a minimum interval is due that many ticks after its last message if the status has changed, and
+HEARTBEAT_MS after it in any case, so that its ages stay current.
 """
 
 from typing import Final
@@ -28,10 +28,13 @@ class WatchPacing:
         self._at_most = max(HEARTBEAT_MS // TICK_MS, self._at_least)
         self.sent(now, version)
 
+    def may_be_due(self, now: int) -> bool:
+        """Returns whether a message can be due at tick `now`, if the status has changed."""
+        return now - self._last >= self._at_least
+
     def due(self, now: int, version: int) -> bool:
         """Returns whether a message is due at tick `now`, at which the status has this version."""
-        passed = now - self._last
-        return passed >= self._at_most or (passed >= self._at_least and version != self._version)
+        return now - self._last >= self._at_most or (self.may_be_due(now) and version != self._version)
 
     def sent(self, now: int, version: int) -> None:
         """Records that a message with this version was sent at this tick."""

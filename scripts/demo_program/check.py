@@ -9,12 +9,12 @@ from common.errors import UserError
 from console.client import GatewayClient, PreviewProfile, PreviewState, PreviewStatus, SystemStatus
 from console.client.results import Freshness
 from console.receiver.address import StreamAddress
-from console.receiver.receiver import Receiver
 from demo_program.ground import Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
 from simrobot.control import ask
 from tests.support.free import udp_port_is_free
+from tests.support.receiver import Receiver
 
 FRAMES: Final = 60
 _SPEEDS_MPS: Final = (0.8, 0.3)
@@ -156,10 +156,10 @@ def _video(preview: PreviewStatus) -> str:
     with Receiver(address, queue_size=FRAMES) as receiver:
         frame = receiver.next_frame(_FIRST_FRAME_WITHIN_S)
         first_s = time.monotonic() - began_s
-        pictures.add(hash(frame.plane(0)))
+        pictures.add(hash(frame.read()))
         for _ in range(FRAMES - 1):
             frame = receiver.next_frame(_FRAME_WITHIN_S)
-            pictures.add(hash(frame.plane(0)))
+            pictures.add(hash(frame.read()))
     if len(pictures) == 1:
         raise UserError(f"{FRAMES} frames came, but they all show the same picture")
     return (

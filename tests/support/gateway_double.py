@@ -4,6 +4,7 @@ It keeps the contract's behaviour of the preview; tests/contract holds the real 
 """
 
 import threading
+import time
 from collections import deque
 from collections.abc import Iterator
 from concurrent import futures
@@ -29,6 +30,8 @@ _TARGETS = {
 }
 """Frames per second and kbit/s."""
 _HELD_AT_MOST_S = 20
+_TICK_S = 0.05
+_HEARTBEAT_S = 1.0
 
 
 def healthy_status() -> system_status_pb2.SystemStatus:
@@ -119,7 +122,7 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
             accepted=self.accept, message=message, preview=self.status.preview
         )
 
-    def Ping(self, _request: Any, context: Any) -> Never:  # noqa: N802
+    def Ping(self, _request: Any, context: Any) -> Any:  # noqa: N802
         _not_offered(context)
 
     def WatchSystemStatus(self, _request: Any, context: Any) -> Any:  # noqa: N802
@@ -180,6 +183,33 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
 def _not_offered(context: grpc.ServicerContext) -> Never:
     """A gateway of the first release: clients poll the status instead of watching it."""
     context.abort(grpc.StatusCode.UNIMPLEMENTED, "Method not implemented!")
+
+
+class StreamingGatewayDouble(GatewayDouble):
+    """A present gateway: it streams its status with detections, and answers pings."""
+
+    def WatchSystemStatus(  # noqa: N802
+        self, request: robot_gateway_pb2.WatchSystemStatusRequest, context: Any
+    ) -> Iterator[robot_gateway_pb2.WatchSystemStatusResponse]:
+        ended = threading.Event()
+        context.add_callback(ended.set)
+        self._begin("WatchSystemStatus", context)
+        sent, sent_s = None, 0.0
+        while not ended.is_set():
+            self.hold.wait(_HELD_AT_MOST_S)
+            newest = robot_gateway_pb2.WatchSystemStatusResponse(status=self.status)
+            if request.include_detections:
+                newest.detections.CopyFrom(self.overlay.detections)
+            if newest != sent or time.monotonic() - sent_s >= _HEARTBEAT_S:
+                sent, sent_s = newest, time.monotonic()
+                yield newest
+            ended.wait(max(request.min_interval_ms / 1000, _TICK_S))
+
+    def Ping(self, _request: Any, context: Any) -> robot_gateway_pb2.PingResponse:  # noqa: N802
+        self._begin("Ping", context)
+        return robot_gateway_pb2.PingResponse(
+            monotonic_ns=time.monotonic_ns(), wall_clock_unix_ns=time.time_ns(), boot_id="double"
+        )
 
 
 def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:

@@ -6,8 +6,8 @@ from typing import Self
 
 from common.backoff import Backoff
 from console.receiver.address import StreamAddress
-from console.receiver.errors import NoFrameError, StreamError
-from console.receiver.receiver import Receiver
+from console.receiver.errors import StreamError
+from tests.support.receiver import NoFrameError, Receiver
 from tests.support.waiting import wait_until
 
 

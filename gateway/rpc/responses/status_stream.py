@@ -1,4 +1,4 @@
-"""The status for all watchers: one snapshot per tick, serialised once for all who are due.
+"""The status for all watchers: at most one snapshot per tick, serialised once for all who are due.
 
 A watcher has no queue. While its response is on the way it is not due; when it comes back it gets the newest.
 """
@@ -69,8 +69,9 @@ class StatusStream:
             due_s = max(due_s + _TICK_S, self._clock())
             await asyncio.sleep(due_s - self._clock())
             self._tick += 1
-            self._refresh()
-            self._wake_due()
+            if any(each.pacing.may_be_due(self._tick) for each in self._watchers):
+                self._refresh()
+                self._wake_due()
 
     async def responses(
         self, min_interval_ms: int, recipient: Recipient, *, with_detections: bool = False

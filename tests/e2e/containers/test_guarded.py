@@ -16,11 +16,11 @@ from console.client.errors import GatewayError, NotAllowed, NotTrusted, Unreacha
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
-from console.receiver.receiver import Receiver
 from console.robots.login import parse_login
 from gateway.access.ca import new_ca
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
 from tests.support.engine import ROOT
+from tests.support.receiver import Receiver
 from tests.support.robotctl import robotctl
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher

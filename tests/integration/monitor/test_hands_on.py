@@ -8,15 +8,18 @@ from functools import partial
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QPushButton, QStyledItemDelegate, QWidget
 
 from console.client import PreviewProfile
+from console.monitor.event_log import EventLine, EventLog
+from console.window.event_list import EventList
 from console.window.monitor_window import MonitorWindow
 from console.window.preview_panel import PreviewPanel
 from console.window.programs import monitor
-from omniseer.gateway.v1 import preview_pb2
+from omniseer.gateway.v1 import fault_pb2, preview_pb2, system_status_pb2
 from omniseer.gateway.v1 import states_pb2 as states
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
+from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
 from tests.support.qt import keep_screenshot, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
@@ -52,9 +55,10 @@ class Desk:
         return [line.text.text() for line in self.preview.notes.shown if line.text.text()]
 
 
-@pytest.fixture
-def desk_work() -> Iterator[Desk]:
-    gateway = GatewayDouble()
+@pytest.fixture(params=[StreamingGatewayDouble, GatewayDouble], ids=["streamed", "polled"])
+def desk_work(request: pytest.FixtureRequest) -> Iterator[Desk]:
+    """In front of a gateway that streams its status, and of an older one, which is polled."""
+    gateway = request.param()
     with serving(gateway) as port, monitor(f"127.0.0.1:{port}") as window:
         window.activateWindow()
         made = Desk(window, gateway)
@@ -192,7 +196,7 @@ def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Des
 
 
 def test_closing_ends_everything_although_the_gateway_hangs() -> None:
-    gateway = GatewayDouble()
+    gateway = StreamingGatewayDouble()
     with serving(gateway) as port:
         with monitor(f"127.0.0.1:{port}") as window:
             until(window.preview.switch.isEnabled, "it is connected")
@@ -205,14 +209,31 @@ def test_closing_ends_everything_although_the_gateway_hangs() -> None:
         gateway.hold.set()
 
 
-def test_what_the_robot_says_is_never_markup(desk_work: Desk) -> None:
-    text = "<h1>low</h1><img src='x'>"
-    desk_work.gateway.status.faults.add(
-        id="x", severity=3, component="<b>battery</b>", message=text, remedy="<a href='x'>y</a>", active=True
-    )
-    faults = desk_work.window.side.faults
-    until(lambda: text in faults.shown[0].message.text(), "the fault")
-    assert faults.shown[0].message.textFormat() is Qt.TextFormat.PlainText
+@pytest.mark.parametrize("state", [states.PREVIEW_DISABLED, states.PREVIEW_FAULTED])
+def test_what_the_robot_says_is_never_markup(desk_work: Desk, state: states.PreviewState.ValueType) -> None:
+    status = system_status_pb2.SystemStatus()
+    mark_up(status)
+    for fault in status.faults:
+        fault.severity, fault.active = fault_pb2.FAULT_SEVERITY_ERROR, True
+    # An address that is none would be reported as this computer's own finding.
+    status.preview.endpoint.Clear()
+    status.preview.state = state
+    desk_work.gateway.status.CopyFrom(status)
+    window = desk_work.window
+    until(lambda: MARKUP in window.side.faults.shown[0].message.text(), "the fault")
+    until(desk_work.notes, "the robot's notes")
+    assert MARKUP in window.header.name.text()
+    assert MARKUP in shown_by_qt(window.header.target.toolTip())
+    assert any(MARKUP in shown_by_qt(line.text.toolTip()) for line in window.preview.notes.shown)
+    no_widget_takes_markup(window)
+    assert type(window.side.events.itemDelegate()) is QStyledItemDelegate, "Qt's own one draws plain text"
+
+
+def test_events_of_impossible_times_are_listed() -> None:
+    events = EventList()
+    times_s = (1e19, -1e19, 1e308, 253_402_300_799.0)
+    events.show_log(EventLog().with_lines(EventLine(at_s, "gone far") for at_s in times_s))
+    assert events.lines[1:] == ["--:--:--  gone far"] * 3
 
 
 def test_a_hundred_faults_do_not_burst_the_window(desk_work: Desk) -> None:

@@ -15,7 +15,6 @@ from console.window.lines import TintedLine
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from console.window.theme import draw_shape
-from console.window.window_settings import WindowSettings
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.qt import DARK, LIGHT, in_colours, keep_screenshot, let_pass, until
 from tests.support.snapshots import event
@@ -23,6 +22,7 @@ from tests.support.snapshots import event
 READABLE = 4.5
 """Contrast that the Web Content Accessibility Guidelines ask of text (level AA)."""
 SMALL_LAPTOP = (1366, 768)
+SETTINGS = "robot-gateway/monitor.ini"
 
 
 def troubled() -> GatewayDouble:
@@ -148,8 +148,7 @@ def test_it_opens_as_it_was_left() -> None:
     ],
 )
 def test_a_broken_settings_file_is_ignored(own_settings: Path, content: bytes) -> None:
-    file = Path(WindowSettings().file)
-    assert file.is_relative_to(own_settings)
+    file = own_settings / SETTINGS
     file.parent.mkdir(parents=True)
     file.write_bytes(content)
     width, height, _ = open_and_close()
@@ -157,7 +156,7 @@ def test_a_broken_settings_file_is_ignored(own_settings: Path, content: bytes) -
     assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
 
 
-def test_a_settings_file_that_can_not_be_written_is_ignored() -> None:
-    file = Path(WindowSettings().file)
+def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path) -> None:
+    file = own_settings / SETTINGS
     file.mkdir(parents=True)
     assert open_and_close()[:2] == (1280, 800)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import StreamingGatewayDouble, serving
 from tests.support.robotctl import ROBOTCTL, environment, only_line, robotctl_process
 from tests.support.waiting import wait_until
 
@@ -81,7 +81,7 @@ def opened(target: str, directory: Path) -> Iterator["subprocess.Popen[str]"]:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_closes_it_in_the_middle_of_a_call(tmp_path: Path, number: signal.Signals) -> None:
-    gateway = GatewayDouble()
+    gateway = StreamingGatewayDouble()
     with serving(gateway) as port, opened(f"127.0.0.1:{port}", tmp_path) as process:
         wait_until(lambda: len(gateway.calls) > 3 or process.poll() is not None, "it follows the robot", 30)
         gateway.hold.clear()

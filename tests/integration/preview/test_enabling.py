@@ -5,10 +5,10 @@ import asyncio
 import pytest
 
 from console.receiver.address import StreamAddress
-from console.receiver.receiver import Receiver
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.eventually import eventually
 from tests.support.free import udp_port_is_free
+from tests.support.receiver import Receiver
 from tests.support.running_gateway import running_gateway
 from tests.support.running_preview import RunningPreview
 

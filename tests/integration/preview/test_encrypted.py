@@ -10,9 +10,9 @@ import pytest
 from console.doctor import srt_probe
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
-from console.receiver.receiver import Receiver
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.eventually import eventually
+from tests.support.receiver import Receiver
 from tests.support.running_gateway import running_gateway
 from tests.support.running_preview import RunningPreview
 

@@ -12,9 +12,9 @@ import pytest
 
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
-from console.receiver.receiver import Receiver
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
+from tests.support.receiver import Receiver
 from tests.support.running_preview import RunningPreview
 from tests.support.visitors import visit
 from tests.support.waiting import wait_until

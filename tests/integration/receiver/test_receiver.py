@@ -8,19 +8,20 @@ import pytest
 
 from console.receiver.address import StreamAddress
 from console.receiver.errors import (
-    NoFrameError,
     StreamEndedError,
     StreamRefusedError,
     UndecodableError,
 )
-from console.receiver.receiver import Receiver
 from tests.support.free import free_udp_port
+from tests.support.receiver import NoFrameError, Receiver
 from tests.support.streams import SrtSender, encode
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
 PATIENCE_S = 20
+NINE_FRAMES_NS = 280_000_000
+"""At 30 frames per second, less than the demultiplexer corrects their times by."""
 
 
 @pytest.fixture
@@ -48,12 +49,11 @@ def test_a_frame_does_not_wait_for_the_next_one(sender: SrtSender, port: int, co
     pieces = encode(codec, 12)
     with viewer(port) as receiver:
         joined(sender)
-        for number, piece in enumerate(pieces, start=1):
+        for piece in pieces:
             sender.send(piece)
             frame = receiver.next_frame(PATIENCE_S)
             assert (frame.width, frame.height, frame.codec) == (320, 240, codec)
             assert not frame.corrupt
-            assert receiver.received == number
 
 
 def test_frames_differ_and_times_grow(sender: SrtSender, port: int) -> None:
@@ -63,7 +63,7 @@ def test_frames_differ_and_times_grow(sender: SrtSender, port: int) -> None:
         for piece in pieces:
             sender.send(piece)
         frames = [receiver.next_frame(PATIENCE_S) for _ in pieces]
-    assert len({frame.plane(0) for frame in frames}) == 10
+    assert len({frame.read() for frame in frames}) == 10
     times_ns = [frame.pts_ns for frame in frames if frame.pts_ns is not None]
     assert len(times_ns) == 10
     assert times_ns == sorted(set(times_ns))
@@ -77,9 +77,9 @@ def test_a_slow_caller_gets_the_newest_frames(sender: SrtSender, port: int) -> N
         first = receiver.next_frame(PATIENCE_S)
         for piece in pieces[1:]:
             sender.send(piece)
-        while (newest := receiver.next_frame(PATIENCE_S)) and receiver.received < 10:
-            pass
-        assert (newest.pts_ns or 0) > (first.pts_ns or 0)
+        newest = receiver.next_frame(PATIENCE_S)
+        while (newest.pts_ns or 0) < (first.pts_ns or 0) + NINE_FRAMES_NS:
+            newest = receiver.next_frame(PATIENCE_S)
 
 
 def test_the_codec_may_change_under_the_connection(sender: SrtSender, port: int) -> None:

@@ -224,11 +224,28 @@ def test_without_qt_one_line_says_what_to_install(running: VideoGround, tmp_path
     assert robotctl_process("--target", running.target, *command, PYTHONPATH=path).returncode == 0
 
 
-def test_without_a_display_one_line_says_what_to_do() -> None:
-    given = environment(DISPLAY="", WAYLAND_DISPLAY="")
+@pytest.mark.parametrize(
+    ("display", "said"),
+    [
+        ({"DISPLAY": ""}, "no display"),
+        ({"DISPLAY": "127.0.0.1:98", "QT_QPA_PLATFORM": "xcb"}, "Qt can't show"),
+    ],
+    ids=["none", "silent"],
+)
+def test_without_a_display_one_line_says_what_to_do_and_no_file_is_left(
+    tmp_path: Path, display: dict[str, str], said: str
+) -> None:
+    given = environment(WAYLAND_DISPLAY="")
     given.pop("QT_QPA_PLATFORM", None)
+    file = tmp_path / "kept.ts"
     done = subprocess.run(
-        [ROBOTCTL, "view"], env=given, capture_output=True, text=True, timeout=60, check=False
+        [ROBOTCTL, "view", "--record", str(file)],
+        env=given | display,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode == 1
-    assert "no display" in only_line(done.stderr)
+    assert said in only_line(done.stderr)
+    assert not file.exists()

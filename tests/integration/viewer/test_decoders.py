@@ -5,9 +5,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from console.receiver import clips
@@ -15,6 +17,7 @@ from console.receiver.decoder_probe import objection
 from tests.support.clips import FRAMES
 from tests.support.robotctl import robotctl_process
 from tests.support.video_ground import VideoGround, video_ground
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
@@ -79,6 +82,62 @@ def test_a_trial_finds_what_is_wrong(fault: str, why: str) -> None:
     )
     said = done.stdout.strip()
     assert said == why or (why and why in said), done
+
+
+TRIAL = "console.receiver.decoder_trial"
+ENDS_WITHIN_S = 2.0
+
+
+@contextmanager
+def trial_in_progress(**environment: str) -> Iterator[tuple["subprocess.Popen[bytes]", psutil.Process]]:
+    """A program that tries a decoder, and its trial."""
+    code = "from console.receiver.decoder_probe import objection; objection('vah264dec', 'h264', 60)"
+    with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=os.environ | environment) as parent:
+        try:
+            found = wait_until(lambda: psutil.Process(parent.pid).children(), "its trial has begun")
+            yield parent, found[0]
+        finally:
+            parent.kill()
+
+
+def ended(process: psutil.Process) -> bool:
+    return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
+
+
+def test_a_trial_that_hangs_in_its_driver_ends_with_its_parent() -> None:
+    with trial_in_progress(**with_doubles(vah264dec="stuck")) as (parent, trial):
+        wait_until(
+            lambda: any("libgstreamer" in each.path for each in trial.memory_maps()), "GStreamer is loaded"
+        )
+        parent.kill()
+        wait_until(lambda: ended(trial), "it ends", ENDS_WITHIN_S)
+
+
+def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(tmp_path: Path) -> None:
+    begun = tmp_path / "begun"
+    (tmp_path / "gi").mkdir()
+    (tmp_path / "gi/__init__.py").write_text(
+        f"import pathlib, sys, time\n"
+        f"if {TRIAL!r} in sys.orig_argv:\n"
+        f"    pathlib.Path({str(begun)!r}).touch()\n"
+        f"    time.sleep(60)\n"
+    )
+    with trial_in_progress(PYTHONPATH=str(tmp_path)) as (parent, trial):
+        wait_until(begun.exists, "it loads GStreamer")
+        parent.kill()
+        wait_until(lambda: ended(trial), "it ends", ENDS_WITHIN_S)
+
+
+def test_a_trial_whose_parent_is_gone_already_does_not_begin() -> None:
+    someone_else = str(os.getppid())
+    done = subprocess.run(
+        [sys.executable, "-m", TRIAL, "avdec_h264", "h264", someone_else],
+        cwd=ROOT,
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (os.EX_UNAVAILABLE, b"")
 
 
 def test_a_proven_decoder_is_used(running: VideoGround) -> None:

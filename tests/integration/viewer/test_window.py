@@ -15,7 +15,8 @@ from console.viewer.summary import FrameCounter
 from omniseer.gateway.v1 import preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import GatewayDouble, serving
+from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
+from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
@@ -140,7 +141,7 @@ def test_a_window_that_was_busy_paints_the_latest_frame_only(ground: VideoGround
 
 
 def test_a_refusal_is_shown_in_the_robots_words() -> None:
-    double = GatewayDouble()
+    double = StreamingGatewayDouble()
     double.accept = False
     with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
         shows(view, PlaybackState.OFF)
@@ -157,7 +158,7 @@ def seeing(
 ) -> Iterator[tuple[ViewWindow, GatewayDouble]]:
     """A robot that shows `source` and detects `boxes` in a camera image of this shape."""
     settings = {"source": {"kind": "gst", "description": source}}
-    double = GatewayDouble()
+    double = StreamingGatewayDouble()
     found = double.overlay.detections
     found.available, found.source_width_px, found.source_height_px = True, *shape
     found.detection_count = len(boxes)
@@ -269,6 +270,17 @@ def test_stale_boxes_are_not_painted(tmp_path: Path) -> None:
         until(lambda: yellow_is_there(video), "the box")
         double.overlay.detections.stale = True
         until(lambda: not yellow_is_there(video), "no box")
+
+
+def test_what_the_robot_says_is_never_markup() -> None:
+    double = StreamingGatewayDouble()
+    mark_up(double.status)
+    double.status.preview.endpoint.Clear()
+    double.status.preview.state = states.PREVIEW_FAULTED
+    with serving(double) as port, viewing(f"127.0.0.1:{port}", None, FrameCounter()) as view:
+        until(lambda: MARKUP in view.notes.text(), "the robot's notes")
+        assert MARKUP in shown_by_qt(view.notes.toolTip())
+        no_widget_takes_markup(view)
 
 
 def yellow_is_there(widget: QWidget) -> bool:

@@ -3,7 +3,7 @@
 import asyncio
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import replace
 
@@ -13,6 +13,7 @@ from common.backoff import Backoff
 from common.errors import UserError
 from console.client import (
     CaughtUp,
+    DeadlineExceeded,
     DesiredPreview,
     Event,
     EventGap,
@@ -20,6 +21,7 @@ from console.client import (
     FaultSeverity,
     GatewayError,
     NotAllowed,
+    Offset,
     Outage,
     OverlaySnapshot,
     PreviewChange,
@@ -27,6 +29,7 @@ from console.client import (
     Refused,
     Unreachable,
     Unsupported,
+    WatchedStatus,
 )
 from console.client.results import EventKind
 from console.monitor.conversation import RetryBackoff
@@ -45,6 +48,11 @@ class PlayedRobot:
 
     def __init__(self) -> None:
         self.error: GatewayError | None = None
+        self.streams = True
+        """Whether it streams its status with detections; else it is an older one."""
+        self.watching = 0
+        self.pings = 0
+        self.ping_error: GatewayError | None = None
         self.hangs = False
         self.looks = 0
         self.lists = snapshot()
@@ -67,6 +75,37 @@ class PlayedRobot:
         finally:
             self.open -= 1
 
+    async def watch_status(
+        self, min_interval_s: float = 0.1, *, include_detections: bool = False
+    ) -> AsyncGenerator[WatchedStatus | Outage]:
+        self.watching += 1
+        answered = False
+        try:
+            while True:
+                try:
+                    found = await self.overlay()
+                except Unreachable as error:
+                    if not answered:
+                        raise
+                    yield Outage(error, 1)
+                else:
+                    answered = True
+                    here = self.streams and include_detections
+                    yield WatchedStatus(
+                        status=found.status,
+                        monotonic_ns=None,
+                        detections=found.detections if here else None,
+                    )
+                await asyncio.sleep(min_interval_s)
+        finally:
+            self.watching -= 1
+
+    async def ping(self) -> Offset:
+        self.pings += 1
+        if self.ping_error:
+            raise self.ping_error
+        return Offset(0.0, 0.0)
+
     async def overlay(self) -> OverlaySnapshot:
         self.looks += 1
         if self.hangs:
@@ -75,16 +114,13 @@ class PlayedRobot:
             raise self.error
         return self.lists
 
-    async def enable_preview(
+    async def set_preview(
         self,
-        profile: PreviewProfile = PreviewProfile.UNKNOWN,
+        desired: DesiredPreview,
         *,
         settle_within_s: float = 10.0,  # noqa: ARG002  # the client's
     ) -> PreviewChange:
-        return await self._take(DesiredPreview(True, profile))
-
-    async def disable_preview(self, *, settle_within_s: float = 10.0) -> PreviewChange:  # noqa: ARG002  # the client's
-        return await self._take(DesiredPreview(False))
+        return await self._take(desired)
 
     async def events(
         self, after: EventPosition | None = None
@@ -111,9 +147,12 @@ class PlayedRobot:
         return PreviewChange(accepted=True, message="done", preview=snapshot().status.preview)
 
 
-@pytest.fixture
-def robot() -> PlayedRobot:
-    return PlayedRobot()
+@pytest.fixture(params=[True, False], ids=["streamed", "polled"])
+def robot(request: pytest.FixtureRequest) -> PlayedRobot:
+    """One that streams its status, and an older one, which is polled."""
+    played = PlayedRobot()
+    played.streams = request.param
+    return played
 
 
 @contextmanager
@@ -127,7 +166,7 @@ def following(
         yield worker
     finally:
         assert worker.close(10)
-        assert robot.open == 0
+        assert robot.open == robot.watching == 0
 
 
 def reached(worker: Worker, link_state: LinkState) -> MonitorState:
@@ -152,7 +191,7 @@ def test_a_robot_that_is_gone_is_lost_since_it_was_heard_last(robot: PlayedRobot
         robot.error = Unreachable("gone")
         lost = reached(worker, LinkState.LOST)
         assert lost.link.error is robot.error
-        assert lost.link.since_s == lost.received_s
+        assert lost.link.since_s == lost.heard_s >= lost.received_s
         assert lost.snapshot, "what was known stays known"
 
 
@@ -165,6 +204,46 @@ def test_it_tries_again_by_itself_and_counts(robot: PlayedRobot) -> None:
         state = reached(worker, LinkState.CONNECTED)
         assert state.link.attempts == 0
         assert state.link.since_s > began_s
+
+
+def test_a_streamed_status_is_watched_once_and_the_round_trip_measured_besides() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        first = reached(worker, LinkState.CONNECTED)
+        wait_until(lambda: robot.pings >= 2, "pings")
+        later = wait_until(
+            lambda: state if (state := worker.latest()).link.answer_ms != first.link.answer_ms else None,
+            "the answer's time of a ping",
+        )
+        assert robot.watching == 1
+        assert later.heard_s > first.heard_s
+        assert later.link.since_s == first.link.since_s
+
+
+def test_a_gateway_without_the_stream_is_polled_and_not_pinged() -> None:
+    robot = PlayedRobot()
+    robot.streams = False
+    with following(robot) as worker:
+        reached(worker, LinkState.CONNECTED)
+        wait_until(lambda: robot.looks > 8, "it is polled for longer than a ping's period")
+        assert robot.watching == robot.pings == 0
+
+
+def test_a_gateway_that_answers_no_ping_is_lost_although_its_stream_is_open() -> None:
+    robot = PlayedRobot()
+    robot.ping_error = DeadlineExceeded("the gateway did not answer")
+    with following(robot) as worker:
+        assert reached(worker, LinkState.LOST).link.error is robot.ping_error
+        wait_until(lambda: robot.watching == 0, "its stream is closed")
+
+
+def test_a_stream_that_ends_because_of_the_login_is_explained_by_a_call() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        reached(worker, LinkState.CONNECTED)
+        robot.ping_error = NotAllowed("the token of anna was revoked")
+        robot.error = NotAllowed("the credential that opened this stream is no longer valid")
+        assert reached(worker, LinkState.LOST).link.error is robot.ping_error
 
 
 def test_the_operator_need_not_wait_for_the_next_attempt(robot: PlayedRobot) -> None:
@@ -202,8 +281,20 @@ def test_a_request_is_carried_out_and_its_outcome_kept(robot: PlayedRobot) -> No
         )
         assert robot.requests == [DesiredPreview(True, PreviewProfile.LOW_BW)]
         assert isinstance(request.outcome, PreviewChange)
+        assert (taken := worker.latest().snapshot)
+        assert taken.status.preview == request.outcome.preview, "its effect is shown at once"
         worker.switch(DesiredPreview(False))
         wait_until(lambda: robot.requests[-1] == DesiredPreview(False), "the next one")
+
+
+def test_changes_are_reported_by_one_thread_alone(robot: PlayedRobot) -> None:
+    threads: set[str] = set()
+    with following(robot, lambda: threads.add(threading.current_thread().name)) as worker:
+        reached(worker, LinkState.CONNECTED)
+        worker.switch(DesiredPreview(True))
+        assert worker.latest().request, "the request is in the state at once"
+        wait_until(lambda: robot.requests, "the request")
+    assert threads == {"gateway-worker"}
 
 
 def test_one_request_at_a_time(robot: PlayedRobot) -> None:
@@ -248,7 +339,9 @@ def test_events_are_streamed_and_go_on_where_they_broke_off(robot: PlayedRobot) 
         assert texts(worker)[:2] == ["error: odometry: event 1", "error: odometry: event 2"]
 
 
-def test_a_gateway_that_streams_no_events_is_read_from_its_snapshots(robot: PlayedRobot) -> None:
+def test_a_gateway_that_streams_no_events_is_read_from_its_snapshots() -> None:
+    robot = PlayedRobot()
+    robot.streams = False
     robot.streamed = [Unsupported("an old gateway")]
     robot.lists = snapshot(lambda made: made.events.append(event(7, "preview running")))
     with following(robot) as worker:

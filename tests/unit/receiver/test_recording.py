@@ -1,5 +1,6 @@
 import os
 import select
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ def test_a_place_that_cannot_be_written_is_reported_before_anything_starts(tmp_p
 
 
 def test_what_several_connections_write_is_kept_in_order(tmp_path: Path) -> None:
-    with Recording(tmp_path / "drive.ts") as recording:
+    with closing(Recording(tmp_path / "drive.ts")) as recording:
         for number in range(300):
             os.write(recording.pipe, bytes([number % 256]) * 188)
     assert recording.error is None
@@ -33,7 +34,7 @@ def test_what_several_connections_write_is_kept_in_order(tmp_path: Path) -> None
 
 
 def test_a_full_disk_ends_it_and_delays_no_connection() -> None:
-    with Recording(Path("/dev/full")) as recording:
+    with closing(Recording(Path("/dev/full"))) as recording:
         os.write(recording.pipe, bytes(188))
         wait_until(lambda: recording.error, "the error is known")
         for _ in range(2000):
@@ -59,7 +60,7 @@ def test_where_nothing_came_the_name_is_free_again(tmp_path: Path) -> None:
     file = tmp_path / "drive.ts"
     Recording(file).close()
     assert not file.exists()
-    with Recording(file) as recording:
+    with closing(Recording(file)) as recording:
         os.write(recording.pipe, b"x")
     assert file.read_bytes() == b"x"
 
@@ -72,7 +73,7 @@ def test_closing_twice_is_closing_once(tmp_path: Path) -> None:
 
 
 def test_what_was_left_out_is_counted(tmp_path: Path) -> None:
-    with Recording(tmp_path / "drive.ts") as recording:
+    with closing(Recording(tmp_path / "drive.ts")) as recording:
         for _ in range(3):
             recording.add_gap()
     assert recording.gaps == 3

@@ -5,7 +5,7 @@ import pytest
 
 from console.client.results import Detection, Detections
 from console.viewer.geometry import Box
-from console.viewer.overlay import Overlay, marks
+from console.viewer.overlay import marks
 
 PICTURE = Box(0, 0, 640, 360)
 DOG = Detection(
@@ -20,7 +20,7 @@ DOG = Detection(
 )
 
 
-def overlay(*items: Detection, **changes: Any) -> Overlay:
+def overlay(*items: Detection, **changes: Any) -> Detections:
     found = Detections(
         available=True,
         stale=False,
@@ -30,17 +30,17 @@ def overlay(*items: Detection, **changes: Any) -> Overlay:
         count=len(items),
         items=items,
     )
-    return Overlay(replace(found, **changes), received_s=100.0)
+    return replace(found, **changes)
 
 
 def test_a_detection_is_drawn_around_its_centre_with_name_track_and_score() -> None:
-    (mark,) = marks(overlay(DOG), PICTURE, 100.2)
+    (mark,) = marks(overlay(DOG), PICTURE)
     assert mark.box == Box(270, 155, 100, 50)
     assert mark.label == "dog #3 92%"
 
 
 def test_what_the_robot_does_not_name_is_numbered() -> None:
-    (mark,) = marks(overlay(replace(DOG, class_name="", track_id="", score=float("nan"))), PICTURE, 100)
+    (mark,) = marks(overlay(replace(DOG, class_name="", track_id="", score=float("nan"))), PICTURE)
     assert mark.label == "class 16"
 
 
@@ -49,14 +49,9 @@ def test_what_the_robot_does_not_name_is_numbered() -> None:
     [{"stale": True}, {"available": False}, {"source_width_px": None}, {"source_height_px": 0}],
 )
 def test_boxes_that_may_be_wrong_are_not_drawn(changes: dict[str, Any]) -> None:
-    assert marks(overlay(DOG, **changes), PICTURE, 100) == []
-
-
-def test_boxes_go_when_the_robot_falls_silent() -> None:
-    assert marks(overlay(DOG), PICTURE, 100.9)
-    assert marks(overlay(DOG), PICTURE, 101.1) == []
+    assert marks(overlay(DOG, **changes), PICTURE) == []
 
 
 def test_without_detections_nothing_is_drawn() -> None:
-    assert marks(None, PICTURE, 100) == []
-    assert marks(overlay(), PICTURE, 100) == []
+    assert marks(None, PICTURE) == []
+    assert marks(overlay(), PICTURE) == []

@@ -107,6 +107,15 @@ def test_silence_is_a_loss(session: VideoSession, exchange: Exchange) -> None:
     assert "fell silent" in now.reason
 
 
+def test_a_stream_without_any_frame_is_reported_with_the_time_waited(
+    session: VideoSession, exchange: Exchange, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("console.viewer.session.deadline_s", lambda connected_s, _frame_s: connected_s)
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 2)
+    assert "no frame from srt://127.0.0.1:7100 within 4 s" in session.playback().reason
+
+
 def test_another_address_is_called_at_once(session: VideoSession, exchange: Exchange) -> None:
     session.follow(preview(PreviewState.RUNNING))
     called(exchange, 1)

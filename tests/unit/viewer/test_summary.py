@@ -1,4 +1,5 @@
 import os
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ def frame_at(at_s: float, *, corrupt: bool = False) -> Frame:
 
 
 def kept(tmp_path: Path) -> Recording:
-    with Recording(tmp_path / "drive.ts") as recording:
+    with closing(Recording(tmp_path / "drive.ts")) as recording:
         os.write(recording.pipe, bytes(MIB))
     return recording
 
@@ -80,6 +81,6 @@ def test_the_line_of_the_recording(tmp_path: Path) -> None:
 
 
 def test_the_line_of_a_recording_that_ended_early() -> None:
-    with Recording(Path("/dev/full")) as recording:
+    with closing(Recording(Path("/dev/full"))) as recording:
         os.write(recording.pipe, bytes(188))
     assert "ended early: No space left" in recording_line(recording)

@@ -28,12 +28,14 @@ class World:
 
     def __init__(self) -> None:
         self.board = Board()
+        self.taken = 0
         # Far from stale: nothing changes unless a test changes it.
         self._rules = Rules(
             {DETECTIONS: SourceRule(60_000, False), ODOMETRY: SourceRule(60_000, False)}, 60_000
         )
 
     def snapshot(self) -> Snapshot:
+        self.taken += 1
         return take(
             identity=Identity("lab", "1", insecure=False),
             rules=self._rules,
@@ -86,6 +88,16 @@ async def test_new_detections_wake_those_who_requested_them_and_no_others(
     world.board[ODOMETRY] = Received(Velocity(0.1, 0.0, 0.0), time.monotonic())
     assert (await waiting).status.health.measured_vx_mps == pytest.approx(0.1)
     assert (await read(full)).status.health.measured_vx_mps == pytest.approx(0.1)
+
+
+async def test_no_snapshot_is_taken_while_no_response_can_be_due(stream: tuple[World, StatusStream]) -> None:
+    world, watch = stream
+    slow = watch.responses(60_000, CALLER)
+    await read(slow)
+    taken = world.taken
+    with pytest.raises(TimeoutError):
+        await read(slow, QUIET_S)
+    assert world.taken == taken
 
 
 async def test_before_the_first_detections_the_field_says_that_there_are_none() -> None:
