@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -70,11 +71,11 @@ def _check(config_file: Path | None) -> None:
 
 def _encoders(config_file: Path | None, *, as_json: bool) -> None:
     settings = _load(config_file)
-    from preview.encoders import listing  # noqa: PLC0415
+    from preview.encoders import listing, trial  # noqa: PLC0415
     from preview.encoders.probe import TrialProber  # noqa: PLC0415
 
     encoders = settings.encoders
-    prober = TrialProber(settings.profiles.largest, encoders.probe_timeout_s)
+    prober = TrialProber(partial(trial.attempt, settings.profiles.largest, encoders.probe_timeout_s))
     rows = asyncio.run(listing.rows(prober, encoders.preference, encoders.allowed))
     print(json.dumps(rows, indent=2) if as_json else listing.table(rows))
 

@@ -19,7 +19,7 @@ What can fail, how it is noticed, and what follows:
 | last proven encoder fails | as above, and no alternative | FAULTED, retry with backoff |
 | pipeline fails again after running steadily | 15 s in RUNNING before it | backoff starts again at 1 s |
 | pipeline fails while it is being stopped | its fault, in STOPPING | logged, otherwise ignored |
-| encoder hangs after a fault | teardown not finished after 0.3 s | left behind, port and source are free |
+| encoder hangs after a fault | teardown not finished after 0.3 s | left behind; port and source are free |
 | encoder hangs when the preview is disabled | teardown not finished in time | crash marker, HungError |
 | source or listener hangs when stopped | HungError of the pipeline | HungError |
 | driver crashes the process | crash marker of the encoder in use | next process passes the encoder over |
@@ -35,7 +35,7 @@ second and must reconnect, to a stream of possibly another codec.
 import asyncio
 import logging
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +43,9 @@ from typing import Final, Protocol
 
 from common.errors import UserError
 from preview.config import PreviewSettings
-from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.crash_marker import CrashMarkerFile
+from preview.encoders.selection import Selection
 from preview.lifecycle import Event, Lifecycle, State
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
@@ -91,44 +93,6 @@ class Pipeline(Protocol):
         """Writes its graph, for finding the cause of a fault."""
 
 
-class PipelineFactory(Protocol):
-    """Builds pipelines."""
-
-    def __call__(self, plan: Plan, events: PipelineEvents) -> Pipeline:
-        """Returns a pipeline that is not yet started.
-
-        Raises:
-            UserError: the pipeline can't be built.
-        """
-
-
-class EncoderSelector(Protocol):
-    """Knows which encoders work; `preview.encoders.selection.Selection` is the real one."""
-
-    async def probe(self) -> bool:
-        """Tries encoders until one works that has not failed; False when there is none."""
-
-    def choose(self) -> tuple[Encoder, EncoderChoice]:
-        """Returns the encoder to use.
-
-        Raises:
-            UserError: none works.
-        """
-
-    def pass_over(self, name: str, reason: str) -> None:
-        """Excludes an encoder for a while."""
-
-
-class CrashMarker(Protocol):
-    """Names the encoder to blame if this process dies; `crash_marker.CrashMarkerFile` is the real one."""
-
-    def set(self, encoder: str, reason: str = "") -> None:
-        """Marks an encoder as in use, or as the one that hangs because of `reason`."""
-
-    def clear(self) -> None:
-        """Removes the mark."""
-
-
 class Supervisor:
     """The preview.
 
@@ -136,15 +100,15 @@ class Supervisor:
         settings: of the service.
         encoders: chooses the encoder of each pipeline.
         marker: informs the next process if an encoder ends this one.
-        new_pipeline: builds pipelines.
+        new_pipeline: builds pipelines; raises UserError where one can't be built.
     """
 
     def __init__(
         self,
         settings: PreviewSettings,
-        encoders: EncoderSelector,
-        marker: CrashMarker,
-        new_pipeline: PipelineFactory,
+        encoders: Selection,
+        marker: CrashMarkerFile,
+        new_pipeline: Callable[[Plan, PipelineEvents], Pipeline],
     ) -> None:
         self._settings = settings
         self._encoders = encoders
@@ -163,6 +127,8 @@ class Supervisor:
         self._retry_timer: asyncio.TimerHandle | None = None
         self._watchers = 0
         self._unwatched_timer: asyncio.TimerHandle | None = None
+        self._trials: asyncio.Task[bool] | None = None
+        self._closed = False
         self._wake = asyncio.Event()
         self._changed = asyncio.Event()
 
@@ -171,8 +137,10 @@ class Supervisor:
     def apply(self, desired: DesiredState) -> ActualState:
         """Accepts a desired state and returns the actual state at this moment.
 
-        The same revision again is the same request and changes nothing.
+        The same revision again is the same request and changes nothing; nor does any once the service stops.
         """
+        if self._closed:
+            return self.actual()
         if desired.revision != self._desired.revision or desired.revision == 0:
             profile = desired.profile if desired.enabled else self._desired.profile
             self._desired = replace(desired, profile=profile)
@@ -224,18 +192,17 @@ class Supervisor:
             HungError: a driver hangs; the process must end.
         """
         stopped = asyncio.create_task(stop.wait(), name="stop")
-        stopped.add_done_callback(lambda _: self._wake.set())
-        while not stop.is_set():
+        stopped.add_done_callback(lambda _: self._close())
+        while not self._closed:
             await self._wake.wait()
             self._wake.clear()
-            await self._reconcile()
+            while await self._step():
+                self._publish()
+
+    def _close(self) -> None:
+        self._closed = True
         self._desired = replace(self._desired, enabled=False)
         self._follow_desired(new_request=False)
-        await self._reconcile()
-
-    async def _reconcile(self) -> None:
-        while await self._step():
-            self._publish()
 
     async def _step(self) -> bool:
         """Does one thing that the lifecycle's state requires; False when there is none."""
@@ -243,6 +210,8 @@ class Supervisor:
         match self._lifecycle.state:
             case State.STOPPING:
                 await self._finish_stopping()
+            case State.DISABLED if self._teardowns:
+                await self._join_teardowns()
             case State.FAULTED:
                 return await self._recover()
             case State.STARTING if pipeline is None:
@@ -253,8 +222,17 @@ class Supervisor:
                 return False
         return True
 
+    async def _find_encoder(self) -> bool:
+        """Runs trials until an encoder works that has not failed; False when none does, or when disabled."""
+        self._trials = asyncio.create_task(self._encoders.probe(), name="trials until one succeeds")
+        try:
+            await asyncio.wait({self._trials})
+            return not self._trials.cancelled() and self._trials.result()
+        finally:
+            self._trials.cancel()
+
     async def _start(self) -> None:
-        await self._encoders.probe()
+        await self._find_encoder()
         if self._lifecycle.state is not State.STARTING:
             return
         try:
@@ -289,7 +267,7 @@ class Supervisor:
             await self._tear_down(self._pipeline, wait_s=ENCODER_STOP_S)
         if self._encoder_failed:
             self._encoder_failed = False
-            if await self._encoders.probe():
+            if await self._find_encoder():
                 self._lifecycle.count_fallback()
                 self._retry_now = True
             if self._lifecycle.state is not State.FAULTED:
@@ -415,6 +393,8 @@ class Supervisor:
         if self._retry_timer and after is not State.FAULTED:
             self._retry_timer.cancel()
             self._retry_timer = None
+        if self._trials and event is Event.DISABLE:
+            self._trials.cancel()
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()

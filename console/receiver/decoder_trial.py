@@ -1,24 +1,17 @@
-"""Trial of one decoder, in a process that may crash or hang: `python -m console.receiver.decoder_trial`.
+"""Trial of one decoder, in the child process of common.trial.
 
-The arguments are GStreamer's element and the codec. It decodes a clip, access unit by access unit, as a robot
-sends them, and prints one JSON object: {"reason": why the decoder is rejected, or empty}. The parent process
-sets the deadline.
+Decodes a clip, access unit by access unit, as a robot sends them.
 """
 
-import json
-import os
-import sys
 import time
 from itertools import pairwise
 from typing import Any, Final
 
-from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
+from common.trial import report
 from console.receiver import clips
 
-_LIFETIME_S: Final = 30
-"""More than any parent waits: bounds an orphan whose parent was killed between its start and ours."""
 _FIRST_FRAME_TIMEOUT_S: Final = 1.5
 """A driver may have to wake up."""
 _NEXT_FRAME_TIMEOUT_S: Final = 0.3
@@ -28,20 +21,11 @@ _MOST_HELD: Final = 1
 _FRAME_S: Final = 1 / 30
 
 
-def main() -> None:
-    """Runs one trial."""
-    end_with_parent(_LIFETIME_S)
-    element, codec = sys.argv[1:]
-    try:
-        # Kept until the end: a pipeline that is dropped while it plays is torn down badly.
-        pipeline = build(element, codec)
-        reason = trial(pipeline, clips.units(codec))
-    except UserError as error:
-        reason = str(error)
-    sys.stdout.write(json.dumps({"reason": reason}) + "\n")
-    sys.stdout.flush()
-    # Nothing is stopped: the process ends, so that a driver that hangs on closing can't delay the result.
-    os._exit(0)
+def main(element: str, codec: str) -> None:
+    """Tries GStreamer's decoder `element`."""
+    # Kept until the end: a pipeline that is dropped while it plays is torn down badly.
+    pipeline = build(element, codec)
+    report(trial(pipeline, clips.units(codec)))
 
 
 def build(element: str, codec: str) -> Any:
@@ -120,7 +104,3 @@ def _shows_bars(sample: Any) -> bool:
 def _error(pipeline: Any) -> str:
     message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
     return str(message.parse_error()[0].message) if message else ""
-
-
-if __name__ == "__main__":
-    main()

@@ -1,17 +1,15 @@
-"""Trial of one encoder, in a process that may crash or hang.
+"""Trial of one encoder, in the child process of common.trial.
 
-Encodes frames of the requested size with the elements of the real pipeline and prints one line of JSON: the
-reason of a failure, and the time to the first byte. The parent process enforces the deadline.
+Encodes frames of the requested size with the elements of the real pipeline and reports the time to the first
+byte.
 """
 
-import json
 import os
-import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Final
 
-from common.child import end_with_parent
+from common import trial
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
@@ -21,18 +19,8 @@ from preview.values import Target
 FRAMES: Final = 10
 _ENOUGH: Final = 8
 """Frames that must come out; an encoder may hold back one or two until more arrive."""
-_ENDS_WITHIN_S: Final = 90
-"""Longer than any configurable deadline: applies only when the parent was killed."""
 _NICE: Final = 5
 """A trial yields the CPU to a running stream."""
-
-
-@dataclass(slots=True)
-class Outcome:
-    """Result of the trial; `reason` is empty when the encoder is proven."""
-
-    reason: str = ""
-    first_byte_ms: float | None = None
 
 
 @dataclass(slots=True)
@@ -62,42 +50,31 @@ class _Counts:
         self.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
         return Gst.PadProbeReturn.OK
 
-    def outcome(self) -> Outcome:
+    @property
+    def error(self) -> str:
+        """What is wrong with the output; empty for nothing."""
         if self.encoded == 0:
-            return Outcome("it produced no output")
+            return "it produced no output"
         if self.encoded_bytes == 0:
-            return Outcome("it produced only empty buffers")
+            return "it produced only empty buffers"
         if self.parsed < _ENOUGH:
-            return Outcome(f"only {self.parsed} of {FRAMES} frames could be parsed")
-        if self.key_frames == 0:
-            return Outcome("its stream has no key frame")
-        return Outcome(first_byte_ms=(self.first_out_at - self.first_in_at) * 1000)
+            return f"only {self.parsed} of {FRAMES} frames could be parsed"
+        return "" if self.key_frames else "its stream has no key frame"
 
 
-def main() -> None:
-    """Runs one trial; the arguments are the encoder's name, width, height, frames/s and kbit/s.
-
-    `python -m preview.encoders.probe_child x264 1280 720 30 2500`
-    """
-    end_with_parent(_ENDS_WITHIN_S)
+def main(name: str, *figures: str) -> None:
+    """Tries the encoder `name`; the figures are width, height, frames/s and kbit/s."""
     os.nice(_NICE)
-    name, *figures = sys.argv[1:]
     width, height, fps, bitrate = (int(figure) for figure in figures)
-    try:
-        # Referenced until the end: a pipeline that is freed while playing is torn down badly.
-        pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
-        outcome = trial(pipeline)
-    except UserError as error:
-        outcome = Outcome(str(error))
-    # The pipeline is not stopped, so that a driver that hangs while closing can't delay the result.
-    sys.stdout.write(json.dumps(asdict(outcome)) + "\n")
-    sys.stdout.flush()
-    os._exit(0)
-
-
-def trial(pipeline: Any) -> Outcome:
-    """Encodes FRAMES moving frames and evaluates the output."""
+    # Referenced until the end: a pipeline that is freed while playing is torn down badly.
+    pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
     counts = _Counts()
+    error = encode(pipeline, counts)
+    trial.report(error, first_byte_ms=(counts.first_out_at - counts.first_in_at) * 1000)
+
+
+def encode(pipeline: Any, counts: _Counts) -> str:
+    """Encodes FRAMES moving frames and returns what went wrong; empty for nothing."""
     for element, pad, probe in (
         ("encoder", "sink", counts.on_input),
         ("encoder", "src", counts.on_encoded),
@@ -105,15 +82,16 @@ def trial(pipeline: Any) -> Outcome:
     ):
         pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
-        return Outcome(_first_error(pipeline) or "it can't be started")
+        refusal = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+        return str(refusal.parse_error()[0].message) if refusal else "it can't be started"
     message = pipeline.get_bus().timed_pop_filtered(
         Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
     )
     # Without any output the parser reports an error, too: a consequence, not the cause.
     consequence = counts.encoded_bytes == 0 and message.src is pipeline.get_by_name("parser")
     if message.type == Gst.MessageType.ERROR and not consequence:
-        return Outcome(message.parse_error()[0].message)
-    return counts.outcome()
+        return str(message.parse_error()[0].message)
+    return counts.error
 
 
 def build(encoder: Encoder, target: Target) -> Any:
@@ -135,12 +113,3 @@ def build(encoder: Encoder, target: Target) -> Any:
     kbps = target.bitrate_kbps
     properties.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
-
-
-def _first_error(pipeline: Any) -> str:
-    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
-    return str(message.parse_error()[0].message) if message else ""
-
-
-if __name__ == "__main__":
-    main()

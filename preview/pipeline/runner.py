@@ -44,15 +44,15 @@ class Runner:
     """One pipeline from building to teardown; created and used on the loop.
 
     Args:
-        plan: what to build.
         timeouts: deadlines.
+        plan: what to build.
         events: receives the first frame, the first fault and new statistics.
 
     Raises:
         UserError: the pipeline can't be built.
     """
 
-    def __init__(self, plan: Plan, timeouts: TimeoutSettings, events: PipelineEvents) -> None:
+    def __init__(self, timeouts: TimeoutSettings, plan: Plan, events: PipelineEvents) -> None:
         self.plan = plan
         self.measurement: Measurement | None = None
         self._bitrate = Decision(plan.target.bitrate_kbps)

@@ -10,7 +10,7 @@ import grpc
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
-from preview.encoders.selection import Prober
+from preview.encoders.probe import TrialProber
 from preview.rpc import mapping
 from preview.supervisor import Supervisor
 
@@ -29,7 +29,7 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
         encoders: all encoders, in order of preference.
     """
 
-    def __init__(self, supervisor: Supervisor, prober: Prober, encoders: Sequence[Encoder]) -> None:
+    def __init__(self, supervisor: Supervisor, prober: TrialProber, encoders: Sequence[Encoder]) -> None:
         self._supervisor = supervisor
         self._prober = prober
         self._encoders = tuple(encoders)

@@ -13,4 +13,4 @@ pytestmark = pytest.mark.gst
 
 class TestRunner(PipelineContract):
     def build(self, plan: Plan, events: PipelineEvents) -> Runner:
-        return Runner(plan, TimeoutSettings(), events)
+        return Runner(TimeoutSettings(), plan, events)

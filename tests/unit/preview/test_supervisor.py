@@ -11,7 +11,9 @@ import pytest
 from preview import supervisor
 from preview.config import FileSource, PreviewSettings, TestSource, TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE, Encoder
-from preview.encoders.selection import Selection, Verdict
+from preview.encoders.crash_marker import CrashMarkerFile
+from preview.encoders.probe import TrialProber, Verdict
+from preview.encoders.selection import Selection
 from preview.lifecycle import Counters, State
 from preview.pipeline.events import Blame, Fault, HungError
 from preview.supervisor import ENCODER_STOP_S, GRAPH, STEADY_AFTER_S, Supervisor
@@ -51,25 +53,21 @@ def test_every_row_of_the_failure_table_has_a_test() -> None:
     assert set(rows[2:]) == tested
 
 
-class Prober:
-    """Knows the results of all trials; a trial takes `trial_s`."""
+def prober(trial_s: float = 0.0, **results: Verdict) -> TrialProber:
+    """Trials with these results, by default good ones; each takes `trial_s`."""
 
-    def __init__(self, trial_s: float = 0.0, **results: Verdict) -> None:
-        self.verdicts: dict[str, Verdict] = {}
-        self._trial_s = trial_s
-        self._results = {name.replace("_", "-"): result for name, result in results.items()}
+    async def attempt(encoder: Encoder) -> Verdict:
+        await asyncio.sleep(trial_s)
+        return results.get(encoder.name.replace("-", "_"), PROVEN)
 
-    async def verdict(self, encoder: Encoder) -> Verdict:
-        if encoder.name not in self.verdicts:
-            await asyncio.sleep(self._trial_s)
-        self.verdicts[encoder.name] = self._results.get(encoder.name, PROVEN)
-        return self.verdicts[encoder.name]
+    return TrialProber(attempt)
 
 
-class Marker:
+class Marker(CrashMarkerFile):
     """Keeps what the crash marker says now."""
 
-    def __init__(self) -> None:
+    def __init__(self, directory: Path) -> None:
+        super().__init__(directory)
         self.encoder = ""
         self.reason = ""
 
@@ -86,7 +84,7 @@ class Preview:
     Args:
         directory: runtime directory.
         scripts: what happens to its pipelines, in turn.
-        prober: knows which encoders work; default: all.
+        trials: by default, every encoder works.
         order: allowed encoders.
         settings: that differ from the defaults.
     """
@@ -95,15 +93,15 @@ class Preview:
         self,
         directory: Path,
         *scripts: Script,
-        prober: Prober | None = None,
+        trials: TrialProber | None = None,
         order: tuple[str, ...] = ("mpp-h265", "va-h265", "x264"),
         **settings: object,
     ) -> None:
         loop = asyncio.get_running_loop()
         values = {"source": TestSource(), "runtime_dir": directory, **settings}
         self.pipelines = PipelineDoubles(*scripts)
-        self.marker = Marker()
-        self.selection = Selection([CATALOGUE[name] for name in order], 600, prober or Prober(), loop.time)
+        self.marker = Marker(directory)
+        self.selection = Selection([CATALOGUE[name] for name in order], 600, trials or prober(), loop.time)
         made = PreviewSettings(**values)  # type: ignore[arg-type]
         self.supervisor = Supervisor(made, self.selection, self.marker, self.pipelines)
         self.stop = asyncio.Event()
@@ -179,7 +177,7 @@ async def replaced(preview: Preview, fault: Fault) -> None:
 @row("no encoder works")
 @in_virtual_time
 async def test_without_an_encoder(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(x264=NO_OUTPUT), order=("x264",))
+    preview = Preview(tmp_path, trials=prober(x264=NO_OUTPUT), order=("x264",))
     async with preview.serving():
         preview.supervisor.apply(ON)
         state = await preview.until(lambda actual: actual.counters.faults == 2)
@@ -313,6 +311,24 @@ async def test_an_encoder_that_hangs_is_left_behind(tmp_path: Path) -> None:
 
 
 @row("encoder hangs after a fault")
+@pytest.mark.parametrize("disabled_after_s", [0.1, 10])
+@in_virtual_time
+async def test_an_encoder_that_hangs_is_freed_when_disabled_while_faulted(
+    tmp_path: Path, disabled_after_s: float
+) -> None:
+    """No encoder takes over here: disabling finds no pipeline, but a driver that is still occupied."""
+    scripts = [Script(fault=SILENT, encoder_hangs=True), *[Script(build_error="no camera")] * 9]
+    preview = Preview(tmp_path, *scripts, order=("mpp-h265",))
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        await asyncio.sleep(disabled_after_s)
+        assert preview.supervisor.actual().state is State.FAULTED
+        preview.supervisor.apply(OFF)
+    assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
+
+
+@row("encoder hangs after a fault")
 @in_virtual_time
 async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Path) -> None:
     preview = Preview(tmp_path, Script(fault=SILENT, stop_s=2))
@@ -376,7 +392,7 @@ async def test_the_crash_marker_names_the_encoder_as_long_as_it_is_in_use(tmp_pa
 @row("hardware preferred, only x264 works")
 @in_virtual_time
 async def test_software_for_hardware(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(mpp_h265=NO_OUTPUT, va_h265=NO_OUTPUT))
+    preview = Preview(tmp_path, trials=prober(mpp_h265=NO_OUTPUT, va_h265=NO_OUTPUT))
     async with preview.serving():
         preview.supervisor.apply(ON)
         state = await preview.runs_with("x264")
@@ -461,20 +477,21 @@ async def test_enabled_again_while_it_stops(tmp_path: Path) -> None:
 
 @in_virtual_time
 async def test_disabled_during_the_trials_nothing_is_built(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(trial_s=2))
+    preview = Preview(tmp_path, trials=prober(trial_s=2))
     async with preview.serving():
         preview.supervisor.apply(ON)
         await asyncio.sleep(1)
         preview.supervisor.apply(OFF)
         await preview.reaches(State.DISABLED)
-        assert now() == pytest.approx(2)
+        assert now() == pytest.approx(1)
+        await asyncio.sleep(10)
         assert not preview.pipelines.built
 
 
 @pytest.mark.parametrize("request_", [AGAIN, OFF], ids=["on", "off"])
 @in_virtual_time
 async def test_a_request_during_the_trials_after_a_fault(tmp_path: Path, request_: DesiredState) -> None:
-    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=5), prober=Prober(trial_s=2))
+    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=5), trials=prober(trial_s=2))
     async with preview.serving():
         preview.supervisor.apply(ON)
         await preview.reaches(State.FAULTED)
@@ -567,6 +584,20 @@ async def test_a_request_for_a_retry_does_not_outlive_a_disable(tmp_path: Path) 
         faulted_at = now()
         await preview.reaches(State.STARTING)
         assert now() - faulted_at == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("after_s", [0.5, 1.5])
+@in_virtual_time
+async def test_a_stop_does_not_wait_for_trials(tmp_path: Path, after_s: float) -> None:
+    """Neither for those of a start, nor for those after a fault."""
+    preview = Preview(tmp_path, Script(fault=ENCODER), trials=prober(trial_s=1, mpp_h265=PROVEN))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await asyncio.sleep(after_s)
+        stopped_at = now()
+    assert now() - stopped_at < 0.1
+    assert preview.supervisor.apply(AGAIN).state is State.DISABLED, "nothing is started any more"
+    assert preview.supervisor.actual().state is State.DISABLED
 
 
 @in_virtual_time

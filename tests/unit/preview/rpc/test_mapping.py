@@ -7,7 +7,7 @@ import pytest
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import CATALOGUE
-from preview.encoders.selection import Verdict
+from preview.encoders.probe import Verdict
 from preview.lifecycle import Counters, State
 from preview.rpc import mapping
 from preview.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
