@@ -15,6 +15,7 @@ What can fail, how it is noticed, and what follows:
 | source stalls | watchdog: no frames come in | FAULTED, retry with backoff |
 | encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
 | encoder is silent, or gives empty buffers | watchdog: frames go in, none come out | next encoder at once |
+| source's or listener's driver blocks a start | deadline of the call | FAULTED, retry with backoff |
 | encoder's driver blocks a start or an adjustment | deadline of the call | next encoder at once |
 | last proven encoder fails | as above, and no alternative | FAULTED, retry with backoff |
 | pipeline fails again after running steadily | 15 s in RUNNING before it | backoff starts again at 1 s |

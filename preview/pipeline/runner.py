@@ -20,13 +20,13 @@ from preview.config import TimeoutSettings
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
 from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
-from preview.pipeline.events import Fault, HungError, PipelineEvents
+from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
 from preview.pipeline.plan import Plan
 from preview.pipeline.threads import in_thread
-from preview.pipeline.watchdogs import Silent, Watchdogs
+from preview.pipeline.watchdogs import Watchdogs
 from preview.values import Measurement, Profile, StreamState, Target
 
 _log = logging.getLogger(__name__)
@@ -87,11 +87,12 @@ class Runner:
         try:
             outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
         except TimeoutError:
-            self._fail(faults.from_silence(Silent.ENCODER, self._timeouts.start_s, self.plan))
+            self._fail(faults.blocked(self._parts, self.plan, self._timeouts.start_s))
             return
         self._read_bus()
         if outcome == Gst.StateChangeReturn.FAILURE:
-            self._fail(faults.unexplained(self.plan))  # Counts only if no element posted an error.
+            # Counts only if no element posted an error.
+            self._fail(faults.of(Blame.ENCODER, "could not be started and gave no reason", self.plan))
             return
         self._spawn("watch", self._watch())
 
@@ -170,7 +171,7 @@ class Runner:
             self._events.first_frame()
 
     def _source_ended(self) -> None:
-        self._fail(faults.end_of_stream(self.plan))
+        self._fail(faults.of(Blame.SOURCE, "has ended", self.plan))
 
     def _fail(self, fault: Fault) -> None:
         if not self._ended.done():
@@ -200,7 +201,7 @@ class Runner:
             now = time.monotonic()
             silent = watchdogs.check(self._parts.rate.get_property("in"), self._framing.frames, now)
             if silent:
-                self._fail(faults.from_silence(silent, watchdogs.silence_s(silent, now), self.plan))
+                self._fail(faults.of(*silent, self.plan))
                 return
             if now - reading.at >= _WINDOW_S:
                 reading = self._measure(reading)
@@ -262,7 +263,7 @@ class Runner:
                 if calling.done():
                     calling.result()
             except TimeoutError:
-                self._fail(faults.encoder_hung(self.plan, when))
+                self._fail(faults.of(Blame.ENCODER, f"hung when {when}", self.plan))
             finally:
                 calling.cancel()
 

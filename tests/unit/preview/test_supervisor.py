@@ -28,6 +28,7 @@ SILENT = Fault(Blame.ENCODER, "encoder mpp-h265 has produced no frame for 1.0 s"
 STUCK = Fault(Blame.ENCODER, "encoder mpp-h265 hung when the profile was changed")
 SOURCE = Fault(Blame.SOURCE, "camera /dev/video0 has ended.")
 STALLED = Fault(Blame.SOURCE, "camera /dev/video0 has sent no frame for 1.5 s.")
+BLOCKED = Fault(Blame.SOURCE, "camera /dev/video0 has not started within 5 s.")
 PORT = Fault(Blame.LISTENER, "UDP port 7100 on 0.0.0.0 can't be used")
 ON = DesiredState(1, True, Profile.BALANCED)
 OFF = DesiredState(2, False)
@@ -238,6 +239,12 @@ async def test_an_encoder_that_fails(tmp_path: Path, after_s: float) -> None:
 @in_virtual_time
 async def test_a_silent_encoder(tmp_path: Path, after_s: float) -> None:
     await replaced(Preview(tmp_path, Script(fault=SILENT, fault_after_s=after_s)), SILENT)
+
+
+@row("source's or listener's driver blocks a start")
+@in_virtual_time
+async def test_a_camera_that_blocks_the_start(tmp_path: Path) -> None:
+    await retried(Preview(tmp_path, Script(fault=BLOCKED)), BLOCKED.text)
 
 
 @row("encoder's driver blocks a start or an adjustment")
