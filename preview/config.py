@@ -169,7 +169,9 @@ class TimeoutSettings(Section):
 
 
 def _default_runtime_dir() -> Path:
-    return Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / "robot-preview"
+    if own := os.environ.get("XDG_RUNTIME_DIR"):
+        return Path(own) / "robot-preview"
+    return Path(tempfile.gettempdir()) / f"robot-preview-{os.getuid()}"
 
 
 class PreviewSettings(Settings):
@@ -189,5 +191,5 @@ class PreviewSettings(Settings):
     adaptive: AdaptiveSettings = AdaptiveSettings()
     timeouts: TimeoutSettings = TimeoutSettings()
     runtime_dir: Path = Field(default_factory=_default_runtime_dir)
-    """Directory for the graph of the last failed pipeline, the crash report and the crash marker.
-    Preferably on a tmpfs."""
+    """Directory for the graph of the last failed pipeline, the crash report and the crash marker; made this
+    user's own. Preferably on a tmpfs."""

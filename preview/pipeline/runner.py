@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.gst import Gst
+from common.private_files import make_own_directory
 from preview.config import TimeoutSettings
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
@@ -144,7 +145,7 @@ class Runner:
         """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
 
         def write() -> None:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_own_directory(path.parent)
             graph = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
             path.write_text(graph, encoding="utf-8")
 
