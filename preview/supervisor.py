@@ -25,6 +25,7 @@ What can fail, how it is noticed, and what follows:
 | source or listener hangs when stopped | HungError of the pipeline | HungError |
 | driver crashes the process | crash marker of the encoder in use | next process passes the encoder over |
 | hardware preferred, only x264 works | selection | runs, and last_error says so |
+| more viewers than srt.max_viewers | asked in SRT's handshake | refused, counted and logged |
 | gateway is gone | no watcher for without_gateway_s | disabled until the next request |
 
 HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
@@ -269,7 +270,7 @@ class Supervisor:
         if self._encoder_failed:
             self._encoder_failed = False
             if await self._find_encoder():
-                self._lifecycle.count_fallback()
+                self._lifecycle.count(fallbacks=1)
                 self._retry_now = True
             if self._lifecycle.state is not State.FAULTED:
                 return True  # A request came during the trials.
@@ -329,8 +330,12 @@ class Supervisor:
         self._running_since = asyncio.get_running_loop().time()
         self._move(Event.FIRST_FRAME)
 
-    def measured(self) -> None:
+    def measured(self, viewers_refused: int) -> None:
         """Handles new statistics of the pipeline."""
+        if viewers_refused:
+            limit = self._settings.srt.max_viewers
+            _log.warning("refused %d viewers: %d are connected (srt.max_viewers)", viewers_refused, limit)
+            self._lifecycle.count(viewers_refused=viewers_refused)
         running_s = asyncio.get_running_loop().time() - self._running_since
         if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
             self._lifecycle.reset_backoff()

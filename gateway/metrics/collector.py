@@ -165,6 +165,7 @@ def _preview(preview: PreviewView) -> Iterator[Metric]:
         ("restarts", "Those of them after a fault.", counters.restarts),
         ("faults", "Times it became faulted.", counters.faults),
         ("fallbacks", "Encoders that were passed over for the next one.", counters.fallbacks),
+        ("viewers_refused", "Connections of viewers beyond srt.max_viewers.", counters.viewers_refused),
     ):
         yield CounterFamily(f"{_PREFIX}_preview_{name}", what, value=count)
 

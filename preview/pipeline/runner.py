@@ -27,6 +27,7 @@ from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
 from preview.pipeline.plan import Plan
 from preview.pipeline.threads import in_thread
+from preview.pipeline.viewer_limit import ViewerLimit
 from preview.pipeline.watchdogs import Watchdogs
 from preview.values import Measurement, Profile, StreamState, Target
 
@@ -63,6 +64,7 @@ class Runner:
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
         self._framing = Framing(parts, loop, self._first_frame, plan.target.fps)
+        self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
         self._keyframe_gate = KeyframeGate(parts, loop, self._request_key_frame)
         self._file_loop = FileLoop(parts, loop, self._source_ended) if plan.source.loops else None
         self._bus = parts.pipeline.get_bus()
@@ -212,7 +214,7 @@ class Runner:
         self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
         if self.plan.adaptive:
             self._adapt_bitrate(statistics.link_report(before, now))
-        self._events.measured()
+        self._events.measured(self._viewer_limit.take_refused())
         return now
 
     # --- calls into the encoder's driver ---

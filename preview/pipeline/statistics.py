@@ -50,7 +50,7 @@ def read(framing: Framing, sink: Any) -> Reading:
     stats = sink.get_property("stats")
     # Without viewers the structure has no such field.
     callers = stats.get_value("callers") if stats is not None and stats.has_field("callers") else None
-    viewers = {_address(caller): _viewer(caller) for caller in callers or ()}
+    viewers = {address_of(caller.get_value("caller-address")): _viewer(caller) for caller in callers or ()}
     return Reading(time.monotonic(), framing.frames, framing.bytes, viewers)
 
 
@@ -87,9 +87,9 @@ def _share(count: int, sent: int) -> float:
     return min(100.0, 100.0 * count / sent) if sent > 0 else 0.0
 
 
-def _address(caller: Any) -> str:
-    address = caller.get_value("caller-address")
-    return f"{address.get_address().to_string()}:{address.get_port()}" if address else ""
+def address_of(socket_address: Any) -> str:
+    """Returns "HOST:PORT" of a socket address."""
+    return f"{socket_address.get_address().to_string()}:{socket_address.get_port()}" if socket_address else ""
 
 
 def _viewer(caller: Any) -> Viewer:

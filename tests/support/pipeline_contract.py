@@ -35,7 +35,8 @@ class Events:
         self.faults.append(fault)
         self._count("failed")
 
-    def measured(self) -> None:
+    def measured(self, viewers_refused: int) -> None:
+        assert viewers_refused == 0
         self._count("measured")
 
     async def wait_for(self, name: str, count: int = 1) -> None:

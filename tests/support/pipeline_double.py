@@ -27,6 +27,7 @@ class Script:
         fault_after_s: 0: no frame comes.
         fault_in_switch: reported when the profile is switched.
         fault_in_stop: reported while it is being stopped.
+        viewers_refused: in each window.
         stop_s: how long its encoder takes to stop.
         encoder_hangs: its encoder never stops.
         listener_hangs: its listener never stops.
@@ -37,6 +38,7 @@ class Script:
     fault_after_s: float = 0.0
     fault_in_switch: Fault | None = None
     fault_in_stop: Fault | None = None
+    viewers_refused: int = 0
     stop_s: float = 0.02
     encoder_hangs: bool = False
     listener_hangs: bool = False
@@ -91,7 +93,7 @@ class PipelineDouble:
         while True:
             await asyncio.sleep(WINDOW_S)
             self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
-            self._events.measured()
+            self._events.measured(self._script.viewers_refused)
 
     def _fail(self, fault: Fault) -> None:
         if self._end():

@@ -79,4 +79,5 @@ def _counters(message: wire.PreviewCounters) -> PreviewCounters:
         restarts=message.restarts,
         faults=message.faults,
         fallbacks=message.fallbacks,
+        viewers_refused=message.viewers_refused,
     )

@@ -92,4 +92,5 @@ def _counters(counters: Counters) -> pb.PreviewCounters:
         restarts=counters.restarts,
         faults=counters.faults,
         fallbacks=counters.fallbacks,
+        viewers_refused=counters.viewers_refused,
     )

@@ -98,7 +98,7 @@ def test_a_first_frame_alone_does_not_shorten_the_delay() -> None:
 def test_counters() -> None:
     lifecycle = in_state(State.RUNNING)
     lifecycle.handle(Event.FAILURE)
-    lifecycle.count_fallback()
+    lifecycle.count(fallbacks=1)
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)
     lifecycle.handle(Event.DISABLE)

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -407,6 +408,17 @@ async def test_software_for_hardware(tmp_path: Path) -> None:
             "no hardware encoder works, so the CPU encodes with x264: it produced no output"
         )
         assert state.counters == Counters(starts=1)
+
+
+@row("more viewers than srt.max_viewers")
+@in_virtual_time
+async def test_refused_viewers_are_counted_over_pipelines(tmp_path: Path) -> None:
+    refusing = Script(viewers_refused=2, fault=SOURCE, fault_after_s=0.6)
+    preview = Preview(tmp_path, refusing, replace(refusing, viewers_refused=1))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.until(lambda actual: actual.counters.faults == 2)
+        assert preview.supervisor.actual().counters.viewers_refused == 3
 
 
 @row("gateway is gone")

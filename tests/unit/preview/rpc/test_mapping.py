@@ -18,7 +18,7 @@ FULL = ActualState(
     state=State.RUNNING,
     profile=Profile.HIGH_QUALITY,
     last_error="something",
-    counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+    counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
     port=7100,
     latency_ms=125,
     stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
@@ -57,7 +57,7 @@ def test_a_full_status_fills_every_field() -> None:
 
 def test_numbers_arrive_where_they_belong() -> None:
     actual = mapping.actual_state(FULL)
-    assert actual.counters == pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4)
+    assert actual.counters == pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5)
     assert (actual.stream.target_bitrate_kbps, actual.stream.fps) == (3000, 60)
     assert (actual.listener.port, actual.listener.latency_ms) == (7100, 125)
     assert (actual.measurement.worst_rtt_ms, actual.measurement.worst_loss_percent) == (30.5, 1.5)
