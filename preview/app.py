@@ -35,7 +35,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     selection = Selection(encoders.allowed, encoders.forgive_after_s, prober)
     marker = CrashMarkerFile(settings.runtime_dir)
     marker.blame_previous(selection)
-    supervisor = Supervisor(settings, selection, marker, partial(Runner, settings.timeouts))
+    supervisor = Supervisor(settings, selection, marker, Runner)
     server = rpc.new_server()
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)

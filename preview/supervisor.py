@@ -51,7 +51,7 @@ from preview.encoders.selection import Selection
 from preview.lifecycle import Event, Lifecycle, State
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState, Target
+from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState
 
 _log = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class Pipeline(Protocol):
     async def start(self) -> None:
         """Starts it. Failures are reported as events, also after this has returned."""
 
-    async def switch(self, profile: Profile, target: Target) -> None:
+    async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
 
     async def stop(self) -> "asyncio.Task[bool]":
@@ -219,7 +219,8 @@ class Supervisor:
             case State.STARTING if pipeline is None:
                 await self._start()
             case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
-                await self._switch_profile(pipeline)
+                _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
+                await pipeline.switch(profile)
             case _:
                 return False
         return True
@@ -256,11 +257,6 @@ class Supervisor:
                 f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
             )
             _log.warning("%s", self._last_error)
-
-    async def _switch_profile(self, pipeline: Pipeline) -> None:
-        profile = self._desired.profile
-        _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
-        await pipeline.switch(profile, self._settings.profiles.targets[profile])
 
     async def _recover(self) -> bool:
         """Tears the failed pipeline down and arranges what follows; False when only waiting is left."""

@@ -82,7 +82,8 @@ def build(plan: Plan) -> Parts:
     find = body.get_by_name
     encoder, sink = find("encoder"), find("sink")
     adjustable = Adjustable(find("rate_caps"), find("size"), encoder)
-    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, plan.highest_kbps)
+    highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
+    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
     apply_target(adjustable, plan)
     _listen(sink, plan)
     return Parts(
@@ -203,6 +204,6 @@ def _listen(sink: Any, plan: Plan) -> None:
         ("enable-last-sample", False),
     ):
         sink.set_property(name, value)
-    if plan.encrypted:
+    if plan.passphrase:
         Gst.util_set_object_arg(sink, "pbkeylen", str(srt.key_length_bytes))
         sink.set_property("passphrase", plan.passphrase)

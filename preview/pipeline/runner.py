@@ -11,13 +11,13 @@ import logging
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from common.gst import Gst
 from common.private_files import make_own_directory
-from preview.config import TimeoutSettings
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
 from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
@@ -29,7 +29,7 @@ from preview.pipeline.plan import Plan
 from preview.pipeline.threads import in_thread
 from preview.pipeline.viewer_limit import ViewerLimit
 from preview.pipeline.watchdogs import Watchdogs
-from preview.values import Measurement, Profile, StreamState, Target
+from preview.values import Measurement, Profile, StreamState
 
 _log = logging.getLogger(__name__)
 
@@ -46,7 +46,6 @@ class Runner:
     """One pipeline from building to teardown; created and used on the loop.
 
     Args:
-        timeouts: deadlines.
         plan: what to build.
         events: receives the first frame, the first fault and new statistics.
 
@@ -54,11 +53,11 @@ class Runner:
         UserError: the pipeline can't be built.
     """
 
-    def __init__(self, timeouts: TimeoutSettings, plan: Plan, events: PipelineEvents) -> None:
+    def __init__(self, plan: Plan, events: PipelineEvents) -> None:
         self.plan = plan
         self.measurement: Measurement | None = None
         self._bitrate = Decision(plan.target.bitrate_kbps)
-        self._timeouts = timeouts
+        self._timeouts = plan.settings.timeouts
         self._events = events
         self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
         loop = self._loop = asyncio.get_running_loop()
@@ -79,9 +78,8 @@ class Runner:
     def stream(self) -> StreamState:
         """Parameters of the stream being served."""
         plan, bitrate = self.plan, self._bitrate
-        return StreamState(
-            plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, plan.encrypted
-        )
+        encrypted = bool(plan.passphrase)
+        return StreamState(plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, encrypted)
 
     async def start(self) -> None:
         """Starts the pipeline. Failures are reported as events, also after this has returned."""
@@ -99,9 +97,10 @@ class Runner:
             return
         self._spawn("watch", self._watch())
 
-    async def switch(self, profile: Profile, target: Target) -> None:
+    async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
-        plan = self.plan = self.plan.switched(profile, target)
+        plan = self.plan = replace(self.plan, profile=profile)
+        target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
         elements, framing = self._parts.adjustable, self._framing
@@ -212,7 +211,7 @@ class Runner:
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)
         self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
-        if self.plan.adaptive:
+        if self.plan.settings.adaptive.enabled:
             self._adapt_bitrate(statistics.link_report(before, now))
         self._events.measured(self._viewer_limit.take_refused())
         return now

@@ -10,7 +10,7 @@ from pathlib import Path
 from common.errors import UserError
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan
-from preview.values import Measurement, Profile, StreamState, Target
+from preview.values import Measurement, Profile, StreamState
 
 FIRST_FRAME_S = 0.05
 WINDOW_S = 0.5
@@ -60,13 +60,15 @@ class PipelineDouble:
     @property
     def stream(self) -> StreamState:
         plan = self.plan
-        return StreamState(plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, plan.encrypted)
+        return StreamState(
+            plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, bool(plan.passphrase)
+        )
 
     async def start(self) -> None:
         self._serving = asyncio.create_task(self._serve())
 
-    async def switch(self, profile: Profile, target: Target) -> None:
-        self.plan = self.plan.switched(profile, target)
+    async def switch(self, profile: Profile) -> None:
+        self.plan = replace(self.plan, profile=profile)
         if self._script.fault_in_switch:
             self._fail(self._script.fault_in_switch)
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import pytest
 
 from common.gst import Gst
-from preview.config import TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import Blame
 from preview.pipeline.runner import Runner
@@ -68,8 +67,8 @@ def elements(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.mark.usefixtures("elements")
 async def test_the_one_that_blocks_is_blamed(description: str, encoder: str, blame: Blame, text: str) -> None:
     events = Events()
-    plan = replace(plan_of(description), encoder=replace(CATALOGUE["x264"], element=encoder))
-    pipeline = Runner(TimeoutSettings(start_s=0.5), plan, events)
+    plan = replace(plan_of(description, start_s=0.5), encoder=replace(CATALOGUE["x264"], element=encoder))
+    pipeline = Runner(plan, events)
     await pipeline.start()
     (fault,) = events.faults
     assert fault.blame is blame
