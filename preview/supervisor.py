@@ -43,6 +43,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
 
+from common.broadcast import Broadcast
 from common.errors import UserError
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
@@ -116,6 +117,8 @@ class Supervisor:
         self._encoders = encoders
         self._marker = marker
         self._new_pipeline = new_pipeline
+        self.changes = Broadcast()
+        """Notified of each change of the actual state."""
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
         self._desired = DesiredState()
@@ -132,7 +135,6 @@ class Supervisor:
         self._trials: asyncio.Task[bool] | None = None
         self._closed = False
         self._wake = asyncio.Event()
-        self._changed = asyncio.Event()
 
     # --- for the gateway ---
 
@@ -169,11 +171,6 @@ class Supervisor:
             measurement=pipeline.measurement if pipeline else None,
         )
 
-    @property
-    def changed(self) -> asyncio.Event:
-        """Set at the next change of the actual state; to be fetched anew before each reading of it."""
-        return self._changed
-
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Counts as a gateway that watches the service."""
@@ -199,7 +196,7 @@ class Supervisor:
             await self._wake.wait()
             self._wake.clear()
             while await self._step():
-                self._publish()
+                self.changes.notify_all()
 
     def _close(self) -> None:
         self._closed = True
@@ -335,7 +332,7 @@ class Supervisor:
         running_s = asyncio.get_running_loop().time() - self._running_since
         if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
             self._lifecycle.reset_backoff()
-        self._publish()
+        self.changes.notify_all()
 
     def failed(self, fault: Fault) -> None:
         """Handles the fault of a pipeline, or of the attempt to build one."""
@@ -368,7 +365,7 @@ class Supervisor:
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         self._wake.set()
-        self._publish()
+        self.changes.notify_all()
 
     def _restart_unwatched_timer(self) -> None:
         """Restarts the timer that disables the preview when no gateway watches it."""
@@ -400,11 +397,7 @@ class Supervisor:
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()
-        self._publish()
-
-    def _publish(self) -> None:
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
+        self.changes.notify_all()
 
 
 def _has_finished(teardown: "asyncio.Task[bool]") -> bool:

@@ -28,14 +28,11 @@ class KeyframeGate:
 
     Args:
         parts: the pipeline.
-        loop: event loop of the callback.
-        request_key_frame: requests a key frame of the encoder; called on the loop.
+        request_key_frame: requests a key frame of the encoder; called on the event loop.
     """
 
-    def __init__(
-        self, parts: Parts, loop: asyncio.AbstractEventLoop, request_key_frame: Callable[[], None]
-    ) -> None:
-        self._loop = loop
+    def __init__(self, parts: Parts, request_key_frame: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
         self._request_key_frame = request_key_frame
         self._last_request_at = float("-inf")
         self._timer: asyncio.TimerHandle | None = None

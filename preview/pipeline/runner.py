@@ -62,10 +62,10 @@ class Runner:
         self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
-        self._framing = Framing(parts, loop, self._first_frame, plan.target.fps)
+        self._framing = Framing(parts, self._first_frame, plan.target.fps)
         self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
-        self._keyframe_gate = KeyframeGate(parts, loop, self._request_key_frame)
-        self._file_loop = FileLoop(parts, loop, self._source_ended) if plan.source.loops else None
+        self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
+        self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
         self._bus = parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -123,7 +123,8 @@ class Runner:
         Raises:
             HungError: the listener or the source hangs.
         """
-        self._end()  # Errors from here on are caused by the teardown.
+        if not self._ended.done():
+            self._ended.set_result(None)  # Errors from here on are caused by the teardown.
         self._loop.remove_reader(self._bus_fd)
         for task in self._tasks.values():
             task.cancel()
@@ -177,12 +178,8 @@ class Runner:
 
     def _fail(self, fault: Fault) -> None:
         if not self._ended.done():
-            self._end()
-            self._events.failed(fault)
-
-    def _end(self) -> None:
-        if not self._ended.done():
             self._ended.set_result(None)
+            self._events.failed(fault)
 
     def _read_bus(self) -> None:
         while (message := self._bus.pop_filtered(_MESSAGES)) is not None:

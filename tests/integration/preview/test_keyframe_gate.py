@@ -1,6 +1,5 @@
 """The gate when a viewer connects in the very moment in which a frame passes, on another thread."""
 
-import asyncio
 import threading
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -82,7 +81,7 @@ class Ground:
         self._threads: list[threading.Thread] = []
         parts: Any = SimpleNamespace(parser_pad=self.pad, sink=self.sink)
         # Its calls on the loop, which request key frames, wait until the test has ended.
-        self.gate = KeyframeGate(parts, asyncio.get_running_loop(), lambda: None)
+        self.gate = KeyframeGate(parts, lambda: None)
 
     def elsewhere(self, call: Callable[[], object]) -> Callable[[], None]:
         """Returns a function that makes the call on another thread, and waits for it for a moment."""

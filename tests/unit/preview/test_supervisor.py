@@ -124,12 +124,8 @@ class Preview:
 
     async def until(self, holds: Callable[[ActualState], bool]) -> ActualState:
         """Waits for a condition of the actual state, at most some virtual minutes."""
-        async with asyncio.timeout(300):
-            while True:
-                changed, actual = self.supervisor.changed, self.supervisor.actual()
-                if holds(actual):
-                    return actual
-                await changed.wait()
+        assert await self.supervisor.changes.wait_until(lambda: holds(self.supervisor.actual()), 300)
+        return self.supervisor.actual()
 
     async def reaches(self, state: State) -> ActualState:
         return await self.until(lambda actual: actual.state is state)
