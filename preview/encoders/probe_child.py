@@ -6,8 +6,7 @@ byte.
 
 import os
 import time
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from common import trial
 from common.errors import UserError
@@ -23,43 +22,12 @@ _NICE: Final = 5
 """A trial yields the CPU to a running stream."""
 
 
-@dataclass(slots=True)
-class _Counts:
-    """Counts of the pad probes, updated once per frame."""
+class _Seen(NamedTuple):
+    """A buffer that passed a pad."""
 
-    first_in_at: float = 0.0
-    first_out_at: float = 0.0
-    encoded: int = 0
-    encoded_bytes: int = 0
-    parsed: int = 0
-    key_frames: int = 0
-
-    def on_input(self, _pad: Any, _info: Any) -> Any:
-        self.first_in_at = time.monotonic()
-        return Gst.PadProbeReturn.REMOVE
-
-    def on_encoded(self, _pad: Any, info: Any) -> Any:
-        self.encoded += 1
-        self.encoded_bytes += info.get_buffer().get_size()
-        if self.encoded_bytes:
-            self.first_out_at = self.first_out_at or time.monotonic()
-        return Gst.PadProbeReturn.OK
-
-    def on_parsed(self, _pad: Any, info: Any) -> Any:
-        self.parsed += 1
-        self.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
-        return Gst.PadProbeReturn.OK
-
-    @property
-    def error(self) -> str:
-        """What is wrong with the output; empty for nothing."""
-        if self.encoded == 0:
-            return "it produced no output"
-        if self.encoded_bytes == 0:
-            return "it produced only empty buffers"
-        if self.parsed < _ENOUGH:
-            return f"only {self.parsed} of {FRAMES} frames could be parsed"
-        return "" if self.key_frames else "its stream has no key frame"
+    at_s: float
+    size: int
+    is_key_frame: bool
 
 
 def main(name: str, *figures: str) -> None:
@@ -68,30 +36,46 @@ def main(name: str, *figures: str) -> None:
     width, height, fps, bitrate = (int(figure) for figure in figures)
     # Referenced until the end: a pipeline that is freed while playing is torn down badly.
     pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
-    counts = _Counts()
-    error = encode(pipeline, counts)
-    trial.report(error, first_byte_ms=(counts.first_out_at - counts.first_in_at) * 1000)
+    raw = _observe(pipeline, "encoder", "sink")
+    encoded = _observe(pipeline, "encoder", "src")
+    parsed = _observe(pipeline, "out", "sink")
+    error = _play(pipeline)
+    filled = [buffer for buffer in encoded if buffer.size]
+    # Without any output the parser reports an error, too: a consequence, not the cause.
+    if error and (filled or error.src is not pipeline.get_by_name("parser")):
+        trial.report(error.parse_error()[0].message)
+    if not filled:
+        trial.report("it produced only empty buffers" if encoded else "it produced no output")
+    if len(parsed) < _ENOUGH:
+        trial.report(f"only {len(parsed)} of {FRAMES} frames could be parsed")
+    if not any(buffer.is_key_frame for buffer in parsed):
+        trial.report("its stream has no key frame")
+    trial.report(first_byte_ms=(filled[0].at_s - raw[0].at_s) * 1000)
 
 
-def encode(pipeline: Any, counts: _Counts) -> str:
-    """Encodes FRAMES moving frames and returns what went wrong; empty for nothing."""
-    for element, pad, probe in (
-        ("encoder", "sink", counts.on_input),
-        ("encoder", "src", counts.on_encoded),
-        ("out", "sink", counts.on_parsed),
-    ):
-        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
+def _observe(pipeline: Any, element: str, pad: str) -> list[_Seen]:
+    """Returns a list that each buffer of a pad is added to."""
+    seen: list[_Seen] = []
+
+    def probe(_pad: Any, info: Any) -> Any:
+        buffer = info.get_buffer()
+        key_frame = not buffer.has_flags(Gst.BufferFlags.DELTA_UNIT)
+        seen.append(_Seen(time.monotonic(), buffer.get_size(), key_frame))
+        return Gst.PadProbeReturn.OK
+
+    pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
+    return seen
+
+
+def _play(pipeline: Any) -> Any:
+    """Plays to the end; returns the first ERROR message, None for none."""
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
-        refusal = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
-        return str(refusal.parse_error()[0].message) if refusal else "it can't be started"
+        error = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+        return error or trial.report("it can't be started")
     message = pipeline.get_bus().timed_pop_filtered(
         Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
     )
-    # Without any output the parser reports an error, too: a consequence, not the cause.
-    consequence = counts.encoded_bytes == 0 and message.src is pipeline.get_by_name("parser")
-    if message.type == Gst.MessageType.ERROR and not consequence:
-        return str(message.parse_error()[0].message)
-    return counts.error
+    return message if message.type == Gst.MessageType.ERROR else None
 
 
 def build(encoder: Encoder, target: Target) -> Any:
