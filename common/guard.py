@@ -26,6 +26,7 @@ SILENCE_S: Final = 10
 _START_S: Final = 60
 """Until the first heartbeat; GStreamer's first scan of its plugins takes many seconds on a robot."""
 _TICK_S: Final = 1.0
+_ABORT_S: Final = 0.5
 _KILL_S: Final = 5.0
 """For the end of a killed program; past it, the end of the container must do."""
 
@@ -85,11 +86,15 @@ def _ends(
     finally:
         os.close(ended)
     print(f"error: no heartbeat for {most} s, killed", file=sys.stderr, flush=True)
-    guarded.kill()
-    try:
-        guarded.wait(_KILL_S)
-    except subprocess.TimeoutExpired:
-        print("error: it does not end, not even when killed", file=sys.stderr, flush=True)
+    # Aborted, as systemd does, it can still write where it hangs (faulthandler), and so name a driver.
+    for number, wait_s in ((signal.SIGABRT, _ABORT_S), (signal.SIGKILL, _KILL_S)):
+        guarded.send_signal(number)
+        try:
+            guarded.wait(wait_s)
+        except subprocess.TimeoutExpired:
+            continue
+        return False
+    print("error: it does not end, not even when killed", file=sys.stderr, flush=True)
     return False
 
 
