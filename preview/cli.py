@@ -50,7 +50,8 @@ def encoders(
     from preview.encoders import listing, probe, trial  # noqa: PLC0415
 
     order, deadline_s = settings.encoders, settings.encoders.probe_timeout_s
-    prober = probe.TrialProber(partial(trial.attempt, settings.profiles.largest, deadline_s))
+    attempt = partial(trial.attempt, settings.profiles.largest, deadline_s)
+    prober = probe.TrialProber(attempt, repeats=False)
     rows = asyncio.run(listing.rows(prober, order.preference, order.allowed))
     print(json.dumps(rows, indent=2) if as_json else listing.table(rows))
 

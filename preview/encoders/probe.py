@@ -43,14 +43,16 @@ class TrialProber:
 
     Args:
         attempt: runs one trial; raises TrialError where an element exists and does not encode.
+        repeats: whether trials are repeated that a busy machine may have spoiled.
 
     Attributes:
         verdicts: newest results, by encoder name.
     """
 
-    def __init__(self, attempt: Callable[[Encoder], Awaitable[Verdict]]) -> None:
+    def __init__(self, attempt: Callable[[Encoder], Awaitable[Verdict]], *, repeats: bool = True) -> None:
         self.verdicts: dict[str, Verdict] = {}
         self._attempt = attempt
+        self._repeats = repeats
         self._one_at_a_time = asyncio.Lock()
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._first: dict[str, asyncio.Future[None]] = {}
@@ -90,7 +92,7 @@ class TrialProber:
                     verdict = await self._attempt(encoder)
                 except TrialError as error:
                     reason = str(error)
-                    if error.passing:
+                    if error.passing and self._repeats:
                         pause_s = backoff.next_s()
                         reason += f" (tried again after {pause_s:g} s, for the next start of the preview)"
                     verdict = Verdict(present=True, proven=False, reason=reason)

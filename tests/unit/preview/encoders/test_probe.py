@@ -81,6 +81,15 @@ async def test_the_pauses_grow_and_are_bounded() -> None:
 
 
 @in_virtual_time
+async def test_without_repetition_every_result_is_final() -> None:
+    trials = Trials(TIMED_OUT)
+    prober = TrialProber(trials, repeats=False)
+    assert (await prober.verdict(MPP)).reason == str(TIMED_OUT)
+    await asyncio.sleep(10_000)
+    assert len(trials.at_s) == 1
+
+
+@in_virtual_time
 async def test_a_repeated_trial_does_not_delay_a_start() -> None:
     prober = TrialProber(Trials(TIMED_OUT, trial_s=6))
     await prober.verdict(MPP)
