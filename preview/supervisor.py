@@ -161,7 +161,7 @@ class Supervisor:
             instance_id=self._instance_id,
             applied_revision=self._desired.revision,
             state=self._lifecycle.state,
-            profile=pipeline.plan.profile if pipeline else self._desired.profile,
+            profile=self._desired.profile,
             last_error=self._last_error,
             counters=self._lifecycle.counters,
             port=self._settings.srt.port,

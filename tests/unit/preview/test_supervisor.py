@@ -522,8 +522,12 @@ async def test_another_profile_keeps_the_pipeline(tmp_path: Path) -> None:
     async with preview.serving():
         preview.supervisor.apply(ON)
         await preview.reaches(State.RUNNING)
-        preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
-        state = await preview.until(lambda actual: actual.profile is Profile.LOW_BW)
+        # A gateway takes the new revision as applied: the old profile must not be beside it.
+        answer = preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
+        assert (answer.applied_revision, answer.profile) == (2, Profile.LOW_BW)
+        state = await preview.until(
+            lambda actual: actual.stream is not None and actual.stream.target.fps == 15
+        )
         assert state.stream
         assert (state.state, state.stream.target.fps) == (State.RUNNING, 15)
         assert len(preview.pipelines.built) == 1

@@ -166,7 +166,7 @@ class ActualState(_message.Message):
     state: Global___LifecycleState.ValueType
     """State of the lifecycle."""
     profile: Global___Profile.ValueType
-    """The profile of the pipeline, or of the newest desired state while there is none."""
+    """The profile of the newest revision applied; a running pipeline follows at once."""
     last_error: _builtins.str
     """The last error and what to do, for people. Empty for none since the preview was last enabled."""
     @_builtins.property
