@@ -1,22 +1,16 @@
 """Trials: work that may crash or hang in a driver, in a child process with a deadline.
 
-`run` starts `python -m common.trial`, which calls the function `main` of a module; that ends with `report`.
+`run` starts `python -m common.trial_child`, which calls the function `main` of a module.
 """
 
 import asyncio
-import importlib
 import json
 import os
 import signal
 import sys
 from contextlib import suppress
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
-from common.child import end_with_parent
-from common.errors import UserError
-
-_LIFETIME_S: Final = 90
-"""Of the child: more than any parent waits."""
 _KILL_S: Final = 1.0
 """For the end of a killed child; a driver may keep it in the kernel for longer."""
 _MAX_OUTPUT_BYTES: Final = 64 * 1024
@@ -49,7 +43,7 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     """
     try:
         child = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "common.trial", str(os.getpid()), module, *arguments),
+            *(sys.executable, "-m", "common.trial_child", str(os.getpid()), module, *arguments),
             stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
@@ -91,30 +85,3 @@ def _result(output: bytes, code: int) -> dict[str, Any]:
     if reason := result.get("error"):
         raise TrialError(str(reason))
     return result
-
-
-def report(error: str = "", **result: Any) -> NoReturn:
-    """Reports the result of a trial and ends the process.
-
-    Nothing is stopped or freed: a driver that hangs while closing can't delay the result.
-
-    Args:
-        error: why the trial failed; empty if it did not.
-        result: what `run` returns, as far as JSON can express it.
-    """
-    print(json.dumps({"error": " ".join(error.split()), **result}), flush=True)
-    os._exit(0)
-
-
-def _main() -> None:
-    parent, module, *arguments = sys.argv[1:]
-    # Before the module is imported: to import GStreamer may hang as well.
-    end_with_parent(int(parent), _LIFETIME_S)
-    try:
-        importlib.import_module(module).main(*arguments)
-    except UserError as error:
-        report(str(error))
-
-
-if __name__ == "__main__":
-    _main()

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.gst import GLib, Gst
-from common.trial import report
+from common.trial_child import report
 from console.receiver import clips
 
 _FIRST_FRAME_TIMEOUT_S: Final = 1.5

@@ -8,9 +8,9 @@ import os
 import time
 from typing import Any, Final, NamedTuple
 
-from common import trial
 from common.errors import UserError
 from common.gst import GLib, Gst
+from common.trial_child import report
 from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.values import Target
@@ -43,14 +43,14 @@ def main(name: str, *figures: str) -> None:
     filled = [buffer for buffer in encoded if buffer.size]
     # Without any output the parser reports an error, too: a consequence, not the cause.
     if error and (filled or error.src is not pipeline.get_by_name("parser")):
-        trial.report(error.parse_error()[0].message)
+        report(error.parse_error()[0].message)
     if not filled:
-        trial.report("it produced only empty buffers" if encoded else "it produced no output")
+        report("it produced only empty buffers" if encoded else "it produced no output")
     if len(parsed) < _ENOUGH:
-        trial.report(f"only {len(parsed)} of {FRAMES} frames could be parsed")
+        report(f"only {len(parsed)} of {FRAMES} frames could be parsed")
     if not any(buffer.is_key_frame for buffer in parsed):
-        trial.report("its stream has no key frame")
-    trial.report(first_byte_ms=(filled[0].at_s - raw[0].at_s) * 1000)
+        report("its stream has no key frame")
+    report(first_byte_ms=(filled[0].at_s - raw[0].at_s) * 1000)
 
 
 def _observe(pipeline: Any, element: str, pad: str) -> list[_Seen]:
@@ -71,7 +71,7 @@ def _play(pipeline: Any) -> Any:
     """Plays to the end; returns the first ERROR message, None for none."""
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
         error = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
-        return error or trial.report("it can't be started")
+        return error or report("it can't be started")
     message = pipeline.get_bus().timed_pop_filtered(
         Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
     )

@@ -4,7 +4,7 @@ import ctypes
 import os
 
 from common.errors import UserError
-from common.trial import report
+from common.trial_child import report
 
 
 def main(how: str, what: str) -> None:
