@@ -8,24 +8,23 @@ from typing import Final
 _PR_SET_PDEATHSIG: Final = 1
 
 
-def end_with_parent(at_most_s: int, parent: int | None = None) -> None:
+def end_with_parent(parent: int, at_most_s: int = 0) -> None:
     """Makes the kernel kill this process when the thread that started it ends, or after `at_most_s` seconds.
 
     Must be called first. Both limits work while the interpreter is stuck in native code: prctl(2)
-    PR_SET_PDEATHSIG sends SIGKILL, and alarm(2) SIGALRM, whose default action ends the process.
+    PR_SET_PDEATHSIG sends SIGKILL, and alarm(2) SIGALRM, whose default action ends the process. A parent that
+    has already ended ends this process at once.
 
     Args:
-        at_most_s: lifetime in seconds.
-        parent: process ID of the one that started it; None trusts that it still runs.
+        parent: process ID of the parent, from the parent itself: getppid(2) here may already name another.
+        at_most_s: 0 for no limit.
 
     Raises:
         OSError: the kernel refuses the parent-death signal.
     """
-    parent = parent or os.getppid()
     signal.alarm(at_most_s)
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL):
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG)")
     if os.getppid() != parent:
-        # The parent ended before prctl; no signal will come.
         os._exit(os.EX_UNAVAILABLE)

@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import stat
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
@@ -69,6 +70,25 @@ def sync_directory(directory: Path) -> None:
         # Some network file systems can't.
         if error.errno != errno.EINVAL:
             raise
+    finally:
+        os.close(handle)
+
+
+def make_own_directory(directory: Path) -> None:
+    """Makes sure that a directory exists, belongs to this user, and is closed to all others (mode 0700).
+
+    Where every user may write, as in /tmp, another one may have made a directory or link of that name first.
+
+    Raises:
+        OSError: it can't be made, is a symbolic link, or is another user's or everyone's (sticky).
+    """
+    _make_directory(directory)
+    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        status = os.fstat(handle)
+        if status.st_uid != os.geteuid() or status.st_mode & stat.S_ISVTX:
+            raise PermissionError(errno.EPERM, "it is not this user's own", str(directory))
+        os.fchmod(handle, PRIVATE_DIRECTORY)
     finally:
         os.close(handle)
 

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 import uvloop
 
+from common import heartbeat
 from common.errors import UserError
 
 
@@ -28,13 +29,15 @@ def end_with(error: UserError) -> NoReturn:
 def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
     """Runs `main(stop)` on a new uvloop; the first SIGINT or SIGTERM sets `stop`, a second cancels `main`.
 
-    `main` is expected to return soon after `stop` is set.
+    `main` is expected to return soon after `stop` is set. Sends heartbeats to a supervisor that wants them.
     """
     uvloop.run(_with_signals(main))
 
 
 async def _with_signals(main: Callable[[asyncio.Event], Awaitable[None]]) -> None:
     stop = asyncio.Event()
+    # First, so that a `main` that blocks from the beginning is noticed as soon as one that blocks later.
+    heartbeats = asyncio.ensure_future(heartbeat.send())
     task = asyncio.ensure_future(main(stop))
 
     def on_signal() -> None:
@@ -51,5 +54,6 @@ async def _with_signals(main: Callable[[asyncio.Event], Awaitable[None]]) -> Non
         if not stop.is_set():
             raise
     finally:
+        heartbeats.cancel()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)

@@ -96,7 +96,8 @@ STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-m", "common.healthcheck"]
 ENTRYPOINT ["tini", "--"]
-CMD ["robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]
+# Docker restarts what has ended, not what is unhealthy: the guard ends a program that hangs.
+CMD ["python", "-m", "common.guard", "robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]
 # Last, because they change with every commit and nothing above does.
 ARG VERSION=0.0.0
 ARG REVISION=unknown

@@ -3,16 +3,17 @@
 import asyncio
 import logging
 import os
+from functools import partial
 from typing import Final, NoReturn
 
 from common import bind, rpc
 from common.health import Health
 from preview.config import PreviewSettings
+from preview.encoders import trial
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.probe import TrialProber
 from preview.encoders.selection import Selection
-from preview.pipeline.events import HungError, PipelineEvents
-from preview.pipeline.plan import Plan
+from preview.pipeline.events import HungError
 from preview.pipeline.runner import Runner
 from preview.rpc.servicer import SERVICE, PreviewServicer
 from preview.supervisor import Supervisor
@@ -30,15 +31,11 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
         UserError: the socket can't be used.
     """
     encoders = settings.encoders
-    prober = TrialProber(settings.profiles.largest, encoders.probe_timeout_s)
+    prober = TrialProber(partial(trial.attempt, settings.profiles.largest, encoders.probe_timeout_s))
     selection = Selection(encoders.allowed, encoders.forgive_after_s, prober)
     marker = CrashMarkerFile(settings.runtime_dir)
     marker.blame_previous(selection)
-
-    def new_pipeline(plan: Plan, events: PipelineEvents) -> Runner:
-        return Runner(plan, settings.timeouts, events)
-
-    supervisor = Supervisor(settings, selection, marker, new_pipeline)
+    supervisor = Supervisor(settings, selection, marker, Runner)
     server = rpc.new_server()
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)

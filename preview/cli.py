@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -18,17 +19,25 @@ _Config = Annotated[
     typer.Option("--config", help="YAML file; default: built-in values and PREVIEW__... variables."),
 ]
 
+# GStreamer is imported late: without it, checking the configuration still works.
+
 
 @app.command()
 def serve(config_file: _Config = None) -> None:
     """Serves the gateway until Ctrl-C."""
-    program.run_to_exit(lambda: _serve(config_file))
+    settings = _load(config_file)
+    # Trials are started by fork and exec; gRPC's handlers for a bare fork would only get in their way.
+    os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
+    from preview.app import serve as serve_app  # noqa: PLC0415
+
+    program.run(partial(serve_app, settings))
 
 
 @app.command()
 def check(config_file: _Config = None) -> None:
     """Checks the configuration and exits."""
-    program.run_to_exit(lambda: _check(config_file))
+    config.load(PreviewSettings, config_file)
+    print(f"{config_file or 'the environment'}: ok")
 
 
 @app.command()
@@ -37,46 +46,25 @@ def encoders(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
 ) -> None:
     """Tries every encoder and lists the results."""
-    program.run_to_exit(lambda: _encoders(config_file, as_json=as_json))
+    settings = _load(config_file)
+    from preview.encoders import listing, probe, trial  # noqa: PLC0415
+
+    order, deadline_s = settings.encoders, settings.encoders.probe_timeout_s
+    attempt = partial(trial.attempt, settings.profiles.largest, deadline_s)
+    prober = probe.TrialProber(attempt, repeats=False)
+    rows = asyncio.run(listing.rows(prober, order.preference, order.allowed))
+    print(json.dumps(rows, indent=2) if as_json else listing.table(rows))
 
 
 def main() -> None:
     """Entry point."""
-    app()
+    program.run_to_exit(app)
 
 
 def _load(config_file: Path | None) -> PreviewSettings:
     settings = config.load(PreviewSettings, config_file)
     logs.configure(settings.log_level, settings.log_format)
     return settings
-
-
-# GStreamer is imported late: without it, checking the configuration still works.
-
-
-def _serve(config_file: Path | None) -> None:
-    settings = _load(config_file)
-    # Trials are started by fork and exec; gRPC's handlers for a bare fork would only get in their way.
-    os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
-    from preview.app import serve as serve_app  # noqa: PLC0415
-
-    program.run(lambda stop: serve_app(settings, stop))
-
-
-def _check(config_file: Path | None) -> None:
-    config.load(PreviewSettings, config_file)
-    print(f"{config_file or 'the environment'}: ok")
-
-
-def _encoders(config_file: Path | None, *, as_json: bool) -> None:
-    settings = _load(config_file)
-    from preview.encoders import listing  # noqa: PLC0415
-    from preview.encoders.probe import TrialProber  # noqa: PLC0415
-
-    encoders = settings.encoders
-    prober = TrialProber(settings.profiles.largest, encoders.probe_timeout_s)
-    rows = asyncio.run(listing.rows(prober, encoders.preference, encoders.allowed))
-    print(json.dumps(rows, indent=2) if as_json else listing.table(rows))
 
 
 if __name__ == "__main__":

@@ -102,6 +102,8 @@ class SrtSettings(Section):
     port: int = Field(default=7100, ge=1, le=65535)
     latency_ms: int = Field(default=125, ge=0, le=8000)
     """SRTO_LATENCY: how long a receiver waits for a lost packet; the larger one of both sides applies."""
+    max_viewers: int = Field(default=32, ge=1, le=1000)
+    """More are refused. One that vanished counts until SRT gives it up, 5 s later."""
     key_length_bytes: Literal[16, 24, 32] = 16
     """SRTO_PBKEYLEN of encrypted sessions: 16 is AES-128, 32 is AES-256."""
 
@@ -169,7 +171,9 @@ class TimeoutSettings(Section):
 
 
 def _default_runtime_dir() -> Path:
-    return Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / "robot-preview"
+    if own := os.environ.get("XDG_RUNTIME_DIR"):
+        return Path(own) / "robot-preview"
+    return Path(tempfile.gettempdir()) / f"robot-preview-{os.getuid()}"
 
 
 class PreviewSettings(Settings):
@@ -189,5 +193,5 @@ class PreviewSettings(Settings):
     adaptive: AdaptiveSettings = AdaptiveSettings()
     timeouts: TimeoutSettings = TimeoutSettings()
     runtime_dir: Path = Field(default_factory=_default_runtime_dir)
-    """Directory for the graph of the last failed pipeline, the crash report and the crash marker.
-    Preferably on a tmpfs."""
+    """Directory for the graph of the last failed pipeline, the crash report and the crash marker; made this
+    user's own. Preferably on a tmpfs."""

@@ -89,12 +89,14 @@ class Counters:
         restarts: pipelines started after a fault; included in `starts`.
         faults: transitions to FAULTED.
         fallbacks: encoders replaced by the next one after a failure.
+        viewers_refused: connections refused because of srt.max_viewers.
     """
 
     starts: int = 0
     restarts: int = 0
     faults: int = 0
     fallbacks: int = 0
+    viewers_refused: int = 0
 
 
 class Lifecycle:
@@ -124,9 +126,14 @@ class Lifecycle:
         self.state = after
         return after
 
-    def count_fallback(self) -> None:
-        """Counts an encoder that was replaced by the next one."""
-        self.counters = replace(self.counters, fallbacks=self.counters.fallbacks + 1)
+    def count(self, *, fallbacks: int = 0, viewers_refused: int = 0) -> None:
+        """Counts what is no transition: encoders replaced by the next one, refused viewers."""
+        counters = self.counters
+        self.counters = replace(
+            counters,
+            fallbacks=counters.fallbacks + fallbacks,
+            viewers_refused=counters.viewers_refused + viewers_refused,
+        )
 
     def reset_backoff(self) -> None:
         """Starts the backoff again: the pipeline has run steadily since its last fault."""

@@ -15,15 +15,17 @@ What can fail, how it is noticed, and what follows:
 | source stalls | watchdog: no frames come in | FAULTED, retry with backoff |
 | encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
 | encoder is silent, or gives empty buffers | watchdog: frames go in, none come out | next encoder at once |
+| source's or listener's driver blocks a start | deadline of the call | FAULTED, retry with backoff |
 | encoder's driver blocks a start or an adjustment | deadline of the call | next encoder at once |
 | last proven encoder fails | as above, and no alternative | FAULTED, retry with backoff |
 | pipeline fails again after running steadily | 15 s in RUNNING before it | backoff starts again at 1 s |
 | pipeline fails while it is being stopped | its fault, in STOPPING | logged, otherwise ignored |
-| encoder hangs after a fault | teardown not finished after 0.3 s | left behind, port and source are free |
+| encoder hangs after a fault | teardown not finished after 0.3 s | left behind; port and source are free |
 | encoder hangs when the preview is disabled | teardown not finished in time | crash marker, HungError |
 | source or listener hangs when stopped | HungError of the pipeline | HungError |
 | driver crashes the process | crash marker of the encoder in use | next process passes the encoder over |
 | hardware preferred, only x264 works | selection | runs, and last_error says so |
+| more viewers than srt.max_viewers | asked in SRT's handshake | refused, counted and logged |
 | gateway is gone | no watcher for without_gateway_s | disabled until the next request |
 
 HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
@@ -35,19 +37,22 @@ second and must reconnect, to a stream of possibly another codec.
 import asyncio
 import logging
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
 
+from common.broadcast import Broadcast
 from common.errors import UserError
 from preview.config import PreviewSettings
-from preview.encoders.catalogue import CATALOGUE, Encoder
+from preview.encoders.catalogue import CATALOGUE
+from preview.encoders.crash_marker import CrashMarkerFile
+from preview.encoders.selection import Selection
 from preview.lifecycle import Event, Lifecycle, State
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState, Target
+from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState
 
 _log = logging.getLogger(__name__)
 
@@ -77,7 +82,7 @@ class Pipeline(Protocol):
     async def start(self) -> None:
         """Starts it. Failures are reported as events, also after this has returned."""
 
-    async def switch(self, profile: Profile, target: Target) -> None:
+    async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
 
     async def stop(self) -> "asyncio.Task[bool]":
@@ -91,44 +96,6 @@ class Pipeline(Protocol):
         """Writes its graph, for finding the cause of a fault."""
 
 
-class PipelineFactory(Protocol):
-    """Builds pipelines."""
-
-    def __call__(self, plan: Plan, events: PipelineEvents) -> Pipeline:
-        """Returns a pipeline that is not yet started.
-
-        Raises:
-            UserError: the pipeline can't be built.
-        """
-
-
-class EncoderSelector(Protocol):
-    """Knows which encoders work; `preview.encoders.selection.Selection` is the real one."""
-
-    async def probe(self) -> bool:
-        """Tries encoders until one works that has not failed; False when there is none."""
-
-    def choose(self) -> tuple[Encoder, EncoderChoice]:
-        """Returns the encoder to use.
-
-        Raises:
-            UserError: none works.
-        """
-
-    def pass_over(self, name: str, reason: str) -> None:
-        """Excludes an encoder for a while."""
-
-
-class CrashMarker(Protocol):
-    """Names the encoder to blame if this process dies; `crash_marker.CrashMarkerFile` is the real one."""
-
-    def set(self, encoder: str, reason: str = "") -> None:
-        """Marks an encoder as in use, or as the one that hangs because of `reason`."""
-
-    def clear(self) -> None:
-        """Removes the mark."""
-
-
 class Supervisor:
     """The preview.
 
@@ -136,20 +103,22 @@ class Supervisor:
         settings: of the service.
         encoders: chooses the encoder of each pipeline.
         marker: informs the next process if an encoder ends this one.
-        new_pipeline: builds pipelines.
+        new_pipeline: builds pipelines; raises UserError where one can't be built.
     """
 
     def __init__(
         self,
         settings: PreviewSettings,
-        encoders: EncoderSelector,
-        marker: CrashMarker,
-        new_pipeline: PipelineFactory,
+        encoders: Selection,
+        marker: CrashMarkerFile,
+        new_pipeline: Callable[[Plan, PipelineEvents], Pipeline],
     ) -> None:
         self._settings = settings
         self._encoders = encoders
         self._marker = marker
         self._new_pipeline = new_pipeline
+        self.changes = Broadcast()
+        """Notified of each change of the actual state."""
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
         self._desired = DesiredState()
@@ -163,16 +132,19 @@ class Supervisor:
         self._retry_timer: asyncio.TimerHandle | None = None
         self._watchers = 0
         self._unwatched_timer: asyncio.TimerHandle | None = None
+        self._trials: asyncio.Task[bool] | None = None
+        self._closed = False
         self._wake = asyncio.Event()
-        self._changed = asyncio.Event()
 
     # --- for the gateway ---
 
     def apply(self, desired: DesiredState) -> ActualState:
         """Accepts a desired state and returns the actual state at this moment.
 
-        The same revision again is the same request and changes nothing.
+        The same revision again is the same request and changes nothing; nor does any once the service stops.
         """
+        if self._closed:
+            return self.actual()
         if desired.revision != self._desired.revision or desired.revision == 0:
             profile = desired.profile if desired.enabled else self._desired.profile
             self._desired = replace(desired, profile=profile)
@@ -189,7 +161,7 @@ class Supervisor:
             instance_id=self._instance_id,
             applied_revision=self._desired.revision,
             state=self._lifecycle.state,
-            profile=pipeline.plan.profile if pipeline else self._desired.profile,
+            profile=self._desired.profile,
             last_error=self._last_error,
             counters=self._lifecycle.counters,
             port=self._settings.srt.port,
@@ -198,11 +170,6 @@ class Supervisor:
             encoder=pipeline.plan.choice if pipeline else None,
             measurement=pipeline.measurement if pipeline else None,
         )
-
-    @property
-    def changed(self) -> asyncio.Event:
-        """Set at the next change of the actual state; to be fetched anew before each reading of it."""
-        return self._changed
 
     @contextmanager
     def watched(self) -> Iterator[None]:
@@ -224,18 +191,17 @@ class Supervisor:
             HungError: a driver hangs; the process must end.
         """
         stopped = asyncio.create_task(stop.wait(), name="stop")
-        stopped.add_done_callback(lambda _: self._wake.set())
-        while not stop.is_set():
+        stopped.add_done_callback(lambda _: self._close())
+        while not self._closed:
             await self._wake.wait()
             self._wake.clear()
-            await self._reconcile()
+            while await self._step():
+                self.changes.notify_all()
+
+    def _close(self) -> None:
+        self._closed = True
         self._desired = replace(self._desired, enabled=False)
         self._follow_desired(new_request=False)
-        await self._reconcile()
-
-    async def _reconcile(self) -> None:
-        while await self._step():
-            self._publish()
 
     async def _step(self) -> bool:
         """Does one thing that the lifecycle's state requires; False when there is none."""
@@ -243,18 +209,30 @@ class Supervisor:
         match self._lifecycle.state:
             case State.STOPPING:
                 await self._finish_stopping()
+            case State.DISABLED if self._teardowns:
+                await self._join_teardowns()
             case State.FAULTED:
                 return await self._recover()
             case State.STARTING if pipeline is None:
                 await self._start()
             case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
-                await self._switch_profile(pipeline)
+                _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
+                await pipeline.switch(profile)
             case _:
                 return False
         return True
 
+    async def _find_encoder(self) -> bool:
+        """Runs trials until an encoder works that has not failed; False when none does, or when disabled."""
+        self._trials = asyncio.create_task(self._encoders.probe(), name="trials until one succeeds")
+        try:
+            await asyncio.wait({self._trials})
+            return not self._trials.cancelled() and self._trials.result()
+        finally:
+            self._trials.cancel()
+
     async def _start(self) -> None:
-        await self._encoders.probe()
+        await self._find_encoder()
         if self._lifecycle.state is not State.STARTING:
             return
         try:
@@ -277,11 +255,6 @@ class Supervisor:
             )
             _log.warning("%s", self._last_error)
 
-    async def _switch_profile(self, pipeline: Pipeline) -> None:
-        profile = self._desired.profile
-        _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
-        await pipeline.switch(profile, self._settings.profiles.targets[profile])
-
     async def _recover(self) -> bool:
         """Tears the failed pipeline down and arranges what follows; False when only waiting is left."""
         if self._pipeline:
@@ -289,8 +262,8 @@ class Supervisor:
             await self._tear_down(self._pipeline, wait_s=ENCODER_STOP_S)
         if self._encoder_failed:
             self._encoder_failed = False
-            if await self._encoders.probe():
-                self._lifecycle.count_fallback()
+            if await self._find_encoder():
+                self._lifecycle.count(fallbacks=1)
                 self._retry_now = True
             if self._lifecycle.state is not State.FAULTED:
                 return True  # A request came during the trials.
@@ -350,12 +323,16 @@ class Supervisor:
         self._running_since = asyncio.get_running_loop().time()
         self._move(Event.FIRST_FRAME)
 
-    def measured(self) -> None:
+    def measured(self, viewers_refused: int) -> None:
         """Handles new statistics of the pipeline."""
+        if viewers_refused:
+            limit = self._settings.srt.max_viewers
+            _log.warning("refused %d viewers: %d are connected (srt.max_viewers)", viewers_refused, limit)
+            self._lifecycle.count(viewers_refused=viewers_refused)
         running_s = asyncio.get_running_loop().time() - self._running_since
         if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
             self._lifecycle.reset_backoff()
-        self._publish()
+        self.changes.notify_all()
 
     def failed(self, fault: Fault) -> None:
         """Handles the fault of a pipeline, or of the attempt to build one."""
@@ -388,7 +365,7 @@ class Supervisor:
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         self._wake.set()
-        self._publish()
+        self.changes.notify_all()
 
     def _restart_unwatched_timer(self) -> None:
         """Restarts the timer that disables the preview when no gateway watches it."""
@@ -415,14 +392,12 @@ class Supervisor:
         if self._retry_timer and after is not State.FAULTED:
             self._retry_timer.cancel()
             self._retry_timer = None
+        if self._trials and event is Event.DISABLE:
+            self._trials.cancel()
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()
-        self._publish()
-
-    def _publish(self) -> None:
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
+        self.changes.notify_all()
 
 
 def _has_finished(teardown: "asyncio.Task[bool]") -> bool:

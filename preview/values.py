@@ -122,7 +122,7 @@ class ActualState:
         instance_id: random per process.
         applied_revision: newest desired state applied; 0 for none.
         state: state of the lifecycle.
-        profile: profile of the pipeline, or of the newest desired state.
+        profile: of the newest desired state; a running pipeline follows at once.
         last_error: last error since the preview was enabled; empty for none.
         counters: counts since the process started.
         port: UDP port of the listener.

@@ -4,12 +4,10 @@ That an element exists says little: drivers refuse later, hang, crash, hold fram
 So a decoder counts only after it decoded a clip correctly, without holding anything back.
 """
 
-import json
-import os
-import signal
-import subprocess
-import sys
+import asyncio
 from typing import Final
+
+from common import trial
 
 HARDWARE: Final = {
     "h264": ("vah264dec", "nvh264dec", "v4l2slh264dec", "v4l2h264dec"),
@@ -36,21 +34,8 @@ def proven_decoder(codec: str) -> str | None:
 
 def objection(element: str, codec: str, timeout_s: float = TRIAL_TIMEOUT_S) -> str:
     """Returns why a decoder fails its trial; empty if it passes."""
-    command = [sys.executable, "-m", "console.receiver.decoder_trial", element, codec, str(os.getpid())]
     try:
-        done = subprocess.run(  # noqa: S603  # this program, and names from our own table
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            timeout=timeout_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return f"it hung: no result within {timeout_s:g} s"
-    if done.returncode < 0:
-        return f"it crashed when tried ({signal.Signals(-done.returncode).name})"
-    try:
-        return str(json.loads(done.stdout)["reason"])
-    except (ValueError, KeyError, TypeError):
-        return f"its trial ended with code {done.returncode} and without a result"
+        asyncio.run(trial.run(timeout_s, "console.receiver.decoder_trial", element, codec))
+    except trial.TrialError as error:
+        return str(error)
+    return ""

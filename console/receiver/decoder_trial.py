@@ -1,29 +1,15 @@
-"""Trial of one decoder, in a process that may crash or hang: `python -m console.receiver.decoder_trial`.
+"""Trial of one decoder, in the child process of common.trial.
 
-The arguments are GStreamer's element, the codec and the parent's process ID. It decodes a clip, access unit
-by access unit, as a robot sends them, and prints one JSON object: {"reason": why the decoder is rejected, or
-empty}. The parent process sets the deadline.
+Decodes a clip, access unit by access unit, as a robot sends them.
 """
 
-# ruff: noqa: E402 - the process is bound to its parent before it loads GStreamer.
-
-import json
-import os
-import sys
 import time
 from itertools import pairwise
 from typing import Any, Final
 
-from common.child import end_with_parent
-
-_LIFETIME_S: Final = 30
-"""More than any parent waits."""
-if __name__ == "__main__":
-    # Before GStreamer: loading its plugins takes a while, and may hang.
-    end_with_parent(_LIFETIME_S, int(sys.argv.pop()))
-
 from common.errors import UserError
 from common.gst import GLib, Gst
+from common.trial_child import report
 from console.receiver import clips
 
 _FIRST_FRAME_TIMEOUT_S: Final = 1.5
@@ -35,19 +21,11 @@ _MOST_HELD: Final = 1
 _FRAME_S: Final = 1 / 30
 
 
-def main() -> None:
-    """Runs one trial."""
-    element, codec = sys.argv[1:]
-    try:
-        # Kept until the end: a pipeline that is dropped while it plays is torn down badly.
-        pipeline = build(element, codec)
-        reason = trial(pipeline, clips.units(codec))
-    except UserError as error:
-        reason = str(error)
-    sys.stdout.write(json.dumps({"reason": reason}) + "\n")
-    sys.stdout.flush()
-    # Nothing is stopped: the process ends, so that a driver that hangs on closing can't delay the result.
-    os._exit(0)
+def main(element: str, codec: str) -> None:
+    """Tries GStreamer's decoder `element`."""
+    # Kept until the end: a pipeline that is dropped while it plays is torn down badly.
+    pipeline = build(element, codec)
+    report(trial(pipeline, clips.units(codec)))
 
 
 def build(element: str, codec: str) -> Any:
@@ -126,7 +104,3 @@ def _shows_bars(sample: Any) -> bool:
 def _error(pipeline: Any) -> str:
     message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
     return str(message.parse_error()[0].message) if message else ""
-
-
-if __name__ == "__main__":
-    main()

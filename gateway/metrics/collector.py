@@ -159,6 +159,8 @@ def _preview(preview: PreviewView) -> Iterator[Metric]:
     yield _counter("preview_faults", "Times it became faulted.", counters.faults)
     passed_over = "Encoders that were passed over for the next one."
     yield _counter("preview_fallbacks", passed_over, counters.fallbacks)
+    beyond = "Connections of viewers beyond srt.max_viewers."
+    yield _counter("preview_viewers_refused", beyond, counters.viewers_refused)
 
 
 def _stream(now: Snapshot) -> Iterator[Metric]:

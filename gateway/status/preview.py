@@ -82,6 +82,7 @@ class Counters:
     restarts: int = 0
     faults: int = 0
     fallbacks: int = 0
+    viewers_refused: int = 0
 
 
 @dataclass(frozen=True, slots=True)

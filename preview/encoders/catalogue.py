@@ -11,25 +11,12 @@ elements' sources and documentation.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
 from preview.values import Codec
 
-
-class Unit(Enum):
-    """Unit of a bit rate property; the value is the factor from kbit/s."""
-
-    BIT_PER_S = 1000
-    KBIT_PER_S = 1
-
-
-class KeyFrameBy(Enum):
-    """How a key frame is requested."""
-
-    EVENT = "GstForceKeyUnit"
-    SIGNAL = "force-IDR"
+_BIT_PER_S: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +25,7 @@ class ElementProperties:
 
     Args:
         bitrate: properties for the bit rate; each one that exists is set.
-        unit: unit of `bitrate`.
+        per_kbps: its unit, as the factor from kbit/s.
         gop: properties for the GOP length (longest distance between key frames), in frames.
         fixed: constant properties: low latency, no B-frames, headers with every key frame.
         vbv_ms: property for the size of the rate buffer (VBV) in ms. Empty: none in that unit.
@@ -46,11 +33,11 @@ class ElementProperties:
         controls: V4L2 controls, packed into `extra-controls`: control -> "bitrate", "gop" or a number.
         input_caps: caps of the element's input.
         upload: element that copies frames into the encoder's memory.
-        key_frame_by: how a key frame is requested.
+        key_frame_signal: action signal that requests a key frame, in place of a GstForceKeyUnit event.
     """
 
     bitrate: tuple[str, ...] = ("bitrate",)
-    unit: Unit = Unit.KBIT_PER_S
+    per_kbps: int = 1
     gop: tuple[str, ...] = ("key-int-max",)
     fixed: Mapping[str, str] = field(default_factory=dict)
     vbv_ms: str = ""
@@ -58,7 +45,7 @@ class ElementProperties:
     controls: Mapping[str, str] = field(default_factory=dict)
     input_caps: str = "video/x-raw,format=NV12"
     upload: str = ""
-    key_frame_by: KeyFrameBy = KeyFrameBy.EVENT
+    key_frame_signal: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +68,7 @@ def _values(text: str) -> dict[str, str]:
 _MPP = ElementProperties(
     # `bps` upstream, `bitrate` in forks; bit/s in both.
     bitrate=("bps", "bitrate"),
-    unit=Unit.BIT_PER_S,
+    per_kbps=_BIT_PER_S,
     gop=("gop",),
     # max-pending: frames kept in the encoder; the default is 16.
     fixed=_values("header-mode=each-idr rc-mode=cbr max-pending=1"),
@@ -104,12 +91,12 @@ _NV = ElementProperties(
     ),
 )
 _NVV4L2 = ElementProperties(
-    unit=Unit.BIT_PER_S,
+    per_kbps=_BIT_PER_S,
     gop=("iframeinterval", "idrinterval"),
     fixed=_values("control-rate=1 insert-sps-pps=true num-B-Frames=0 maxperf-enable=true"),
     input_caps="video/x-raw(memory:NVMM),format=NV12",
     upload="nvvidconv",
-    key_frame_by=KeyFrameBy.SIGNAL,
+    key_frame_signal="force-IDR",
 )
 _QSV = ElementProperties(
     gop=("gop-size",), fixed=_values("rate-control=cbr b-frames=0 low-latency=true idr-interval=0")

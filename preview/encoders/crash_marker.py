@@ -4,8 +4,9 @@ A driver can end this process, by a crash or by a hang that only the end of the 
 would prove itself in the next process's trial, be used and end that process, too; the marker makes the next
 process pass it over for a while. A process that was killed from outside (SIGKILL, SIGTERM) blames no encoder.
 
-Two files in the runtime directory: the marker, written when an encoder starts and removed when it has stopped
+In the runtime directory are the marker, written when an encoder starts and removed when it has stopped
 properly, and the report that Python's fault handler writes on SIGSEGV, SIGABRT, SIGBUS, SIGFPE and SIGILL.
+The next process moves a report aside, where it stays for people until the next crash.
 """
 
 import faulthandler
@@ -14,12 +15,14 @@ import logging
 from pathlib import Path
 from typing import IO, Final
 
+from common.private_files import make_own_directory
 from preview.encoders.selection import Selection
 
 _log = logging.getLogger(__name__)
 
 _MARKER: Final = "encoder-in-use.json"
 _REPORT: Final = "crash.txt"
+LAST_REPORT: Final = "last-crash.txt"
 _IN_USE: Final = ""
 """Reason of a marker that blames the encoder only together with a crash report."""
 
@@ -28,11 +31,12 @@ class CrashMarkerFile:
     """The marker of this process, and what the previous one left.
 
     Args:
-        directory: runtime directory, created when missing. When it is not writable, a warning is logged and
-            the next process must find out by itself.
+        directory: runtime directory, created when missing. Where it is not writable or not this user's own,
+            a warning is logged, nothing in it is read, and the next process must find out by itself.
     """
 
     def __init__(self, directory: Path) -> None:
+        self._directory = directory
         self._marker = directory / _MARKER
         self._report = directory / _REPORT
         self._report_file: IO[bytes] | None = None
@@ -41,6 +45,7 @@ class CrashMarkerFile:
         """Has the encoder that ended the previous process passed over; starts this process's crash report."""
         crash = self.begin_report()
         try:
+            make_own_directory(self._directory)
             marker = json.loads(self._marker.read_text(encoding="utf-8"))
             name, reason = str(marker["encoder"]), str(marker["why"])
         except FileNotFoundError:
@@ -65,9 +70,11 @@ class CrashMarkerFile:
         """
         previous = ""
         try:
-            self._report.parent.mkdir(parents=True, exist_ok=True)
+            make_own_directory(self._directory)
             if self._report.exists():
                 previous = _cause(self._report.read_text(encoding="utf-8", errors="replace"))
+            if previous:
+                self._report.replace(self._directory / LAST_REPORT)
             # Kept open: on a signal the handler can only write to an open file.
             self._report_file = self._report.open("wb")
         except OSError as error:
@@ -84,7 +91,7 @@ class CrashMarkerFile:
             reason: what it did, for people. Empty: nothing yet; counts only if this process crashes.
         """
         try:
-            self._marker.parent.mkdir(parents=True, exist_ok=True)
+            make_own_directory(self._directory)
             self._marker.write_text(json.dumps({"encoder": encoder, "why": reason}), encoding="utf-8")
         except OSError as error:
             _log.warning("no crash marker for encoder %s in %s: %s", encoder, self._marker, error)

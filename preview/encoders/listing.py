@@ -8,14 +8,14 @@ from rich.console import Console
 from rich.table import Table
 
 from preview.encoders.catalogue import Encoder
-from preview.encoders.selection import Prober
+from preview.encoders.probe import TrialProber
 
 _WIDTH: Final = 160
 _HEADINGS: Final = ("encoder", "family", "element", "codec", "present", "proven", "first byte", "why not")
 
 
 async def rows(
-    prober: Prober, encoders: Sequence[Encoder], allowed: Sequence[Encoder]
+    prober: TrialProber, encoders: Sequence[Encoder], allowed: Sequence[Encoder]
 ) -> list[dict[str, Any]]:
     """Tries the encoders in turn and returns one JSON object for each."""
     return [

@@ -1,56 +1,72 @@
-"""Trials of encoders: which ones really encode on this machine.
+"""Runs the trials of encoders, one at a time, and keeps their results. Pure: the trial itself is injected.
 
-The existence of an element proves little: drivers refuse later, return nothing, return empty buffers, crash
-or hang. So an encoder counts as proven only after it has encoded frames, in a process of its own with a
-deadline; a crash or a hang is a result like any other. Results are cached for the life of this process.
+A result is kept for the life of this process, unless its cause may have been a busy machine: a deadline that
+was missed, a process that could not be started. Such a trial is repeated in the background, with a growing
+pause, and the next start of the preview uses what has been proven by then.
 """
 
 import asyncio
-import json
-import signal
-import sys
-from collections.abc import Iterable, Mapping
+import logging
+from collections.abc import Awaitable, Callable, Iterable
+from dataclasses import dataclass
 from typing import Final
 
-from common.gst import Gst
+from common.backoff import Backoff
+from common.trial import TrialError
 from preview.encoders.catalogue import Encoder
-from preview.encoders.selection import Verdict
-from preview.values import Target
 
-_MAX_OUTPUT_BYTES: Final = 64 * 1024
+_log = logging.getLogger(__name__)
+
+FIRST_RETRY_S: Final = 10.0
+LONGEST_RETRY_S: Final = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Result of the trial of an encoder.
+
+    Args:
+        present: whether the element exists on this machine.
+        proven: whether it encoded frames.
+        reason: why it is not present or not proven, for people; empty when proven.
+        first_byte_ms: time from the first frame in to the first byte out; None when not proven.
+    """
+
+    present: bool
+    proven: bool
+    reason: str = ""
+    first_byte_ms: float | None = None
 
 
 class TrialProber:
-    """Runs trials, one at a time, and caches their results.
+    """Trials and their results.
 
     Args:
-        target: stream parameters of the trials.
-        timeout_s: deadline of one trial, start of its process included.
+        attempt: runs one trial; raises TrialError where an element exists and does not encode.
+        repeats: whether trials are repeated that a busy machine may have spoiled.
+
+    Attributes:
+        verdicts: newest results, by encoder name.
     """
 
-    def __init__(self, target: Target, timeout_s: float) -> None:
-        self._target = target
-        self._timeout_s = timeout_s
-        self._trials: dict[str, asyncio.Task[Verdict]] = {}
+    def __init__(self, attempt: Callable[[Encoder], Awaitable[Verdict]], *, repeats: bool = True) -> None:
+        self.verdicts: dict[str, Verdict] = {}
+        self._attempt = attempt
+        self._repeats = repeats
         self._one_at_a_time = asyncio.Lock()
-
-    @property
-    def verdicts(self) -> Mapping[str, Verdict]:
-        """Results so far, by encoder name."""
-        return {
-            name: trial.result()
-            for name, trial in self._trials.items()
-            if trial.done() and not trial.cancelled() and trial.exception() is None
-        }
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._first: dict[str, asyncio.Future[None]] = {}
+        """Done when the first trial is."""
 
     async def verdict(self, encoder: Encoder) -> Verdict:
-        """Returns the result for one encoder; runs its trial when there is none."""
-        trial = self._trials.get(encoder.name)
-        if trial is None:
-            trial = asyncio.create_task(self._try(encoder), name=f"trial of {encoder.name}")
-            self._trials[encoder.name] = trial
+        """Returns the newest result for one encoder; runs its trial when there is none."""
+        name = encoder.name
+        if name not in self._tasks:
+            self._first[name] = asyncio.get_running_loop().create_future()
+            self._tasks[name] = asyncio.create_task(self._try(encoder), name=f"trials of {name}")
         # A cancelled caller does not cancel the trial: others may wait for it, too.
-        return await asyncio.shield(trial)
+        await asyncio.shield(self._first[name])
+        return self.verdicts[name]
 
     async def try_all(self, encoders: Iterable[Encoder]) -> None:
         """Runs the trials of these encoders, in order."""
@@ -58,51 +74,30 @@ class TrialProber:
             await self.verdict(encoder)
 
     async def close(self) -> None:
-        """Cancels running trials and waits for their processes."""
-        for trial in self._trials.values():
-            trial.cancel()
-        await asyncio.gather(*self._trials.values(), return_exceptions=True)
+        """Cancels the trials, which kills their processes."""
+        pending = [*self._tasks.values(), *self._first.values()]
+        for each in pending:
+            each.cancel()
+        await asyncio.gather(*pending, return_exceptions=True)
 
-    async def _try(self, encoder: Encoder) -> Verdict:
-        if Gst.ElementFactory.find(encoder.element) is None:
-            reason = f"there is no GStreamer element {encoder.element}"
-            return Verdict(present=False, proven=False, reason=reason)
-        async with self._one_at_a_time:
-            return await self._run_trial(encoder)
-
-    async def _run_trial(self, encoder: Encoder) -> Verdict:
-        target = self._target
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "preview.encoders.probe_child", encoder.name),
-            *map(str, (target.width_px, target.height_px, target.fps, target.bitrate_kbps)),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL,
-            limit=_MAX_OUTPUT_BYTES,
-        )
-        try:
-            output, _ = await asyncio.wait_for(process.communicate(), self._timeout_s)
-        except TimeoutError:
-            return _failed(f"it hung: no result within {self._timeout_s:g} s")
-        finally:
-            if process.returncode is None:
-                process.kill()
-                await process.wait()
-        return _parse(output, process.returncode or 0)
-
-
-def _parse(output: bytes, code: int) -> Verdict:
-    if code < 0:
-        return _failed(f"it crashed when tried ({signal.Signals(-code).name})")
-    try:
-        outcome = json.loads(output)
-        reason, first_byte_ms = str(outcome["reason"]), outcome["first_byte_ms"]
-    except (ValueError, KeyError, TypeError):
-        return _failed(f"its trial ended with code {code} and without a result")
-    if reason:
-        return _failed(" ".join(reason.split()))
-    return Verdict(present=True, proven=True, first_byte_ms=float(first_byte_ms))
-
-
-def _failed(reason: str) -> Verdict:
-    return Verdict(present=True, proven=False, reason=reason)
+    async def _try(self, encoder: Encoder) -> None:
+        """Tries an encoder until the result is final."""
+        backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
+        pause_s: float | None = 0.0
+        while pause_s is not None:
+            await asyncio.sleep(pause_s)
+            pause_s = None
+            async with self._one_at_a_time:
+                try:
+                    verdict = await self._attempt(encoder)
+                except TrialError as error:
+                    reason = str(error)
+                    if error.passing and self._repeats:
+                        pause_s = backoff.next_s()
+                        reason += f" (tried again after {pause_s:g} s, for the next start of the preview)"
+                    verdict = Verdict(present=True, proven=False, reason=reason)
+            if verdict.proven and backoff.failures:
+                _log.info("encoder %s works now: the next start of the preview uses it", encoder.name)
+            self.verdicts[encoder.name] = verdict
+            if not self._first[encoder.name].done():
+                self._first[encoder.name].set_result(None)

@@ -1,19 +1,16 @@
-"""Trial of one encoder, in a process that may crash or hang.
+"""Trial of one encoder, in the child process of common.trial.
 
-Encodes frames of the requested size with the elements of the real pipeline and prints one line of JSON: the
-reason of a failure, and the time to the first byte. The parent process enforces the deadline.
+Encodes frames of the requested size with the elements of the real pipeline and reports the time to the first
+byte.
 """
 
-import json
 import os
-import sys
 import time
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from common.child import end_with_parent
 from common.errors import UserError
 from common.gst import GLib, Gst
+from common.trial_child import report
 from preview.encoders import properties
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.values import Target
@@ -21,99 +18,64 @@ from preview.values import Target
 FRAMES: Final = 10
 _ENOUGH: Final = 8
 """Frames that must come out; an encoder may hold back one or two until more arrive."""
-_ENDS_WITHIN_S: Final = 90
-"""Longer than any configurable deadline: applies only when the parent was killed."""
 _NICE: Final = 5
 """A trial yields the CPU to a running stream."""
 
 
-@dataclass(slots=True)
-class Outcome:
-    """Result of the trial; `reason` is empty when the encoder is proven."""
+class _Seen(NamedTuple):
+    """A buffer that passed a pad."""
 
-    reason: str = ""
-    first_byte_ms: float | None = None
-
-
-@dataclass(slots=True)
-class _Counts:
-    """Counts of the pad probes, updated once per frame."""
-
-    first_in_at: float = 0.0
-    first_out_at: float = 0.0
-    encoded: int = 0
-    encoded_bytes: int = 0
-    parsed: int = 0
-    key_frames: int = 0
-
-    def on_input(self, _pad: Any, _info: Any) -> Any:
-        self.first_in_at = time.monotonic()
-        return Gst.PadProbeReturn.REMOVE
-
-    def on_encoded(self, _pad: Any, info: Any) -> Any:
-        self.encoded += 1
-        self.encoded_bytes += info.get_buffer().get_size()
-        if self.encoded_bytes:
-            self.first_out_at = self.first_out_at or time.monotonic()
-        return Gst.PadProbeReturn.OK
-
-    def on_parsed(self, _pad: Any, info: Any) -> Any:
-        self.parsed += 1
-        self.key_frames += not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT)
-        return Gst.PadProbeReturn.OK
-
-    def outcome(self) -> Outcome:
-        if self.encoded == 0:
-            return Outcome("it produced no output")
-        if self.encoded_bytes == 0:
-            return Outcome("it produced only empty buffers")
-        if self.parsed < _ENOUGH:
-            return Outcome(f"only {self.parsed} of {FRAMES} frames could be parsed")
-        if self.key_frames == 0:
-            return Outcome("its stream has no key frame")
-        return Outcome(first_byte_ms=(self.first_out_at - self.first_in_at) * 1000)
+    at_s: float
+    size: int
+    is_key_frame: bool
 
 
-def main() -> None:
-    """Runs one trial; the arguments are the encoder's name, width, height, frames/s and kbit/s.
-
-    `python -m preview.encoders.probe_child x264 1280 720 30 2500`
-    """
-    end_with_parent(_ENDS_WITHIN_S)
+def main(name: str, *figures: str) -> None:
+    """Tries the encoder `name`; the figures are width, height, frames/s and kbit/s."""
     os.nice(_NICE)
-    name, *figures = sys.argv[1:]
     width, height, fps, bitrate = (int(figure) for figure in figures)
-    try:
-        # Referenced until the end: a pipeline that is freed while playing is torn down badly.
-        pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
-        outcome = trial(pipeline)
-    except UserError as error:
-        outcome = Outcome(str(error))
-    # The pipeline is not stopped, so that a driver that hangs while closing can't delay the result.
-    sys.stdout.write(json.dumps(asdict(outcome)) + "\n")
-    sys.stdout.flush()
-    os._exit(0)
+    # Referenced until the end: a pipeline that is freed while playing is torn down badly.
+    pipeline = build(CATALOGUE[name], Target(width, height, fps, bitrate, bitrate))
+    raw = _observe(pipeline, "encoder", "sink")
+    encoded = _observe(pipeline, "encoder", "src")
+    parsed = _observe(pipeline, "out", "sink")
+    error = _play(pipeline)
+    filled = [buffer for buffer in encoded if buffer.size]
+    # Without any output the parser reports an error, too: a consequence, not the cause.
+    if error and (filled or error.src is not pipeline.get_by_name("parser")):
+        report(error.parse_error()[0].message)
+    if not filled:
+        report("it produced only empty buffers" if encoded else "it produced no output")
+    if len(parsed) < _ENOUGH:
+        report(f"only {len(parsed)} of {FRAMES} frames could be parsed")
+    if not any(buffer.is_key_frame for buffer in parsed):
+        report("its stream has no key frame")
+    report(first_byte_ms=(filled[0].at_s - raw[0].at_s) * 1000)
 
 
-def trial(pipeline: Any) -> Outcome:
-    """Encodes FRAMES moving frames and evaluates the output."""
-    counts = _Counts()
-    for element, pad, probe in (
-        ("encoder", "sink", counts.on_input),
-        ("encoder", "src", counts.on_encoded),
-        ("out", "sink", counts.on_parsed),
-    ):
-        pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
+def _observe(pipeline: Any, element: str, pad: str) -> list[_Seen]:
+    """Returns a list that each buffer of a pad is added to."""
+    seen: list[_Seen] = []
+
+    def probe(_pad: Any, info: Any) -> Any:
+        buffer = info.get_buffer()
+        key_frame = not buffer.has_flags(Gst.BufferFlags.DELTA_UNIT)
+        seen.append(_Seen(time.monotonic(), buffer.get_size(), key_frame))
+        return Gst.PadProbeReturn.OK
+
+    pipeline.get_by_name(element).get_static_pad(pad).add_probe(Gst.PadProbeType.BUFFER, probe)
+    return seen
+
+
+def _play(pipeline: Any) -> Any:
+    """Plays to the end; returns the first ERROR message, None for none."""
     if pipeline.set_state(Gst.State.PLAYING) == Gst.StateChangeReturn.FAILURE:
-        return Outcome(_first_error(pipeline) or "it can't be started")
+        error = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+        return error or report("it can't be started")
     message = pipeline.get_bus().timed_pop_filtered(
         Gst.CLOCK_TIME_NONE, Gst.MessageType.ERROR | Gst.MessageType.EOS
     )
-    # Without any output the parser reports an error, too: a consequence, not the cause.
-    consequence = counts.encoded_bytes == 0 and message.src is pipeline.get_by_name("parser")
-    if message.type == Gst.MessageType.ERROR and not consequence:
-        return Outcome(message.parse_error()[0].message)
-    return counts.outcome()
+    return message if message.type == Gst.MessageType.ERROR else None
 
 
 def build(encoder: Encoder, target: Target) -> Any:
@@ -135,12 +97,3 @@ def build(encoder: Encoder, target: Target) -> Any:
     kbps = target.bitrate_kbps
     properties.configure(pipeline.get_by_name("encoder"), encoder, kbps, target.fps, highest_kbps=kbps)
     return pipeline
-
-
-def _first_error(pipeline: Any) -> str:
-    message = pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
-    return str(message.parse_error()[0].message) if message else ""
-
-
-if __name__ == "__main__":
-    main()

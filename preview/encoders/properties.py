@@ -7,7 +7,7 @@ because every trial is a process of its own.
 from typing import Any, Final
 
 from common.gst import GObject, Gst, GstVideo
-from preview.encoders.catalogue import Encoder, KeyFrameBy
+from preview.encoders.catalogue import Encoder
 from preview.values import Codec, Target
 
 _PARSERS: Final = {Codec.H264: "h264parse", Codec.H265: "h265parse"}
@@ -80,7 +80,7 @@ def set_bitrate(element: Any, encoder: Encoder, bitrate_kbps: int, gop_frames: i
     """
     names = encoder.properties
     for name in names.bitrate:
-        _set(element, name, str(bitrate_kbps * names.unit.value))
+        _set(element, name, str(bitrate_kbps * names.per_kbps))
     if names.vbv_ms:
         _set(element, names.vbv_ms, str(vbv_ms(bitrate_kbps)))
     if names.controls:
@@ -104,9 +104,9 @@ def request_key_frame(element: Any, encoder: Encoder, sink_pad: Any) -> None:
         sink_pad: sink pad of the listener. The event travels upstream from there through muxer and parser,
             which then repeat their tables and headers.
     """
-    if encoder.properties.key_frame_by is KeyFrameBy.SIGNAL:
-        if GObject.signal_lookup(KeyFrameBy.SIGNAL.value, element):
-            element.emit(KeyFrameBy.SIGNAL.value)
+    if signal := encoder.properties.key_frame_signal:
+        if GObject.signal_lookup(signal, element):
+            element.emit(signal)
         return
     sink_pad.push_event(GstVideo.video_event_new_upstream_force_key_unit(Gst.CLOCK_TIME_NONE, True, 0))
 

@@ -1,41 +1,12 @@
 """Selection of the encoder: the first one in the order that is proven and has not failed since. Pure."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 from common.errors import UserError
 from preview.encoders.catalogue import Encoder
+from preview.encoders.probe import TrialProber
 from preview.values import EncoderChoice
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """Result of the trial of an encoder.
-
-    Args:
-        present: whether the element exists on this machine.
-        proven: whether it encoded frames.
-        reason: why it is not present or not proven, for people; empty when proven.
-        first_byte_ms: time from the first frame in to the first byte out; None when not proven.
-    """
-
-    present: bool
-    proven: bool
-    reason: str = ""
-    first_byte_ms: float | None = None
-
-
-class Prober(Protocol):
-    """Runs trials of encoders and caches the results."""
-
-    @property
-    def verdicts(self) -> Mapping[str, Verdict]:
-        """Results so far, by encoder name."""
-
-    async def verdict(self, encoder: Encoder) -> Verdict:
-        """Returns the result for one encoder; runs its trial when there is none."""
 
 
 class Selection:
@@ -52,7 +23,7 @@ class Selection:
         self,
         order: Sequence[Encoder],
         forgive_after_s: float,
-        prober: Prober,
+        prober: TrialProber,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._order = tuple(order)

@@ -103,7 +103,10 @@ class BitrateController:
         if signs:
             self._last_congested_at = now
             if now - self._last_decrease_at >= _HOLD_AFTER_DECREASE_S:
-                self._decrease(signs, _factor(link), now)
+                severe = (
+                    link.loss_percent > _SEVERE_LOSS_PERCENT or link.dropped_percent > _SEVERE_DROPPED_PERCENT
+                )
+                self._decrease(signs, _SEVERE_DECREASE if severe else _DECREASE, now)
         elif self._may_increase(now):
             self._increase(now)
         return self._decision
@@ -146,8 +149,3 @@ class BitrateController:
         self._last_increase_at = now
         reason = "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
         self._decision = Decision(after, reason)
-
-
-def _factor(link: LinkReport) -> float:
-    severe = link.loss_percent > _SEVERE_LOSS_PERCENT or link.dropped_percent > _SEVERE_DROPPED_PERCENT
-    return _SEVERE_DECREASE if severe else _DECREASE

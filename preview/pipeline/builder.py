@@ -16,7 +16,6 @@ from typing import Any, Final
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
-from preview.pipeline import square_pixels
 from preview.pipeline.plan import Plan
 
 _TABLES_EVERY: Final = 4500
@@ -29,6 +28,8 @@ new viewer, with continuity counters that the stream does not continue; its key 
 
 An element does it, not a probe: caps that a probe drops are pushed again with every buffer.
 """
+_SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
+_TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 _SRT_POLL_MS: Final = 1000
 """Wake-up interval of the listener's thread; the default, no time-out, can block its stop forever."""
 
@@ -81,7 +82,8 @@ def build(plan: Plan) -> Parts:
     find = body.get_by_name
     encoder, sink = find("encoder"), find("sink")
     adjustable = Adjustable(find("rate_caps"), find("size"), encoder)
-    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, plan.highest_kbps)
+    highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
+    properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
     apply_target(adjustable, plan)
     _listen(sink, plan)
     return Parts(
@@ -125,8 +127,36 @@ def _source(plan: Plan) -> Any:
     for name, values in plan.source.properties.items():
         for key, value in values.items():
             source.get_by_name(name).set_property(key, value)
-    square_pixels.fill_in(source)
+    _fill_in_square_pixels(source)
     return source
+
+
+def _fill_in_square_pixels(source: Any) -> None:
+    """Completes the caps behind sources of untyped bytes: shared memory, a socket, a raw file.
+
+    Such caps are all that is known of the frames, and they rarely state the pixel aspect ratio. GStreamer
+    leaves it open until videoscale negotiates it, and a capsfilter that would have to choose one then fails
+    ("Filter caps do not completely specify the output format"). Such caps mean square pixels.
+    """
+    elements = source.iterate_all_by_element_factory_name("capsfilter")
+    while (step := elements.next())[0] == Gst.IteratorResult.OK:
+        if _follows_untyped_source(step[1]):
+            square = step[1].get_property("caps").intersect(Gst.Caps.from_string(_SQUARE))
+            # Empty where the caps state another aspect ratio, or are not raw video.
+            if not square.is_empty():
+                step[1].set_property("caps", square)
+
+
+def _follows_untyped_source(element: Any) -> bool:
+    """Whether only transparent elements separate this one from a source that can't state its caps."""
+    pad = element.get_static_pad("sink").get_peer()
+    while pad is not None and (before := pad.get_parent_element()) is not None:
+        if before.numsinkpads == 0:
+            return bool(pad.query_caps(None).is_any())
+        if before.get_factory().get_name() not in _TRANSPARENT:
+            return False
+        pad = before.get_static_pad("sink").get_peer()
+    return False
 
 
 def _body(plan: Plan) -> str:
@@ -174,6 +204,6 @@ def _listen(sink: Any, plan: Plan) -> None:
         ("enable-last-sample", False),
     ):
         sink.set_property(name, value)
-    if plan.encrypted:
+    if plan.passphrase:
         Gst.util_set_object_arg(sink, "pbkeylen", str(srt.key_length_bytes))
         sink.set_property("passphrase", plan.passphrase)

@@ -40,5 +40,5 @@ class PipelineEvents(Protocol):
     def failed(self, fault: Fault) -> None:
         """The pipeline has failed. Once per pipeline: only the first fault is reported."""
 
-    def measured(self) -> None:
-        """New statistics are available."""
+    def measured(self, viewers_refused: int) -> None:
+        """New statistics are available; so many viewers were refused since the last ones."""

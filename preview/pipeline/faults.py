@@ -6,74 +6,64 @@ from common.gst import Gst
 from preview.pipeline.builder import Parts
 from preview.pipeline.events import Blame, Fault
 from preview.pipeline.plan import Plan
-from preview.pipeline.watchdogs import Silent
 
 _DETAILS: Final = 120
 """Characters of GStreamer's debug text that are quoted; the log has all of it."""
 
 
+def of(blame: Blame, what: str, plan: Plan) -> Fault:
+    """Returns the fault of a part, with the remedy where there is one.
+
+    Args:
+        blame: the part.
+        what: what it did, as the predicate of a sentence.
+        plan: of the pipeline.
+    """
+    match blame:
+        case Blame.SOURCE:
+            remedy = f" {plan.source.remedy}." if plan.source.remedy else ""
+            text = f"{plan.source.label} {what}.{remedy}"
+        case Blame.ENCODER:
+            text = f"encoder {plan.encoder.name} {what}"
+        case Blame.LISTENER:
+            text = f"the SRT listener on port {plan.srt.port} {what}."
+        case Blame.OTHER:
+            text = f"the pipeline {what}. The log of the preview service has more."
+    return Fault(blame, text)
+
+
 def from_message(message: Any, parts: Parts, plan: Plan) -> Fault:
     """Returns the fault of an ERROR message of the bus."""
     error, debug = message.parse_error()
-    blame = _blame(message.src, parts)
-    return Fault(blame, _text(blame, error, debug or "", plan))
+    culprit = message.src
+    elements = _elements(parts).items()
+    blame = next((b for b, e in elements if culprit is e or culprit.has_as_ancestor(e)), Blame.OTHER)
+    taken = error.matches(Gst.ResourceError.quark(), Gst.ResourceError.OPEN_WRITE) or "bind" in (debug or "")
+    if blame is Blame.LISTENER and taken:
+        port = plan.srt.port
+        return Fault(
+            blame,
+            f"UDP port {port} on {plan.srt.bind} can't be used: another program has it, or the address is not"
+            f" this machine's. 'ss -lunp sport = :{port}' names the program; or choose another srt.port.",
+        )
+    return of(blame, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
 
 
-def from_silence(silent: Silent, seconds: float, plan: Plan) -> Fault:
-    """Returns the fault that a watchdog found."""
-    if silent is Silent.SOURCE:
-        return _of_source(f"{plan.source.label} has sent no frame for {seconds:.1f} s", plan)
-    return Fault(Blame.ENCODER, f"encoder {plan.encoder.name} has produced no frame for {seconds:.1f} s")
+def blocked(parts: Parts, plan: Plan, seconds: float) -> Fault:
+    """Returns the fault of a pipeline whose start does not return.
+
+    A bin changes its elements one after the other, from the listener to the source, so the first one in this
+    order whose change is still pending is the one that blocks.
+    """
+    pending = [
+        blame for blame, e in _elements(parts).items() if e.get_state(0).pending != Gst.State.VOID_PENDING
+    ]
+    blame = pending[0] if pending else Blame.OTHER
+    return of(blame, f"has not started within {seconds:g} s", plan)
 
 
-def end_of_stream(plan: Plan) -> Fault:
-    """Returns the fault of a source that came to its end."""
-    return _of_source(f"{plan.source.label} has ended", plan)
-
-
-def unexplained(plan: Plan) -> Fault:
-    """Returns the fault of a pipeline that did not start while no element posted an error."""
-    return Fault(Blame.ENCODER, f"encoder {plan.encoder.name} could not be started and gave no reason")
-
-
-def encoder_hung(plan: Plan, when: str) -> Fault:
-    """Returns the fault of an encoder whose driver did not return from a call."""
-    return Fault(Blame.ENCODER, f"encoder {plan.encoder.name} hung when {when}")
-
-
-def _of_source(text: str, plan: Plan) -> Fault:
-    return Fault(Blame.SOURCE, f"{text}. {plan.source.remedy}." if plan.source.remedy else f"{text}.")
-
-
-def _blame(culprit: Any, parts: Parts) -> Blame:
-    for element, blame in (
-        (parts.source, Blame.SOURCE),
-        (parts.encoder, Blame.ENCODER),
-        (parts.sink, Blame.LISTENER),
-    ):
-        if culprit is element or culprit.has_as_ancestor(element):
-            return blame
-    return Blame.OTHER
-
-
-def _text(blame: Blame, error: Any, debug: str, plan: Plan) -> str:
-    reason = _reason(error.message.rstrip("."), debug)
-    match blame:
-        case Blame.SOURCE:
-            return _of_source(f"{plan.source.label} failed: {reason}", plan).text
-        case Blame.ENCODER:
-            return f"encoder {plan.encoder.name} failed: {reason}"
-        case Blame.LISTENER:
-            port = plan.srt.port
-            if error.matches(Gst.ResourceError.quark(), Gst.ResourceError.OPEN_WRITE) or "bind" in debug:
-                return (
-                    f"UDP port {port} on {plan.srt.bind} can't be used: another program has it, or the"
-                    f" address is not this machine's. 'ss -lunp sport = :{port}' names the program; or choose"
-                    " another srt.port."
-                )
-            return f"the SRT listener on port {port} failed: {reason}."
-        case Blame.OTHER:
-            return f"the pipeline failed: {reason}. The log of the preview service has more."
+def _elements(parts: Parts) -> dict[Blame, Any]:
+    return {Blame.LISTENER: parts.sink, Blame.ENCODER: parts.encoder, Blame.SOURCE: parts.source}
 
 
 def _reason(text: str, debug: str) -> str:

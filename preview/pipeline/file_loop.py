@@ -20,14 +20,13 @@ class FileLoop:
 
     Args:
         parts: the pipeline.
-        loop: event loop of the callback.
-        on_failure: called on the loop when the seek fails.
+        on_failure: called on the event loop when the seek fails.
     """
 
-    def __init__(self, parts: Parts, loop: asyncio.AbstractEventLoop, on_failure: Callable[[], None]) -> None:
+    def __init__(self, parts: Parts, on_failure: Callable[[], None]) -> None:
         self._pipeline = parts.pipeline
         self._pad = parts.source.get_by_name("pace").get_static_pad("sink")
-        self._loop = loop
+        self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
         self._task: asyncio.Task[None] | None = None
         self._probe_id = self._pad.add_probe(

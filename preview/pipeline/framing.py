@@ -31,19 +31,16 @@ class Framing:
 
     Args:
         parts: the pipeline.
-        loop: event loop of the callback.
-        on_first_frame: called once, on the loop, after the first frame.
+        on_first_frame: called once, on the event loop, after the first frame.
         fps: frame rate.
     """
 
-    def __init__(
-        self, parts: Parts, loop: asyncio.AbstractEventLoop, on_first_frame: Callable[[], None], fps: float
-    ) -> None:
+    def __init__(self, parts: Parts, on_first_frame: Callable[[], None], fps: float) -> None:
         self.frames = 0
         self.bytes = 0
         self.last_frame_at = 0.0
         """time.monotonic() of the newest frame."""
-        self._loop = loop
+        self._loop = asyncio.get_running_loop()
         self._on_first_frame = on_first_frame
         self._references = ClockReferences(self._send_reference, fps)
         self._muxer_pad = parts.muxer_pad

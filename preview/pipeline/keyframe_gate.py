@@ -7,6 +7,7 @@ frame replaces.
 """
 
 import asyncio
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -27,18 +28,17 @@ class KeyframeGate:
 
     Args:
         parts: the pipeline.
-        loop: event loop of the callback.
-        request_key_frame: requests a key frame of the encoder; called on the loop.
+        request_key_frame: requests a key frame of the encoder; called on the event loop.
     """
 
-    def __init__(
-        self, parts: Parts, loop: asyncio.AbstractEventLoop, request_key_frame: Callable[[], None]
-    ) -> None:
-        self._loop = loop
+    def __init__(self, parts: Parts, request_key_frame: Callable[[], None]) -> None:
+        self._loop = asyncio.get_running_loop()
         self._request_key_frame = request_key_frame
         self._last_request_at = float("-inf")
         self._timer: asyncio.TimerHandle | None = None
         self._pad = parts.parser_pad
+        self._lock = threading.Lock()
+        """Held by threads that open or close the gate: adding a probe and keeping its number is one step."""
         self._probe_id: int | None = None
         """None while the gate is open, which is nearly always: a probe in Python costs time per frame."""
         self._may_drop = 0
@@ -49,28 +49,31 @@ class KeyframeGate:
         self._disconnect()
         # It references the listener, which must be freed to free its port.
         del self._disconnect
-        probe_id, self._probe_id = self._probe_id, None
-        if probe_id is not None:
-            self._pad.remove_probe(probe_id)
-        del self._pad
+        with self._lock:
+            if self._probe_id is not None:
+                self._pad.remove_probe(self._probe_id)
+            self._probe_id = None
+            del self._pad
         if self._timer:
             self._timer.cancel()
 
     def _on_caller(self, *_: Any) -> None:
         """Closes the gate, on SRT's thread and under the lock of its socket."""
         if time.monotonic() - self._last_request_at >= _MIN_INTERVAL_S:
-            self._may_drop = _MAX_DROPPED
-            if self._probe_id is None:
-                self._probe_id = self._pad.add_probe(Gst.PadProbeType.BUFFER, self._probe)
+            with self._lock:
+                self._may_drop = _MAX_DROPPED
+                if self._probe_id is None:
+                    self._probe_id = self._pad.add_probe(Gst.PadProbeType.BUFFER, self._probe)
         call_on_loop(self._loop, self._viewer_connected)
 
     def _probe(self, _pad: Any, info: Any) -> Any:
         """Drops delta units until the key frame, on the encoder's thread."""
-        if self._may_drop == 0 or not info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT):
+        with self._lock:
+            if self._may_drop and info.get_buffer().has_flags(Gst.BufferFlags.DELTA_UNIT):
+                self._may_drop -= 1
+                return Gst.PadProbeReturn.DROP
             self._probe_id = None
             return Gst.PadProbeReturn.REMOVE
-        self._may_drop -= 1
-        return Gst.PadProbeReturn.DROP
 
     def _viewer_connected(self) -> None:
         wait_s = self._last_request_at + _MIN_INTERVAL_S - time.monotonic()

@@ -11,23 +11,25 @@ import logging
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.config import TimeoutSettings
+from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
 from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
-from preview.pipeline.events import Fault, HungError, PipelineEvents
+from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
 from preview.pipeline.plan import Plan
 from preview.pipeline.threads import in_thread
-from preview.pipeline.watchdogs import Silent, Watchdogs
-from preview.values import Measurement, Profile, StreamState, Target
+from preview.pipeline.viewer_limit import ViewerLimit
+from preview.pipeline.watchdogs import Watchdogs
+from preview.values import Measurement, Profile, StreamState
 
 _log = logging.getLogger(__name__)
 
@@ -45,25 +47,25 @@ class Runner:
 
     Args:
         plan: what to build.
-        timeouts: deadlines.
         events: receives the first frame, the first fault and new statistics.
 
     Raises:
         UserError: the pipeline can't be built.
     """
 
-    def __init__(self, plan: Plan, timeouts: TimeoutSettings, events: PipelineEvents) -> None:
+    def __init__(self, plan: Plan, events: PipelineEvents) -> None:
         self.plan = plan
         self.measurement: Measurement | None = None
         self._bitrate = Decision(plan.target.bitrate_kbps)
-        self._timeouts = timeouts
+        self._timeouts = plan.settings.timeouts
         self._events = events
         self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
-        self._framing = Framing(parts, loop, self._first_frame, plan.target.fps)
-        self._keyframe_gate = KeyframeGate(parts, loop, self._request_key_frame)
-        self._file_loop = FileLoop(parts, loop, self._source_ended) if plan.source.loops else None
+        self._framing = Framing(parts, self._first_frame, plan.target.fps)
+        self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
+        self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
+        self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
         self._bus = parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -76,9 +78,8 @@ class Runner:
     def stream(self) -> StreamState:
         """Parameters of the stream being served."""
         plan, bitrate = self.plan, self._bitrate
-        return StreamState(
-            plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, plan.encrypted
-        )
+        encrypted = bool(plan.passphrase)
+        return StreamState(plan.target, bitrate.bitrate_kbps, bitrate.reason, plan.encoder.codec, encrypted)
 
     async def start(self) -> None:
         """Starts the pipeline. Failures are reported as events, also after this has returned."""
@@ -87,17 +88,19 @@ class Runner:
         try:
             outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
         except TimeoutError:
-            self._fail(faults.from_silence(Silent.ENCODER, self._timeouts.start_s, self.plan))
+            self._fail(faults.blocked(self._parts, self.plan, self._timeouts.start_s))
             return
         self._read_bus()
         if outcome == Gst.StateChangeReturn.FAILURE:
-            self._fail(faults.unexplained(self.plan))  # Counts only if no element posted an error.
+            # Counts only if no element posted an error.
+            self._fail(faults.of(Blame.ENCODER, "could not be started and gave no reason", self.plan))
             return
         self._spawn("watch", self._watch())
 
-    async def switch(self, profile: Profile, target: Target) -> None:
+    async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
-        plan = self.plan = self.plan.switched(profile, target)
+        plan = self.plan = replace(self.plan, profile=profile)
+        target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
         elements, framing = self._parts.adjustable, self._framing
@@ -120,7 +123,8 @@ class Runner:
         Raises:
             HungError: the listener or the source hangs.
         """
-        self._end()  # Errors from here on are caused by the teardown.
+        if not self._ended.done():
+            self._ended.set_result(None)  # Errors from here on are caused by the teardown.
         self._loop.remove_reader(self._bus_fd)
         for task in self._tasks.values():
             task.cancel()
@@ -143,7 +147,7 @@ class Runner:
         """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
 
         def write() -> None:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_own_directory(path.parent)
             graph = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
             path.write_text(graph, encoding="utf-8")
 
@@ -170,16 +174,12 @@ class Runner:
             self._events.first_frame()
 
     def _source_ended(self) -> None:
-        self._fail(faults.end_of_stream(self.plan))
+        self._fail(faults.of(Blame.SOURCE, "has ended", self.plan))
 
     def _fail(self, fault: Fault) -> None:
         if not self._ended.done():
-            self._end()
-            self._events.failed(fault)
-
-    def _end(self) -> None:
-        if not self._ended.done():
             self._ended.set_result(None)
+            self._events.failed(fault)
 
     def _read_bus(self) -> None:
         while (message := self._bus.pop_filtered(_MESSAGES)) is not None:
@@ -200,7 +200,7 @@ class Runner:
             now = time.monotonic()
             silent = watchdogs.check(self._parts.rate.get_property("in"), self._framing.frames, now)
             if silent:
-                self._fail(faults.from_silence(silent, watchdogs.silence_s(silent, now), self.plan))
+                self._fail(faults.of(*silent, self.plan))
                 return
             if now - reading.at >= _WINDOW_S:
                 reading = self._measure(reading)
@@ -208,9 +208,9 @@ class Runner:
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)
         self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
-        if self.plan.adaptive:
+        if self.plan.settings.adaptive.enabled:
             self._adapt_bitrate(statistics.link_report(before, now))
-        self._events.measured()
+        self._events.measured(self._viewer_limit.take_refused())
         return now
 
     # --- calls into the encoder's driver ---
@@ -262,7 +262,7 @@ class Runner:
                 if calling.done():
                     calling.result()
             except TimeoutError:
-                self._fail(faults.encoder_hung(self.plan, when))
+                self._fail(faults.of(Blame.ENCODER, f"hung when {when}", self.plan))
             finally:
                 calling.cancel()
 

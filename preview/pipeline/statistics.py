@@ -12,37 +12,33 @@ from preview.pipeline.adaptive import LinkReport
 from preview.pipeline.framing import Framing
 from preview.values import Measurement
 
-
-@dataclass(frozen=True, slots=True)
-class Viewer:
-    """SRT statistics of one viewer; packet counts since it connected.
-
-    Args:
-        rtt_ms: round-trip time.
-        sent: packets sent.
-        lost: packets reported lost.
-        retransmitted: packets sent again.
-        dropped: packets dropped because they were too late to send (SRTO_TLPKTDROP).
-    """
-
-    rtt_ms: float
-    sent: int
-    lost: int
-    retransmitted: int
-    dropped: int
-
-
-_NEW: Final = Viewer(0.0, 0, 0, 0, 0)
+_SENT: Final = "packets-sent"
+_SHARES: Final = {
+    # srtsink's name is misleading: it counts loss reports.
+    "loss_percent": "packets-sent-lost",
+    "retransmitted_percent": "packets-retransmitted",
+    "dropped_percent": "packets-sent-dropped",
+}
+"""Shares of a LinkReport, and srtsink's counters of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """All counters at one moment, in monotonic seconds; viewers by their address."""
+    """All counters at one moment, in monotonic seconds.
+
+    Args:
+        at: the moment.
+        frames: encoded frames.
+        bytes: of the transport stream.
+        rtts_ms: round-trip times, by viewer's address.
+        packets: srtsink's counters since the viewer connected, by viewer's address.
+    """
 
     at: float
     frames: int
     bytes: int
-    viewers: dict[str, Viewer]
+    rtts_ms: dict[str, float]
+    packets: dict[str, dict[str, int]]
 
 
 def read(framing: Framing, sink: Any) -> Reading:
@@ -50,8 +46,17 @@ def read(framing: Framing, sink: Any) -> Reading:
     stats = sink.get_property("stats")
     # Without viewers the structure has no such field.
     callers = stats.get_value("callers") if stats is not None and stats.has_field("callers") else None
-    viewers = {_address(caller): _viewer(caller) for caller in callers or ()}
-    return Reading(time.monotonic(), framing.frames, framing.bytes, viewers)
+    viewers = {address_of(caller.get_value("caller-address")): caller for caller in callers or ()}
+    return Reading(
+        at=time.monotonic(),
+        frames=framing.frames,
+        bytes=framing.bytes,
+        rtts_ms={address: float(caller.get_value("rtt-ms")) for address, caller in viewers.items()},
+        packets={
+            address: {name: int(caller.get_value(name)) for name in (_SENT, *_SHARES.values())}
+            for address, caller in viewers.items()
+        },
+    )
 
 
 def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
@@ -61,7 +66,7 @@ def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
     return Measurement(
         fps=(now.frames - before.frames) / seconds,
         bitrate_kbps=(now.bytes - before.bytes) * 8 / 1000 / seconds,
-        viewer_count=len(now.viewers),
+        viewer_count=len(now.packets),
         last_frame_age_ms=max(0, round((now.at - last_frame_at) * 1000)),
         worst_rtt_ms=link.rtt_ms if link else None,
         worst_loss_percent=link.loss_percent if link else None,
@@ -70,34 +75,20 @@ def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
 
 def link_report(before: Reading, now: Reading) -> LinkReport | None:
     """Returns the worst figures of all viewers in the window; None without viewers."""
-    if not now.viewers:
+    if not now.packets:
         return None
-    windows = [(before.viewers.get(address, _NEW), viewer) for address, viewer in now.viewers.items()]
-    return LinkReport(
-        rtt_ms=max(after.rtt_ms for _, after in windows),
-        loss_percent=max(_share(a.lost - b.lost, a.sent - b.sent) for b, a in windows),
-        retransmitted_percent=max(
-            _share(a.retransmitted - b.retransmitted, a.sent - b.sent) for b, a in windows
-        ),
-        dropped_percent=max(_share(a.dropped - b.dropped, a.sent - b.sent) for b, a in windows),
-    )
+
+    def in_window(address: str, name: str) -> int:
+        return now.packets[address][name] - before.packets.get(address, {}).get(name, 0)
+
+    def worst_percent(name: str) -> float:
+        sent = {address: in_window(address, _SENT) for address in now.packets}
+        return max(min(100.0, 100.0 * in_window(a, name) / sent[a]) if sent[a] > 0 else 0.0 for a in sent)
+
+    shares = {share: worst_percent(name) for share, name in _SHARES.items()}
+    return LinkReport(rtt_ms=max(now.rtts_ms.values()), **shares)
 
 
-def _share(count: int, sent: int) -> float:
-    return min(100.0, 100.0 * count / sent) if sent > 0 else 0.0
-
-
-def _address(caller: Any) -> str:
-    address = caller.get_value("caller-address")
-    return f"{address.get_address().to_string()}:{address.get_port()}" if address else ""
-
-
-def _viewer(caller: Any) -> Viewer:
-    return Viewer(
-        rtt_ms=float(caller.get_value("rtt-ms")),
-        sent=int(caller.get_value("packets-sent")),
-        # srtsink's name is misleading: it counts loss reports.
-        lost=int(caller.get_value("packets-sent-lost")),
-        retransmitted=int(caller.get_value("packets-retransmitted")),
-        dropped=int(caller.get_value("packets-sent-dropped")),
-    )
+def address_of(socket_address: Any) -> str:
+    """Returns "HOST:PORT" of a socket address."""
+    return f"{socket_address.get_address().to_string()}:{socket_address.get_port()}" if socket_address else ""

@@ -7,6 +7,7 @@ Everything else in the service runs on the asyncio loop.
 import asyncio
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -29,20 +30,14 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
         TimeoutError: no result within `deadline_s`. The thread is left behind and does not keep the process
             from exiting.
     """
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[T] = loop.create_future()
-
-    def settle(set_outcome: Callable[[Any], None], outcome: Any) -> None:
-        if not done.done():
-            set_outcome(outcome)
+    done: Future[T] = Future()
+    done.set_running_or_notify_cancel()  # From here on, giving up does not disturb the thread.
 
     def run() -> None:
         try:
-            result = work()
+            done.set_result(work())
         except BaseException as error:  # noqa: BLE001  # raised again by the awaiting coroutine
-            call_on_loop(loop, settle, done.set_exception, error)
-        else:
-            call_on_loop(loop, settle, done.set_result, result)
+            done.set_exception(error)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
-    return await asyncio.wait_for(done, deadline_s)
+    return await asyncio.wait_for(asyncio.wrap_future(done), deadline_s)

@@ -4,28 +4,8 @@ A camera whose sensor stalls (v4l2src polls without a timeout) and an encoder wh
 error.
 """
 
-from dataclasses import dataclass
-from enum import Enum
-
 from preview.config import TimeoutSettings
-
-
-class Silent(Enum):
-    """Part that stopped delivering."""
-
-    SOURCE = "source"
-    ENCODER = "encoder"
-
-
-@dataclass(slots=True)
-class _Counter:
-    count: int
-    changed_at: float
-
-    def update(self, count: int, now: float) -> None:
-        if count != self.count:
-            self.count = count
-            self.changed_at = now
+from preview.pipeline.events import Blame
 
 
 class Watchdogs:
@@ -38,13 +18,11 @@ class Watchdogs:
     """
 
     def __init__(self, now: float, timeouts: TimeoutSettings) -> None:
-        self._first_frame_s = timeouts.start_s
-        self._source_s = timeouts.source_silence_s
-        self._encoder_s = timeouts.encoder_silence_s
-        self._captured = _Counter(0, now)
-        self._encoded = _Counter(0, now)
+        self._timeouts = timeouts
+        self._captured = self._encoded = 0
+        self._captured_at = self._encoded_at = now
 
-    def check(self, captured: int, encoded: int, now: float) -> Silent | None:
+    def check(self, captured: int, encoded: int, now: float) -> tuple[Blame, str] | None:
         """Evaluates the counts of this moment.
 
         Args:
@@ -53,23 +31,20 @@ class Watchdogs:
             now: monotonic seconds.
 
         Returns:
-            The part that exceeds its limit, the source first: without frames no encoder can deliver.
+            The part that exceeds its limit, and the predicate of its fault. The source first: without frames
+            no encoder can deliver.
         """
-        was_idle = self._captured.count == 0 or now - self._captured.changed_at > self._encoder_s
-        self._captured.update(captured, now)
-        self._encoded.update(encoded, now)
-        if self._captured.changed_at == now and was_idle:
-            # The encoder had no frames until now: its time starts here.
-            self._encoded.changed_at = now
-        silence_s = now - self._captured.changed_at
-        if silence_s > (self._source_s if captured else self._first_frame_s):
-            return Silent.SOURCE
-        source_delivers = captured > 0 and silence_s <= self._encoder_s
-        if source_delivers and now - self._encoded.changed_at > self._encoder_s:
-            return Silent.ENCODER
+        encoder_limit_s = self._timeouts.encoder_silence_s
+        if captured != self._captured:
+            if self._captured == 0 or now - self._captured_at > encoder_limit_s:
+                # The encoder had no frames until now: its time starts here.
+                self._encoded_at = now
+            self._captured, self._captured_at = captured, now
+        if encoded != self._encoded:
+            self._encoded, self._encoded_at = encoded, now
+        source_s, encoder_s = now - self._captured_at, now - self._encoded_at
+        if source_s > (self._timeouts.source_silence_s if captured else self._timeouts.start_s):
+            return Blame.SOURCE, f"has sent no frame for {source_s:.1f} s"
+        if captured and source_s <= encoder_limit_s < encoder_s:
+            return Blame.ENCODER, f"has produced no frame for {encoder_s:.1f} s"
         return None
-
-    def silence_s(self, silent: Silent, now: float) -> float:
-        """Returns for how many seconds a part has delivered nothing."""
-        counter = self._captured if silent is Silent.SOURCE else self._encoded
-        return now - counter.changed_at

@@ -8,7 +8,7 @@ from typing import Final
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import Encoder
-from preview.encoders.selection import Verdict
+from preview.encoders.probe import Verdict
 from preview.lifecycle import State
 from preview.values import ActualState, Codec, DesiredState, Profile, StreamState
 

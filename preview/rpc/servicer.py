@@ -1,8 +1,6 @@
 """PreviewService: receives, maps, calls, maps, replies."""
 
-import asyncio
 from collections.abc import AsyncIterator, Sequence
-from contextlib import suppress
 from typing import Any, Final
 
 import grpc
@@ -10,7 +8,7 @@ import grpc
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from omniseer.preview.v1 import preview_service_pb2_grpc as pb_grpc
 from preview.encoders.catalogue import Encoder
-from preview.encoders.selection import Prober
+from preview.encoders.probe import TrialProber
 from preview.rpc import mapping
 from preview.supervisor import Supervisor
 
@@ -29,7 +27,7 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
         encoders: all encoders, in order of preference.
     """
 
-    def __init__(self, supervisor: Supervisor, prober: Prober, encoders: Sequence[Encoder]) -> None:
+    def __init__(self, supervisor: Supervisor, prober: TrialProber, encoders: Sequence[Encoder]) -> None:
         self._supervisor = supervisor
         self._prober = prober
         self._encoders = tuple(encoders)
@@ -49,13 +47,17 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
         self, _request: pb.WatchActualStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchActualStateResponse]:
         """Streams the actual state, now and on every change; a slow reader skips outdated states."""
+        sent = self._supervisor.actual()
+
+        def changed() -> bool:
+            return self._supervisor.actual() != sent
+
         with self._supervisor.watched():
             while True:
-                changed, actual = self._supervisor.changed, self._supervisor.actual()
-                yield pb.WatchActualStateResponse(actual=mapping.actual_state(actual))
-                heartbeat_s = _HEARTBEAT_WITH_PIPELINE_S if actual.stream else _HEARTBEAT_S
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(changed.wait(), heartbeat_s)
+                sent = self._supervisor.actual()
+                yield pb.WatchActualStateResponse(actual=mapping.actual_state(sent))
+                heartbeat_s = _HEARTBEAT_WITH_PIPELINE_S if sent.stream else _HEARTBEAT_S
+                await self._supervisor.changes.wait_until(changed, heartbeat_s)
 
     async def ListEncoders(  # noqa: N802  # the schema names it
         self, _request: pb.ListEncodersRequest, _context: grpc.aio.ServicerContext[Any, Any]

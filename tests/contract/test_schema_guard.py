@@ -244,7 +244,7 @@ def test_a_release_freezes_every_package_once(repository: Path) -> None:
 
 def test_a_schema_that_breaks_a_release_is_not_frozen(repository: Path) -> None:
     edit(repository, Path("pyproject.toml"), 'version = "0.1.0"', 'version = "9.8.7"')
-    edit(repository, PRIVATE, "uint64 restarts = 2;", "uint64 restarts = 5;")
+    edit(repository, PRIVATE, "uint64 restarts = 2;", "uint64 restarts = 99;")
 
     result = freeze(repository)
 

@@ -439,8 +439,8 @@ ADDITIONS = [
     ),
     Case(
         preview_pb2.PreviewCounters,
-        uint(1, 4) + uint(2, 3) + uint(3, 2) + uint(4, 1),
-        {"starts": 4, "restarts": 3, "faults": 2, "fallbacks": 1},
+        uint(1, 4) + uint(2, 3) + uint(3, 2) + uint(4, 1) + uint(5, 6),
+        {"starts": 4, "restarts": 3, "faults": 2, "fallbacks": 1, "viewers_refused": 6},
     ),
     Case(
         fault_pb2.Fault,

@@ -3,12 +3,20 @@
 import asyncio
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
 from common.errors import UserError
-from preview.config import GstSource, PreviewSettings, ProfileSettings, ProfilesSettings, SrtSettings
+from preview.config import (
+    GstSource,
+    PreviewSettings,
+    ProfileSettings,
+    ProfilesSettings,
+    SrtSettings,
+    TimeoutSettings,
+)
 from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
@@ -35,7 +43,8 @@ class Events:
         self.faults.append(fault)
         self._count("failed")
 
-    def measured(self) -> None:
+    def measured(self, viewers_refused: int) -> None:
+        assert viewers_refused == 0
         self._count("measured")
 
     async def wait_for(self, name: str, count: int = 1) -> None:
@@ -50,13 +59,15 @@ class Events:
         self._changed.set()
 
 
-def plan_of(description: str, passphrase: str = "") -> Plan:
+def plan_of(description: str, passphrase: str = "", start_s: float = 5.0) -> Plan:
     """A small stream of x264."""
     small = ProfileSettings(width_px=320, height_px=240, bitrate_kbps=600, floor_kbps=150)
+    faster = ProfileSettings(**asdict(FASTER))
     settings = PreviewSettings(
         source=GstSource(description=description),
-        profiles=ProfilesSettings(balanced=small),
+        profiles=ProfilesSettings(balanced=small, high_quality=faster),
         srt=SrtSettings(bind="127.0.0.1", port=free_udp_port(), latency_ms=20),
+        timeouts=TimeoutSettings(start_s=start_s),
     )
     desired = DesiredState(1, True, Profile.BALANCED, passphrase)
     return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"))
@@ -89,7 +100,7 @@ class PipelineContract:
         pipeline = self.build(plan_of(LIVE), events)
         await pipeline.start()
         await events.wait_for("first_frame")
-        await pipeline.switch(Profile.HIGH_QUALITY, FASTER)
+        await pipeline.switch(Profile.HIGH_QUALITY)
         assert pipeline.plan.profile is Profile.HIGH_QUALITY
         assert (pipeline.stream.target, pipeline.stream.bitrate_kbps) == (FASTER, 900)
         await events.wait_for("measured", events.counts["measured"] + 2)

@@ -10,7 +10,7 @@ from pathlib import Path
 from common.errors import UserError
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan
-from preview.values import Measurement, Profile, StreamState, Target
+from preview.values import Measurement, Profile, StreamState
 
 FIRST_FRAME_S = 0.05
 WINDOW_S = 0.5
@@ -27,6 +27,7 @@ class Script:
         fault_after_s: 0: no frame comes.
         fault_in_switch: reported when the profile is switched.
         fault_in_stop: reported while it is being stopped.
+        viewers_refused: in each window.
         stop_s: how long its encoder takes to stop.
         encoder_hangs: its encoder never stops.
         listener_hangs: its listener never stops.
@@ -37,6 +38,7 @@ class Script:
     fault_after_s: float = 0.0
     fault_in_switch: Fault | None = None
     fault_in_stop: Fault | None = None
+    viewers_refused: int = 0
     stop_s: float = 0.02
     encoder_hangs: bool = False
     listener_hangs: bool = False
@@ -58,13 +60,15 @@ class PipelineDouble:
     @property
     def stream(self) -> StreamState:
         plan = self.plan
-        return StreamState(plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, plan.encrypted)
+        return StreamState(
+            plan.target, plan.target.bitrate_kbps, "", plan.encoder.codec, bool(plan.passphrase)
+        )
 
     async def start(self) -> None:
         self._serving = asyncio.create_task(self._serve())
 
-    async def switch(self, profile: Profile, target: Target) -> None:
-        self.plan = self.plan.switched(profile, target)
+    async def switch(self, profile: Profile) -> None:
+        self.plan = replace(self.plan, profile=profile)
         if self._script.fault_in_switch:
             self._fail(self._script.fault_in_switch)
 
@@ -91,7 +95,7 @@ class PipelineDouble:
         while True:
             await asyncio.sleep(WINDOW_S)
             self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
-            self._events.measured()
+            self._events.measured(self._script.viewers_refused)
 
     def _fail(self, fault: Fault) -> None:
         if self._end():

@@ -121,6 +121,8 @@ class PreviewCounters:
     faults: int
     fallbacks: int
     """Times an encoder failed and the next one was used."""
+    viewers_refused: int
+    """Connections refused because as many viewers as configured were connected."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -84,10 +84,12 @@ class Deployment:
         return sorted(int(line) for line in lines)
 
     def program_pid(self, service: str) -> int:
-        """The program itself; the first process is tini, whose child it is."""
-        first = self.inspect(service)["State"]["Pid"]
-        children = Path(f"/proc/{first}/task/{first}/children").read_text(encoding="ascii").split()
-        return int(children[0])
+        """The program itself: a child of the first process, tini, or of the guard between the two."""
+        pid = int(self.inspect(service)["State"]["Pid"])
+        for _ in range(2 if service in {"gateway", "preview"} else 1):
+            children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+            pid = int(children[0])
+        return pid
 
     def signal_all(self, service: str, number: signal.Signals) -> None:
         """Sends a signal from outside, as the kernel would: the engine is not asked and does not know."""

@@ -1,5 +1,6 @@
 """What robots do to software: programs killed and stopped from outside, in the middle of a stream."""
 
+import os
 import signal
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timed, pytest.mar
 
 BACK_WITHIN_S = 5.0
 NOTICED_WITHIN_S = 3.0
+SILENT_WITHIN_S = 11.0
 # Far below the two seconds after which a client gives up: an answer from memory never waits for the preview.
 ANSWERED_WITHIN_S = 1.0
 
@@ -78,6 +80,16 @@ def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
         first_picture_s(viewer, again_s)
         assert not lookout.errors
         assert lookout.slowest_s < ANSWERED_WITHIN_S
+
+
+def test_a_preview_that_hangs_is_restarted(demo: Deployment) -> None:
+    """Documented: after 11 s without a heartbeat. Docker alone would leave it as it is, unhealthy."""
+    with demo.client() as robot, Lookout(robot) as lookout:
+        robot.enable_preview(PreviewProfile.LOW_BW)
+        os.kill(demo.program_pid("preview"), signal.SIGSTOP)
+        frozen_s = time.time()
+        assert restarted_s(demo, "preview", 0) - frozen_s < SILENT_WITHIN_S + BACK_WITHIN_S
+        lookout.wait_for(PreviewState.RUNNING, time.time(), BACK_WITHIN_S)
 
 
 def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:

@@ -4,12 +4,14 @@ import signal
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
 from tests.support.lossy_relay import LossyRelay
 from tests.support.running_preview import RunningPreview
+from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
@@ -19,6 +21,8 @@ MAX_OUTAGE_S = 2.0
 """The promise; where others take the machine's cores, what is measured may take several times that."""
 SLOW_MACHINE = 4.0
 EXIT_HUNG = 70
+STOP_WITHIN_S = 5.0
+"""The containers' stop_grace_period."""
 
 
 @pytest.mark.parametrize(
@@ -43,6 +47,18 @@ def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: st
         assert state.encoder.hardware
         assert state.last_error == ""
         assert state.counters == pb.Counters(starts=1)
+
+
+@pytest.mark.parametrize("enabled", [False, True])
+def test_a_signal_ends_it_also_while_an_encoder_hangs_in_its_trial(tmp_path: Path, enabled: bool) -> None:
+    settings = {"encoders": {"order": ["mpp-h265"], "probe_timeout_s": 60}}
+    with RunningPreview(tmp_path, settings, {"mpph265enc": "hang:3"}) as preview:
+        if enabled:
+            preview.enable()
+        (trial,) = wait_until(lambda: psutil.Process(preview.process.pid).children(), "the trial")
+        preview.process.terminate()
+        assert preview.process.wait(STOP_WITHIN_S) == 0
+        assert not trial.is_running()
 
 
 def test_an_element_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -74,6 +74,41 @@ def test_ten_viewers_at_once(preview: RunningPreview) -> None:
     assert state.counters.faults == 0
 
 
+@pytest.mark.parametrize("passphrase", ["", PASSPHRASE])
+def test_viewers_beyond_the_limit_are_refused_and_counted(tmp_path: Path, passphrase: str) -> None:
+    with RunningPreview(tmp_path, {"srt": {"max_viewers": 2}}) as preview:
+        preview.enable(passphrase=passphrase)
+        preview.running()
+        address = StreamAddress("127.0.0.1", preview.port, 20, passphrase)
+        with ExitStack() as leaving, Watcher(preview.port, passphrase) as watcher:
+            leaving.enter_context(Receiver(address)).next_frame(timeout_s=10)
+            watcher.wait_for_frames(5)
+            with Receiver(address) as third, pytest.raises(StreamError):
+                third.next_frame(timeout_s=8)
+            state = preview.wait_for(lambda a: a.counters.viewers_refused >= 1, "counted")
+            assert state.measurement.viewer_count == 2
+            assert "refused 1 viewers: 2 are connected" in preview.log.read_text(encoding="utf-8")
+            leaving.close()
+            viewers(preview, 1)
+            with Receiver(address) as next_one:
+                next_one.next_frame(timeout_s=10)
+                viewers(preview, 2)
+            assert watcher.reconnects == 0
+        assert preview.running().counters.faults == 0
+
+
+def test_a_wrong_passphrase_takes_no_place_for_long(tmp_path: Path) -> None:
+    with RunningPreview(tmp_path, {"srt": {"max_viewers": 1}}) as preview:
+        preview.enable(passphrase=PASSPHRASE)
+        preview.running()
+        wrong = StreamAddress("127.0.0.1", preview.port, 20, "incorrect horse battery staple")
+        with Receiver(wrong) as stranger, pytest.raises(StreamError):
+            stranger.next_frame(timeout_s=8)
+        with Watcher(preview.port, PASSPHRASE) as watcher:
+            watcher.wait_for_frames(5)
+            viewers(preview, 1)
+
+
 def test_a_viewer_that_freezes_or_dies_does_not_disturb_the_others(preview: RunningPreview) -> None:
     preview.enable()
     preview.running()

@@ -6,11 +6,15 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 
+from common.guard import EXIT_SILENT
 from tests.support.running_preview import ROOT, RunningPreview
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
@@ -93,6 +97,26 @@ def test_a_signal_ends_it_with_everything_tidy(preview: RunningPreview, number: 
     assert preview.process.wait(20) == 0
     assert not preview.socket.exists()
     assert "Traceback" not in preview.log.read_text(encoding="utf-8")
+
+
+@pytest.mark.timed
+def test_frozen_it_is_killed_by_its_guard(tmp_path: Path) -> None:
+    """Documented: within 11 s; what runs in the container."""
+    path = tmp_path / "preview.sock"
+    with subprocess.Popen(
+        [sys.executable, "-m", "common.guard", sys.executable, "-m", "preview.cli", "serve"],
+        cwd=ROOT,
+        env={**os.environ, "PREVIEW__SOCKET": str(path), "PREVIEW__SOURCE__KIND": "test"},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as guard:
+        wait_until(path.exists, "the service is up", 30)
+        (service,) = psutil.Process(guard.pid).children()
+        service.suspend()
+        frozen_s = time.monotonic()
+        assert guard.wait(30) == EXIT_SILENT
+        assert time.monotonic() - frozen_s < 11
+        assert not service.is_running()
 
 
 def test_encoders_are_listed_for_people_and_programs() -> None:

@@ -2,7 +2,6 @@
 
 import pytest
 
-from preview.config import TimeoutSettings
 from preview.pipeline.events import PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
@@ -13,4 +12,4 @@ pytestmark = pytest.mark.gst
 
 class TestRunner(PipelineContract):
     def build(self, plan: Plan, events: PipelineEvents) -> Runner:
-        return Runner(plan, TimeoutSettings(), events)
+        return Runner(plan, events)

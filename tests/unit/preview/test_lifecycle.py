@@ -110,7 +110,7 @@ def test_a_start_after_a_fault_is_a_restart_and_another_request_meanwhile_is_no_
 def test_counters() -> None:
     lifecycle = in_state(State.RUNNING)
     lifecycle.handle(Event.FAILURE)
-    lifecycle.count_fallback()
+    lifecycle.count(fallbacks=1)
     lifecycle.handle(Event.RETRY)
     lifecycle.handle(Event.FIRST_FRAME)
     lifecycle.handle(Event.DISABLE)

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,7 +12,9 @@ import pytest
 from preview import supervisor
 from preview.config import FileSource, PreviewSettings, TestSource, TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE, Encoder
-from preview.encoders.selection import Selection, Verdict
+from preview.encoders.crash_marker import CrashMarkerFile
+from preview.encoders.probe import TrialProber, Verdict
+from preview.encoders.selection import Selection
 from preview.lifecycle import Counters, State
 from preview.pipeline.events import Blame, Fault, HungError
 from preview.supervisor import ENCODER_STOP_S, GRAPH, STEADY_AFTER_S, Supervisor
@@ -26,6 +29,7 @@ SILENT = Fault(Blame.ENCODER, "encoder mpp-h265 has produced no frame for 1.0 s"
 STUCK = Fault(Blame.ENCODER, "encoder mpp-h265 hung when the profile was changed")
 SOURCE = Fault(Blame.SOURCE, "camera /dev/video0 has ended.")
 STALLED = Fault(Blame.SOURCE, "camera /dev/video0 has sent no frame for 1.5 s.")
+BLOCKED = Fault(Blame.SOURCE, "camera /dev/video0 has not started within 5 s.")
 PORT = Fault(Blame.LISTENER, "UDP port 7100 on 0.0.0.0 can't be used")
 ON = DesiredState(1, True, Profile.BALANCED)
 OFF = DesiredState(2, False)
@@ -51,25 +55,21 @@ def test_every_row_of_the_failure_table_has_a_test() -> None:
     assert set(rows[2:]) == tested
 
 
-class Prober:
-    """Knows the results of all trials; a trial takes `trial_s`."""
+def prober(trial_s: float = 0.0, **results: Verdict) -> TrialProber:
+    """Trials with these results, by default good ones; each takes `trial_s`."""
 
-    def __init__(self, trial_s: float = 0.0, **results: Verdict) -> None:
-        self.verdicts: dict[str, Verdict] = {}
-        self._trial_s = trial_s
-        self._results = {name.replace("_", "-"): result for name, result in results.items()}
+    async def attempt(encoder: Encoder) -> Verdict:
+        await asyncio.sleep(trial_s)
+        return results.get(encoder.name.replace("-", "_"), PROVEN)
 
-    async def verdict(self, encoder: Encoder) -> Verdict:
-        if encoder.name not in self.verdicts:
-            await asyncio.sleep(self._trial_s)
-        self.verdicts[encoder.name] = self._results.get(encoder.name, PROVEN)
-        return self.verdicts[encoder.name]
+    return TrialProber(attempt)
 
 
-class Marker:
+class Marker(CrashMarkerFile):
     """Keeps what the crash marker says now."""
 
-    def __init__(self) -> None:
+    def __init__(self, directory: Path) -> None:
+        super().__init__(directory)
         self.encoder = ""
         self.reason = ""
 
@@ -86,7 +86,7 @@ class Preview:
     Args:
         directory: runtime directory.
         scripts: what happens to its pipelines, in turn.
-        prober: knows which encoders work; default: all.
+        trials: by default, every encoder works.
         order: allowed encoders.
         settings: that differ from the defaults.
     """
@@ -95,15 +95,15 @@ class Preview:
         self,
         directory: Path,
         *scripts: Script,
-        prober: Prober | None = None,
+        trials: TrialProber | None = None,
         order: tuple[str, ...] = ("mpp-h265", "va-h265", "x264"),
         **settings: object,
     ) -> None:
         loop = asyncio.get_running_loop()
         values = {"source": TestSource(), "runtime_dir": directory, **settings}
         self.pipelines = PipelineDoubles(*scripts)
-        self.marker = Marker()
-        self.selection = Selection([CATALOGUE[name] for name in order], 600, prober or Prober(), loop.time)
+        self.marker = Marker(directory)
+        self.selection = Selection([CATALOGUE[name] for name in order], 600, trials or prober(), loop.time)
         made = PreviewSettings(**values)  # type: ignore[arg-type]
         self.supervisor = Supervisor(made, self.selection, self.marker, self.pipelines)
         self.stop = asyncio.Event()
@@ -124,12 +124,8 @@ class Preview:
 
     async def until(self, holds: Callable[[ActualState], bool]) -> ActualState:
         """Waits for a condition of the actual state, at most some virtual minutes."""
-        async with asyncio.timeout(300):
-            while True:
-                changed, actual = self.supervisor.changed, self.supervisor.actual()
-                if holds(actual):
-                    return actual
-                await changed.wait()
+        assert await self.supervisor.changes.wait_until(lambda: holds(self.supervisor.actual()), 300)
+        return self.supervisor.actual()
 
     async def reaches(self, state: State) -> ActualState:
         return await self.until(lambda actual: actual.state is state)
@@ -179,7 +175,7 @@ async def replaced(preview: Preview, fault: Fault) -> None:
 @row("no encoder works")
 @in_virtual_time
 async def test_without_an_encoder(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(x264=NO_OUTPUT), order=("x264",))
+    preview = Preview(tmp_path, trials=prober(x264=NO_OUTPUT), order=("x264",))
     async with preview.serving():
         preview.supervisor.apply(ON)
         state = await preview.until(lambda actual: actual.counters.faults == 2)
@@ -240,6 +236,12 @@ async def test_an_encoder_that_fails(tmp_path: Path, after_s: float) -> None:
 @in_virtual_time
 async def test_a_silent_encoder(tmp_path: Path, after_s: float) -> None:
     await replaced(Preview(tmp_path, Script(fault=SILENT, fault_after_s=after_s)), SILENT)
+
+
+@row("source's or listener's driver blocks a start")
+@in_virtual_time
+async def test_a_camera_that_blocks_the_start(tmp_path: Path) -> None:
+    await retried(Preview(tmp_path, Script(fault=BLOCKED)), BLOCKED.text)
 
 
 @row("encoder's driver blocks a start or an adjustment")
@@ -313,6 +315,24 @@ async def test_an_encoder_that_hangs_is_left_behind(tmp_path: Path) -> None:
 
 
 @row("encoder hangs after a fault")
+@pytest.mark.parametrize("disabled_after_s", [0.1, 10])
+@in_virtual_time
+async def test_an_encoder_that_hangs_is_freed_when_disabled_while_faulted(
+    tmp_path: Path, disabled_after_s: float
+) -> None:
+    """No encoder takes over here: disabling finds no pipeline, but a driver that is still occupied."""
+    scripts = [Script(fault=SILENT, encoder_hangs=True), *[Script(build_error="no camera")] * 9]
+    preview = Preview(tmp_path, *scripts, order=("mpp-h265",))
+    async with preview.serving(dies_of="encoder mpp-h265 hung when it was stopped"):
+        preview.supervisor.apply(ON)
+        await preview.reaches(State.FAULTED)
+        await asyncio.sleep(disabled_after_s)
+        assert preview.supervisor.actual().state is State.FAULTED
+        preview.supervisor.apply(OFF)
+    assert (preview.marker.encoder, preview.marker.reason) == ("mpp-h265", "it hung when it was stopped")
+
+
+@row("encoder hangs after a fault")
 @in_virtual_time
 async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Path) -> None:
     preview = Preview(tmp_path, Script(fault=SILENT, stop_s=2))
@@ -376,7 +396,7 @@ async def test_the_crash_marker_names_the_encoder_as_long_as_it_is_in_use(tmp_pa
 @row("hardware preferred, only x264 works")
 @in_virtual_time
 async def test_software_for_hardware(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(mpp_h265=NO_OUTPUT, va_h265=NO_OUTPUT))
+    preview = Preview(tmp_path, trials=prober(mpp_h265=NO_OUTPUT, va_h265=NO_OUTPUT))
     async with preview.serving():
         preview.supervisor.apply(ON)
         state = await preview.runs_with("x264")
@@ -384,6 +404,17 @@ async def test_software_for_hardware(tmp_path: Path) -> None:
             "no hardware encoder works, so the CPU encodes with x264: it produced no output"
         )
         assert state.counters == Counters(starts=1)
+
+
+@row("more viewers than srt.max_viewers")
+@in_virtual_time
+async def test_refused_viewers_are_counted_over_pipelines(tmp_path: Path) -> None:
+    refusing = Script(viewers_refused=2, fault=SOURCE, fault_after_s=0.6)
+    preview = Preview(tmp_path, refusing, replace(refusing, viewers_refused=1))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await preview.until(lambda actual: actual.counters.faults == 2)
+        assert preview.supervisor.actual().counters.viewers_refused == 3
 
 
 @row("gateway is gone")
@@ -461,20 +492,21 @@ async def test_enabled_again_while_it_stops(tmp_path: Path) -> None:
 
 @in_virtual_time
 async def test_disabled_during_the_trials_nothing_is_built(tmp_path: Path) -> None:
-    preview = Preview(tmp_path, prober=Prober(trial_s=2))
+    preview = Preview(tmp_path, trials=prober(trial_s=2))
     async with preview.serving():
         preview.supervisor.apply(ON)
         await asyncio.sleep(1)
         preview.supervisor.apply(OFF)
         await preview.reaches(State.DISABLED)
-        assert now() == pytest.approx(2)
+        assert now() == pytest.approx(1)
+        await asyncio.sleep(10)
         assert not preview.pipelines.built
 
 
 @pytest.mark.parametrize("request_", [AGAIN, OFF], ids=["on", "off"])
 @in_virtual_time
 async def test_a_request_during_the_trials_after_a_fault(tmp_path: Path, request_: DesiredState) -> None:
-    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=5), prober=Prober(trial_s=2))
+    preview = Preview(tmp_path, Script(fault=ENCODER, fault_after_s=5), trials=prober(trial_s=2))
     async with preview.serving():
         preview.supervisor.apply(ON)
         await preview.reaches(State.FAULTED)
@@ -490,8 +522,12 @@ async def test_another_profile_keeps_the_pipeline(tmp_path: Path) -> None:
     async with preview.serving():
         preview.supervisor.apply(ON)
         await preview.reaches(State.RUNNING)
-        preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
-        state = await preview.until(lambda actual: actual.profile is Profile.LOW_BW)
+        # A gateway takes the new revision as applied: the old profile must not be beside it.
+        answer = preview.supervisor.apply(DesiredState(2, True, Profile.LOW_BW))
+        assert (answer.applied_revision, answer.profile) == (2, Profile.LOW_BW)
+        state = await preview.until(
+            lambda actual: actual.stream is not None and actual.stream.target.fps == 15
+        )
         assert state.stream
         assert (state.state, state.stream.target.fps) == (State.RUNNING, 15)
         assert len(preview.pipelines.built) == 1
@@ -567,6 +603,20 @@ async def test_a_request_for_a_retry_does_not_outlive_a_disable(tmp_path: Path) 
         faulted_at = now()
         await preview.reaches(State.STARTING)
         assert now() - faulted_at == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("after_s", [0.5, 1.5])
+@in_virtual_time
+async def test_a_stop_does_not_wait_for_trials(tmp_path: Path, after_s: float) -> None:
+    """Neither for those of a start, nor for those after a fault."""
+    preview = Preview(tmp_path, Script(fault=ENCODER), trials=prober(trial_s=1, mpp_h265=PROVEN))
+    async with preview.serving():
+        preview.supervisor.apply(ON)
+        await asyncio.sleep(after_s)
+        stopped_at = now()
+    assert now() - stopped_at < 0.1
+    assert preview.supervisor.apply(AGAIN).state is State.DISABLED, "nothing is started any more"
+    assert preview.supervisor.actual().state is State.DISABLED
 
 
 @in_virtual_time

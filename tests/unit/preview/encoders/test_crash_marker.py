@@ -1,13 +1,16 @@
 """What a process learns from the marker and the crash report of the previous one."""
 
+import json
+import shutil
 import signal
+import stat
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from preview.encoders.crash_marker import CrashMarkerFile
+from preview.encoders.crash_marker import LAST_REPORT, CrashMarkerFile
 
 # A process of its own each time: the fault handler of the test's process is pytest's.
 LIVES = """
@@ -68,6 +71,39 @@ def test_a_report_counts_once(tmp_path: Path) -> None:
     life(tmp_path, ends_by=signal.SIGSEGV)
     assert life(tmp_path)
     assert life(tmp_path) == ""
+
+
+def test_a_report_is_kept_for_people_until_the_next_crash(tmp_path: Path) -> None:
+    life(tmp_path, ends_by=signal.SIGSEGV)
+    for _ in range(2):
+        life(tmp_path)
+        assert (tmp_path / LAST_REPORT).read_text(encoding="utf-8").startswith("Fatal Python error: Segm")
+    life(tmp_path, ends_by=signal.SIGABRT)
+    life(tmp_path)
+    assert (tmp_path / LAST_REPORT).read_text(encoding="utf-8").startswith("Fatal Python error: Aborted")
+
+
+def test_a_directory_of_others_is_neither_read_nor_written(tmp_path: Path) -> None:
+    """Where all users may write, another one could have made it, or a link to a directory of this user."""
+    own = tmp_path / "own"
+    CrashMarkerFile(own).set("mpp-h265", "it hung when it was stopped")
+    (tmp_path / "link").symlink_to(own)
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shutil.copy(own / "encoder-in-use.json", shared)
+    shared.chmod(0o1777)
+    for directory in (tmp_path / "link", shared):
+        before = sorted(directory.iterdir())
+        assert life(directory, "x264") == ""
+        assert sorted(directory.iterdir()) == before
+        assert json.loads((directory / "encoder-in-use.json").read_text())["encoder"] == "mpp-h265"
+
+
+def test_the_directory_is_closed_to_others(tmp_path: Path) -> None:
+    directory = tmp_path / "run"
+    directory.mkdir(mode=0o755)
+    CrashMarkerFile(directory).set("mpp-h265")
+    assert stat.S_IMODE(directory.stat().st_mode) == 0o700
 
 
 def test_a_directory_that_cannot_be_made_is_survived(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ import pytest
 
 from common.errors import UserError
 from preview.encoders.catalogue import CATALOGUE, Encoder
-from preview.encoders.selection import Selection, Verdict
+from preview.encoders.probe import TrialProber, Verdict
+from preview.encoders.selection import Selection
 
 ORDER = [CATALOGUE[name] for name in ("mpp-h265", "va-h265", "x264")]
 GOOD = Verdict(present=True, proven=True, first_byte_ms=5)
@@ -13,16 +14,13 @@ ABSENT = Verdict(present=False, proven=False, reason="there is no GStreamer elem
 ALL_GOOD = {"mpp-h265": GOOD, "va-h265": GOOD, "x264": GOOD}
 
 
-class Prober:
-    """Knows all results beforehand; counts as tried what was asked for."""
+def prober(results: dict[str, Verdict]) -> TrialProber:
+    """Trials with these results."""
 
-    def __init__(self, results: dict[str, Verdict]) -> None:
-        self._results = results
-        self.verdicts: dict[str, Verdict] = {}
+    async def attempt(encoder: Encoder) -> Verdict:
+        return results[encoder.name]
 
-    async def verdict(self, encoder: Encoder) -> Verdict:
-        self.verdicts[encoder.name] = self._results[encoder.name]
-        return self.verdicts[encoder.name]
+    return TrialProber(attempt)
 
 
 class Clock:
@@ -34,9 +32,9 @@ class Clock:
 
 def selection(verdicts: dict[str, Verdict], clock: Clock | None = None) -> Selection:
     """A selection whose trials are over."""
-    prober = Prober(verdicts)
-    prober.verdicts = verdicts
-    return Selection(ORDER, 600, prober, clock or Clock())
+    tried = prober(verdicts)
+    tried.verdicts.update(verdicts)
+    return Selection(ORDER, 600, tried, clock or Clock())
 
 
 def chosen(selection: Selection) -> tuple[str, str]:
@@ -87,10 +85,10 @@ def test_what_was_not_tried_is_not_used() -> None:
 
 
 async def test_trials_end_at_the_first_encoder_that_works_and_has_not_failed() -> None:
-    prober = Prober({"mpp-h265": BAD, "va-h265": GOOD, "x264": GOOD})
-    encoders = Selection(ORDER, 600, prober)
+    trials = prober({"mpp-h265": BAD, "va-h265": GOOD, "x264": GOOD})
+    encoders = Selection(ORDER, 600, trials)
     assert await encoders.probe()
-    assert set(prober.verdicts) == {"mpp-h265", "va-h265"}
+    assert set(trials.verdicts) == {"mpp-h265", "va-h265"}
     encoders.pass_over("va-h265", "it failed")
     assert await encoders.probe()
-    assert set(prober.verdicts) == {"mpp-h265", "va-h265", "x264"}
+    assert set(trials.verdicts) == {"mpp-h265", "va-h265", "x264"}

@@ -7,7 +7,7 @@ import pytest
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import CATALOGUE
-from preview.encoders.selection import Verdict
+from preview.encoders.probe import Verdict
 from preview.lifecycle import Counters, State
 from preview.rpc import mapping
 from preview.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
@@ -18,7 +18,7 @@ FULL = ActualState(
     state=State.RUNNING,
     profile=Profile.HIGH_QUALITY,
     last_error="something",
-    counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+    counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
     port=7100,
     latency_ms=125,
     stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
@@ -62,7 +62,7 @@ def test_every_value_arrives_at_its_place() -> None:
         state=pb.LIFECYCLE_STATE_RUNNING,
         profile=pb.PROFILE_HIGH_QUALITY,
         last_error="something",
-        counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+        counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
         listener=pb.Listener(port=7100, latency_ms=125),
         stream=pb.Stream(
             width_px=1280,

@@ -403,6 +403,7 @@ class PreviewCounters(_message.Message):
     RESTARTS_FIELD_NUMBER: _builtins.int
     FAULTS_FIELD_NUMBER: _builtins.int
     FALLBACKS_FIELD_NUMBER: _builtins.int
+    VIEWERS_REFUSED_FIELD_NUMBER: _builtins.int
     starts: _builtins.int
     """Pipelines started, for whatever reason."""
     restarts: _builtins.int
@@ -411,6 +412,10 @@ class PreviewCounters(_message.Message):
     """Times the preview became FAULTED."""
     fallbacks: _builtins.int
     """Times an encoder was passed over for the next one while the preview was enabled."""
+    viewers_refused: _builtins.int
+    """Connections of viewers that were refused because as many as configured were connected
+    (srt.max_viewers of the preview). A viewer that keeps trying counts each time.
+    """
     def __init__(
         self,
         *,
@@ -418,10 +423,11 @@ class PreviewCounters(_message.Message):
         restarts: _builtins.int = ...,
         faults: _builtins.int = ...,
         fallbacks: _builtins.int = ...,
+        viewers_refused: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["fallbacks", b"fallbacks", "faults", b"faults", "restarts", b"restarts", "starts", b"starts"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["fallbacks", b"fallbacks", "faults", b"faults", "restarts", b"restarts", "starts", b"starts", "viewers_refused", b"viewers_refused"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -166,7 +166,7 @@ class ActualState(_message.Message):
     state: Global___LifecycleState.ValueType
     """State of the lifecycle."""
     profile: Global___Profile.ValueType
-    """The profile of the pipeline, or of the newest desired state while there is none."""
+    """The profile of the newest revision applied; a running pipeline follows at once."""
     last_error: _builtins.str
     """The last error and what to do, for people. Empty for none since the preview was last enabled."""
     @_builtins.property
@@ -378,6 +378,7 @@ class Counters(_message.Message):
     RESTARTS_FIELD_NUMBER: _builtins.int
     FAULTS_FIELD_NUMBER: _builtins.int
     FALLBACKS_FIELD_NUMBER: _builtins.int
+    VIEWERS_REFUSED_FIELD_NUMBER: _builtins.int
     starts: _builtins.int
     """Pipelines started."""
     restarts: _builtins.int
@@ -386,6 +387,8 @@ class Counters(_message.Message):
     """Times the state became FAULTED."""
     fallbacks: _builtins.int
     """Times an encoder was replaced by the next one after a failure."""
+    viewers_refused: _builtins.int
+    """Connections of viewers that were refused because srt.max_viewers were connected."""
     def __init__(
         self,
         *,
@@ -393,10 +396,11 @@ class Counters(_message.Message):
         restarts: _builtins.int = ...,
         faults: _builtins.int = ...,
         fallbacks: _builtins.int = ...,
+        viewers_refused: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["fallbacks", b"fallbacks", "faults", b"faults", "restarts", b"restarts", "starts", b"starts"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["fallbacks", b"fallbacks", "faults", b"faults", "restarts", b"restarts", "starts", b"starts", "viewers_refused", b"viewers_refused"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

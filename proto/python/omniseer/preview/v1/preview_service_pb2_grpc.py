@@ -87,7 +87,7 @@ class PreviewServiceServicer:
 
     def ListEncoders(self, request, context):
         """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
-        later ones return cached results.
+        later ones return what is known by then.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

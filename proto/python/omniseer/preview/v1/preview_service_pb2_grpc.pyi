@@ -52,7 +52,7 @@ class PreviewServiceStub:
     """
     ListEncoders: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
-    later ones return cached results.
+    later ones return what is known by then.
     """
 
 @_typing.type_check_only
@@ -79,7 +79,7 @@ class PreviewServiceAsyncStub(PreviewServiceStub):
     """
     ListEncoders: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]  # type: ignore[assignment]
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
-    later ones return cached results.
+    later ones return what is known by then.
     """
 
 class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -121,7 +121,7 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_preview_service_pb2.ListEncodersResponse, _abc.Awaitable[_preview_service_pb2.ListEncodersResponse]]:
         """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
-        later ones return cached results.
+        later ones return what is known by then.
         """
 
 def add_PreviewServiceServicer_to_server(servicer: PreviewServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

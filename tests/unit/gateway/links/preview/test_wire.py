@@ -54,7 +54,7 @@ def test_a_full_report() -> None:
             worst_rtt_ms=0,
             worst_loss_percent=1.5,
         ),
-        counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+        counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
     )
     assert {field.name for field, _ in message.ListFields()} == set(pb.ActualState.DESCRIPTOR.fields_by_name)
     assert wire.from_wire(message) == PreviewReport(
@@ -67,7 +67,7 @@ def test_a_full_report() -> None:
         stream=Stream(1280, 720, 30.0, 2500, Codec.H265, True, "6 % loss"),
         encoder=Encoder(name="x264", hardware=True, wanted="mpp-h265", fallback_reason="absent"),
         measurement=Measurement(29.5, 2400.0, 2, 12, worst_rtt_ms=0.0, worst_loss_percent=1.5),
-        counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4),
+        counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
     )
 
 

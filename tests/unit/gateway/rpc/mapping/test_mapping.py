@@ -133,7 +133,7 @@ def everything() -> Snapshot:
         stream=Stream(1280, 720, 15.0, 1000, Codec.H265, True, "RTT 180 ms"),
         encoder=Encoder("x264", True, "mpp-h265", "no such element"),
         measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),
-        counters=Counters(4, 3, 2, 1),
+        counters=Counters(4, 3, 2, 1, 6),
         passphrase="a-passphrase",
     )
     board = Board(

@@ -1,0 +1,87 @@
+"""Trials: work that may crash or hang in a driver, in a child process with a deadline.
+
+`run` starts `python -m common.trial_child`, which calls the function `main` of a module.
+"""
+
+import asyncio
+import json
+import os
+import signal
+import sys
+from contextlib import suppress
+from typing import Any, Final
+
+_KILL_S: Final = 1.0
+"""For the end of a killed child; a driver may keep it in the kernel for longer."""
+_MAX_OUTPUT_BYTES: Final = 64 * 1024
+
+
+class TrialError(Exception):
+    """A trial that gave no result, or a bad one; the text says why, for people.
+
+    Attributes:
+        passing: the cause may be the state of the machine, not what was tried: another trial may succeed.
+    """
+
+    def __init__(self, reason: str, *, passing: bool = False) -> None:
+        super().__init__(reason)
+        self.passing = passing
+
+
+async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
+    """Runs `module.main(*arguments)` in a child process and returns what it reports.
+
+    Cancelling it kills the child; it does not take longer than a second more.
+
+    Args:
+        timeout_s: deadline in seconds, start of the process included.
+        module: full name.
+        arguments: of its `main`.
+
+    Raises:
+        TrialError: the child reported an error, crashed, exceeded the deadline or could not be started.
+    """
+    try:
+        child = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "common.trial_child", str(os.getpid()), module, *arguments),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            limit=_MAX_OUTPUT_BYTES,
+        )
+    except OSError as error:
+        raise TrialError(f"its trial can't be started: {error.strerror}", passing=True) from error
+    output = None
+    try:
+        with suppress(TimeoutError):
+            output, _ = await asyncio.wait_for(child.communicate(), timeout_s)
+    finally:
+        await _kill(child)
+    if output is None:
+        # One that can't even be killed keeps its driver busy: the next one would hang, too.
+        ended = child.returncode is not None
+        raise TrialError(f"it hung: no result within {timeout_s:g} s", passing=ended)
+    return _result(output, child.returncode or 0)
+
+
+async def _kill(child: asyncio.subprocess.Process) -> None:
+    """Kills a child that still runs, and waits for its end for at most _KILL_S."""
+    if child.returncode is None:
+        with suppress(ProcessLookupError):
+            child.kill()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(child.wait(), _KILL_S)
+
+
+def _result(output: bytes, code: int) -> dict[str, Any]:
+    if code < 0:
+        # SIGKILL comes from outside: from the kernel when memory is short.
+        name = signal.Signals(-code).name
+        raise TrialError(f"it crashed when tried ({name})", passing=-code == signal.SIGKILL)
+    try:
+        result = dict(json.loads(output))
+    except (ValueError, TypeError):
+        raise TrialError(f"its trial ended with code {code} and without a result") from None
+    if reason := result.get("error"):
+        raise TrialError(str(reason))
+    return result

@@ -1,0 +1,81 @@
+"""What becomes of a trial whose child fails in each way, and how long that may take."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from common import trial
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).parents[3]
+CHILD = "tests.support.trial_child"
+
+
+async def outcome(*arguments: str, timeout_s: float = 20) -> str:
+    with pytest.raises(trial.TrialError) as failure:
+        await trial.run(timeout_s, CHILD, *arguments)
+    return f"{failure.value}{'; passing' if failure.value.passing else ''}"
+
+
+async def test_a_result_comes_back() -> None:
+    assert await trial.run(20, CHILD, "report", "7") == {"error": "", "number": 7}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("error", "two\nlines"), "two lines"),
+        (("user error", "no such element"), "no such element"),
+        (("signal", str(int(signal.SIGSEGV))), "it crashed when tried (SIGSEGV)"),
+        (("signal", str(int(signal.SIGKILL))), "it crashed when tried (SIGKILL); passing"),
+        (("nonsense", "x"), "its trial ended with code 0 and without a result"),
+        (("unknown", "x"), "its trial ended with code 1 and without a result"),
+    ],
+)
+async def test_a_failure_says_why(arguments: tuple[str, ...], reason: str) -> None:
+    assert await outcome(*arguments) == reason
+
+
+async def test_a_child_that_hangs_is_killed_at_its_deadline() -> None:
+    assert await outcome("hang", "x", timeout_s=1) == "it hung: no result within 1 s; passing"
+
+
+async def test_a_process_that_can_not_be_started_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "/not/there")
+    assert await outcome("report", "7") == "its trial can't be started: No such file or directory; passing"
+
+
+async def test_a_child_that_can_not_be_killed_is_waited_for_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    pids: list[int] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(asyncio.subprocess.Process, "kill", lambda child: pids.append(child.pid))
+        started_s = time.monotonic()
+        # Nothing says that it would not hang again: no other trial.
+        assert await outcome("hang", "x", timeout_s=1) == "it hung: no result within 1 s"
+        assert time.monotonic() - started_s < 5
+        task = asyncio.create_task(trial.run(20, CHILD, "hang", "x"))
+        await asyncio.sleep(0.5)
+        started_s = time.monotonic()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert time.monotonic() - started_s < 3
+    for pid in pids:
+        os.kill(pid, signal.SIGKILL)
+    await asyncio.sleep(0.2)
+
+
+def test_a_child_does_not_outlive_its_parent() -> None:
+    code = f"import asyncio; from common import trial; asyncio.run(trial.run(60, {CHILD!r}, 'hang', 'x'))"
+    with subprocess.Popen([sys.executable, "-c", code], cwd=ROOT) as parent:
+        (child,) = wait_until(lambda: psutil.Process(parent.pid).children(), "the child")
+        parent.kill()
+        parent.wait(10)
+        wait_until(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE, "it ended")
