@@ -11,7 +11,6 @@ import argparse
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from rich.console import Console
 from bench import report
 from bench.processes import resident_mib
 from bench.rows import Row
+from bench.soak_readings import Reading, judge
 from bench.video import product
 from bench.video.camera import camera
 from bench.video.progress import tell
@@ -32,14 +32,6 @@ FEWEST_ROUNDS = 100
 LATENCY_MS = 20
 _TELL_EVERY_ROUNDS = 25
 _PROFILES = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """Of the service while the preview is off."""
-
-    resident_mib: float
-    descriptors: int
 
 
 def run(names: list[str], minutes: float = MINUTES) -> list[Row]:
@@ -79,26 +71,6 @@ def _round(robot: product.Robot, first: PreviewProfile, second: PreviewProfile) 
 
 def _read(pid: int) -> Reading:
     return Reading(resident_mib(pid), len(list(Path(f"/proc/{pid}/fd").iterdir())))
-
-
-def judge(readings: list[Reading], minutes: float) -> list[Row]:
-    """What the readings say, in the order they were taken."""
-    tenth = len(readings) // 10
-    early, late = readings[tenth : 2 * tenth], readings[-tenth:]
-    what = f"over {len(readings)} rounds in {minutes:g} min of enable, join, switch, leave, disable"
-    grown_mib = min(r.resident_mib for r in late) - min(r.resident_mib for r in early)
-    more = min(r.descriptors for r in late) - min(r.descriptors for r in early)
-    return [
-        Row(
-            "soak.rss_growth_mib",
-            f"resident memory of the preview service, {what}",
-            "MiB",
-            grown_mib,
-            None,
-            5,
-        ),
-        Row("soak.fds_growth", f"its file descriptors, {what}", "", more, None, 0),
-    ]
 
 
 def main() -> int:

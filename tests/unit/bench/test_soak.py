@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.soak import Reading, judge
+from bench.soak_readings import Reading, judge
 
 ROUNDS = 1000
 WARMING_UP = [Reading(60.0 + round_ / 2, 20) for round_ in range(100)]
