@@ -42,3 +42,18 @@ GObject: Final[Any] = _GObject
 Gio: Final[Any] = _Gio
 
 Gst.init(None)
+
+
+def stop(pipeline: Any) -> None:
+    """Sets a pipeline and every element in it to NULL.
+
+    Gst.Bin gives up at the first child that fails, which leaves those upstream of it PLAYING; freed in that
+    state, they crash the process. A child fails whose driver did not open, and that has not been stopped yet.
+    """
+    if pipeline.set_state(Gst.State.NULL) != Gst.StateChangeReturn.FAILURE:
+        return
+    # The newest child is first in the list: from the source on, so that nothing flows into what has stopped.
+    for child in reversed(pipeline.children):
+        child.set_locked_state(True)
+        child.set_state(Gst.State.NULL)
+    pipeline.set_state(Gst.State.NULL)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from common.errors import UserError
-from common.gst import GLib, Gst
+from common.gst import GLib, Gst, stop
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import CODECS, DecodingBranch, element
 from console.receiver.errors import UndecodableError, ended, from_srt
@@ -55,7 +55,7 @@ class Connection:
         """Disconnects. Afterwards nothing reaches the queue."""
         self._post(_STOP)
         self._bus_reader.join()
-        self._pipeline.set_state(Gst.State.NULL)
+        stop(self._pipeline)
         # GStreamer's objects hold our handlers and we hold them: without this no collector frees either, nor
         # the sockets they keep.
         for branch in (*self._branches.values(), *self._removed):

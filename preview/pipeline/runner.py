@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from common.gst import Gst
+from common.gst import Gst, stop
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
@@ -276,14 +276,14 @@ def _stop_element(element: Any) -> None:
 async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
     """Stops and frees a pipeline; False when that does not finish in time."""
 
-    def stop() -> None:
-        last_reference[0].set_state(Gst.State.NULL)
+    def stop_and_free() -> None:
+        stop(last_reference[0])
         # Freed here, in this thread: libsrt frees the port for good, and cleans up, when the last element is
         # freed, and both take their time.
         last_reference.clear()
 
     try:
-        await in_thread(stop, deadline_s)
+        await in_thread(stop_and_free, deadline_s)
     except TimeoutError:
         return False
     return True

@@ -45,7 +45,8 @@ def check(ground: Ground, programs: Programs, began_s: float) -> None:
         with _step("preview on", programs) as say:
             preview = _preview_on(robot)
             say(_preview_in_words(preview))
-        with _step("video", programs) as say:
+        # PyGObject does not survive an exception out of a signal handler. Each wait there is bounded.
+        with _step("video", programs) as say, programs.interruption.deferred():
             say(_video(preview))
         with _step("preview off", programs) as say:
             say(_preview_off(ground, programs, robot))

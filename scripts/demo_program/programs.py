@@ -45,7 +45,7 @@ class Programs:
 
     def __init__(self, ground: Ground, interruption: Interruption) -> None:
         self._ground = ground
-        self._interruption = interruption
+        self.interruption = interruption
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._stops = ExitStack()
 
@@ -86,7 +86,7 @@ class Programs:
 
     def check_alive(self) -> None:
         """Raises ProgramTroubleError when one has ended by itself, KeyboardInterrupt when all shall end."""
-        self._interruption.raise_if_asked()
+        self.interruption.raise_if_asked()
         for name, process in self._running.items():
             code = process.poll()
             if code is not None:

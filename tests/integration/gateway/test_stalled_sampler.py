@@ -13,6 +13,8 @@ from grpc_health.v1.health_pb2_grpc import HealthStub
 from gateway.app import running
 from gateway.assembly import ThisRobot, build
 from gateway.config import GatewaySettings
+from gateway.links.link import Connector
+from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.rpc.server import SERVICE
 from gateway.status.board import Board
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
@@ -20,14 +22,21 @@ from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.eventually import eventually
 
 
-class StalledRobot(ThisRobot):
+class StalledRobot:
     """Its sampler has begun, and hangs."""
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self.board = Board()
+        self._real = ThisRobot(settings)
 
     @contextmanager
     def feeding(self, board: Board) -> Iterator[None]:
         self.board = board
         board.ros_passed_s = time.monotonic() - 10
         yield
+
+    def preview_connector(self) -> Connector[PreviewSpec, PreviewReport]:
+        return self._real.preview_connector()
 
 
 async def test_a_sampler_that_hangs_is_a_fault_and_not_serving_until_it_goes_on(tmp_path: Path) -> None:
@@ -54,5 +63,5 @@ async def test_a_sampler_that_hangs_is_a_fault_and_not_serving_until_it_goes_on(
             return await serving()
 
         await eventually(serving, HealthCheckResponse.NOT_SERVING.__eq__, "NOT_SERVING")
-        assert await is_stalled()
+        await eventually(is_stalled, bool, "the fault")
         await eventually(serving_after_a_pass, HealthCheckResponse.SERVING.__eq__, "SERVING")

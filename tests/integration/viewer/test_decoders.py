@@ -46,6 +46,7 @@ def seen(ground: VideoGround, **faults: str) -> dict[str, Any]:
         **with_doubles(**faults),
     )
     assert done.returncode == 0, done.stderr
+    assert "GStreamer-CRITICAL" not in done.stderr
     document: dict[str, Any] = json.loads(done.stdout)
     return document
 
@@ -131,7 +132,7 @@ def test_a_trial_that_hangs_before_it_has_loaded_gstreamer_ends_with_its_parent(
 def test_a_trial_whose_parent_is_gone_already_does_not_begin() -> None:
     someone_else = str(os.getppid())
     done = subprocess.run(
-        [sys.executable, "-m", TRIAL, "avdec_h264", "h264", someone_else],
+        [sys.executable, "-m", "common.trial_child", someone_else, TRIAL, "avdec_h264", "h264"],
         cwd=ROOT,
         capture_output=True,
         timeout=60,

@@ -33,3 +33,18 @@ def test_what_the_shell_has_us_ignore_stays_ignored() -> None:
     interruption = Interruption()
     os.kill(os.getpid(), signal.SIGINT)
     interruption.raise_if_asked()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_deferred_signal_interrupts_at_the_end_of_the_block(number: signal.Signals) -> None:
+    interruption = Interruption()
+    seen = []
+
+    def work() -> None:
+        with interruption.deferred():
+            os.kill(os.getpid(), number)
+            seen.append("undisturbed")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert seen == ["undisturbed"]
