@@ -140,7 +140,7 @@ class VideoSession:
 
     @property
     def redials(self) -> int:
-        """Connections to the stream beyond the first."""
+        """How often the stream was connected to again after it was lost or fell silent."""
         return self._inputs.redials
 
     def close(self, timeout_s: float = 2.0) -> bool:

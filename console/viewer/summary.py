@@ -26,7 +26,7 @@ class ViewSummary:
         decoder: GStreamer's element that decoded it.
         first_picture_ms: from the start to the first frame.
         fps: frames per second from the first to the last.
-        redials: connections to the stream beyond the first.
+        redials: how often the stream was connected to again after it was lost or fell silent.
         recording: file, bytes and gaps of the recording; None without one.
     """
 
