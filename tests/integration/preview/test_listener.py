@@ -80,20 +80,22 @@ def test_viewers_beyond_the_limit_are_refused_and_counted(tmp_path: Path, passph
         preview.enable(passphrase=passphrase)
         preview.running()
         address = StreamAddress("127.0.0.1", preview.port, 20, passphrase)
-        with ExitStack() as leaving, Watcher(preview.port, passphrase) as watcher:
+        # One after the other: srtsink listens with a backlog of one (srt_listen), which two at once exceed.
+        with ExitStack() as leaving:
             leaving.enter_context(Receiver(address)).next_frame(timeout_s=10)
-            watcher.wait_for_frames(5)
-            with Receiver(address) as third, pytest.raises(StreamError):
-                third.next_frame(timeout_s=8)
-            state = preview.wait_for(lambda a: a.counters.viewers_refused >= 1, "counted")
-            assert state.measurement.viewer_count == 2
-            assert "refused 1 viewers: 2 are connected" in preview.log.read_text(encoding="utf-8")
-            leaving.close()
-            viewers(preview, 1)
-            with Receiver(address) as next_one:
-                next_one.next_frame(timeout_s=10)
-                viewers(preview, 2)
-            assert watcher.reconnects == 0
+            with Watcher(preview.port, passphrase) as watcher:
+                watcher.wait_for_frames(5)
+                with Receiver(address) as third, pytest.raises(StreamError):
+                    third.next_frame(timeout_s=8)
+                state = preview.wait_for(lambda a: a.counters.viewers_refused >= 1, "counted")
+                assert state.measurement.viewer_count == 2
+                assert "refused 1 viewers: 2 are connected" in preview.log.read_text(encoding="utf-8")
+                leaving.close()
+                viewers(preview, 1)
+                with Receiver(address) as next_one:
+                    next_one.next_frame(timeout_s=10)
+                    viewers(preview, 2)
+                assert watcher.reconnects == 0
         assert preview.running().counters.faults == 0
 
 
