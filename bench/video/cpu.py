@@ -1,7 +1,7 @@
 """CPU of the preview service against gst-launch-1.0 with the same encoder, told the same.
 
 Both send at once, the same frames to one viewer each, and are measured in the same window: what else the
-machine does, and how warm its caches are, is the same for both. Whoever sends fewer frames needs less, so
+machine does, and how warm its caches are, is the same for both. A sender of fewer frames needs less, so
 a window in which too many are missing on either side does not count.
 """
 

@@ -1,6 +1,10 @@
-"""The characters that a terminal does not print but obeys."""
+"""The characters that a terminal does not print but obeys, and how they get into every text of a message."""
 
+from collections.abc import Callable
 from typing import Final
+
+from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.message import Message
 
 CONTROL_CHARACTERS: Final = "".join(
     chr(point)
@@ -15,3 +19,13 @@ CONTROL_CHARACTERS: Final = "".join(
         *range(0xE0000, 0xE0080),  # invisible tags
     )
 )
+
+
+def change_texts(message: Message, change: Callable[[str], str]) -> None:
+    """Replaces every text that is set, at any depth, by what `change` makes of it."""
+    for field, value in message.ListFields():
+        if field.message_type:
+            for item in value if field.is_repeated else [value]:
+                change_texts(item, change)
+        elif field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
+            setattr(message, field.name, change(value))

@@ -1,10 +1,7 @@
 """compose.yaml as the robot runs it: the host's network and shared memory, beside the robot's own nodes."""
 
 import json
-import os
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -13,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.containers.deployment import Deployment, deployed
-from tests.support.engine import ROOT
+from tests.support.helper import helper
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
 
@@ -31,23 +28,6 @@ def on_the_robot(directory: Path) -> Iterator[Deployment]:
         yield deployment
 
 
-@contextmanager
-def one_of_the_pair(role: str, env: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "tests.support.pair", role],
-        cwd=ROOT,
-        env=env,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
 @pytest.mark.usefixtures("images")
 def test_a_killed_gateway_costs_the_robots_own_pair_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -57,8 +37,8 @@ def test_a_killed_gateway_costs_the_robots_own_pair_nothing(
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         with (
             simulated_robot(tmp_path),
-            one_of_the_pair("listen", dict(os.environ)) as listener,
-            one_of_the_pair("talk", dict(os.environ)) as talker,
+            helper("tests.support.pair", "listen") as listener,
+            helper("tests.support.pair", "talk") as talker,
         ):
             assert talker.stdout
             assert talker.stdout.readline() == "met\n"

@@ -9,13 +9,14 @@ import pytest
 
 from omniseer.gateway.v1 import event_pb2, states_pb2
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse, WatchSystemStatusResponse
-from tests.support.control_characters import CONTROL_CHARACTERS
+from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import fields_of, fill
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import robotctl, robotctl_process
 
 NEVER = set(CONTROL_CHARACTERS) - {"\n"}
 LATEST = 2**63 - 1
+HOSTILE = f"{CONTROL_CHARACTERS}\x1b]52;c;cm0gLXJm\x07"
 
 
 class HostileRobot(GatewayDouble):
@@ -26,7 +27,7 @@ class HostileRobot(GatewayDouble):
         for message in (self.status, self.overlay, self.info):
             message.Clear()
             fill(message)
-            _poison(message)
+            change_texts(message, lambda _text: HOSTILE)
         self.info.configuration_json = json.dumps({"name": CONTROL_CHARACTERS})
         self.info.wall_clock_unix_ms = LATEST
         self.status.preview.state = states_pb2.PREVIEW_RUNNING
@@ -41,19 +42,10 @@ class HostileRobot(GatewayDouble):
                 if each.containing_oneof is None and not each.message_type:
                     setattr(event, each.name, "a" if each.cpp_type == each.CPPTYPE_STRING else 2)
             fill(getattr(event, field.name))
-            _poison(event)
+            change_texts(event, lambda _text: HOSTILE)
             event.run_id, event.sequence, event.wall_clock_unix_ms = "a", number + 1, LATEST
             yield SubscribeEventsResponse(event=event)
         yield SubscribeEventsResponse(caught_up=event_pb2.EventPosition(run_id="a", sequence=99))
-
-
-def _poison(message: Any) -> None:
-    for field, value in message.ListFields():
-        if field.message_type:
-            for item in value if field.is_repeated else [value]:
-                _poison(item)
-        elif field.cpp_type == field.CPPTYPE_STRING:
-            setattr(message, field.name, f"{CONTROL_CHARACTERS}\x1b]52;c;cm0gLXJm\x07")
 
 
 @pytest.fixture

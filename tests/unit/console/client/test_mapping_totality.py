@@ -42,7 +42,7 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
 )
-from tests.support.control_characters import CONTROL_CHARACTERS
+from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import alternatives, changes, fields_of, fill_distinctly, is_alternative
 
 FILES: Final = (
@@ -421,20 +421,10 @@ def test_every_value_of_an_answer_arrives_at_its_place_and_nowhere_else(
         )
 
 
-def fill_with_control_characters(message: Message) -> None:
-    """Puts every control character into every text that is set."""
-    for field, value in message.ListFields():
-        if field.message_type:
-            for item in value if field.is_repeated else [value]:
-                fill_with_control_characters(item)
-        elif field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
-            setattr(message, field.name, f"{value}{CONTROL_CHARACTERS}")
-
-
 @pytest.mark.parametrize(("method", "members"), [pytest.param(*case, id=case_id(*case)) for case in CASES])
 def test_no_text_of_an_answer_holds_a_control_character(method: str, members: tuple[str, ...]) -> None:
     answer = filled_answer(method, members)
-    fill_with_control_characters(answer)
+    change_texts(answer, lambda text: f"{text}{CONTROL_CHARACTERS}")
     texts = {
         place: value
         for place, value in flatten(DECODERS[method](answer.SerializeToString())).items()
