@@ -1,7 +1,6 @@
 """What it costs when nobody watches: gateway and preview service, preview off, a robot publishing."""
 
 import json
-import logging
 import os
 import subprocess
 import sys
@@ -13,43 +12,48 @@ from pathlib import Path
 from unittest.mock import patch
 
 from bench.processes import CpuShare, cpu_share, resident_mib
+from bench.progress import log
 from bench.rows import Row
 from console.client import GatewayClient, Unreachable
 from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.ros import simulated_robot
 
-_log = logging.getLogger(__name__)
-
 UP_WITHIN_S = 30.0
 SETTLE_S = 5.0
 """After the start: discovery, the trials of the encoders."""
-WINDOW_S = 15.0
+ROUNDS = 5
+WINDOW_S = 8.0
 _BIN = Path(sys.executable).parent
 
 
 def run(names: list[str]) -> list[Row]:
     with tempfile.TemporaryDirectory() as directory, _product(Path(directory)) as (gateway, preview):
         time.sleep(SETTLE_S)
-        gateway_cpu, preview_cpu = _cpu_of_both(gateway.pid, preview.pid)
-        sizes = resident_mib(gateway.pid), resident_mib(preview.pid)
-    _log.warning(
-        "idle: gateway %.2f %% (of it Fast DDS %.2f %%) and %.0f MiB, preview %.2f %% and %.0f MiB",
-        gateway_cpu.whole,
-        gateway_cpu.middleware,
-        sizes[0],
-        preview_cpu.whole,
-        sizes[1],
-    )
+        cpu_percent, sizes_mib = [], []
+        for _ in range(ROUNDS):
+            gateway_cpu, preview_cpu = _cpu_of_both(gateway.pid, preview.pid)
+            sizes = resident_mib(gateway.pid), resident_mib(preview.pid)
+            cpu_percent.append(gateway_cpu.whole + preview_cpu.whole)
+            sizes_mib.append(sum(sizes))
+            log(
+                f"idle: gateway {gateway_cpu.whole:.2f} % (of it Fast DDS {gateway_cpu.middleware:.2f} %) and"
+                f" {sizes[0]:.0f} MiB, preview {preview_cpu.whole:.2f} % and {sizes[1]:.0f} MiB"
+            )
     rows = [
         Row(
-            "idle.cpu",
-            "gateway and preview service together, preview off, a robot publishing on all its topics",
-            "% of a core",
-            gateway_cpu.whole + preview_cpu.whole,
-            None,
-            8,
+            name="idle.cpu",
+            what="gateway and preview service together, preview off, a robot publishing on all its topics",
+            unit="% of a core",
+            values=cpu_percent,
+            bar=8,
         ),
-        Row("idle.rss_mib", "resident memory of both in the same state", "MiB", sum(sizes), None, 220),
+        Row(
+            name="idle.rss_mib",
+            what="resident memory of both in the same state",
+            unit="MiB",
+            values=sizes_mib,
+            bar=220,
+        ),
     ]
     return [row for row in rows if not names or row.name in names]
 

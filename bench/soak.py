@@ -18,11 +18,11 @@ from rich.console import Console
 
 from bench import report
 from bench.processes import resident_mib
+from bench.progress import log
 from bench.rows import Row
 from bench.soak_readings import Reading, judge
 from bench.video import product
 from bench.video.camera import camera
-from bench.video.progress import tell
 from bench.video.viewing import PATIENCE_S
 from console.client import PreviewProfile
 
@@ -30,7 +30,7 @@ MINUTES = 30.0
 FEWEST_ROUNDS = 100
 """A tenth of them is a window."""
 LATENCY_MS = 20
-_TELL_EVERY_ROUNDS = 25
+_LOG_EVERY_ROUNDS = 25
 _PROFILES = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 
 
@@ -53,9 +53,9 @@ def _live(robot: product.Robot, seconds: float) -> list[Reading]:
     while time.monotonic() < until_s or len(readings) < FEWEST_ROUNDS:
         _round(robot, next(profiles), next(profiles))
         readings.append(_read(robot.service.pid))
-        if len(readings) % _TELL_EVERY_ROUNDS == 0:
+        if len(readings) % _LOG_EVERY_ROUNDS == 0:
             mib, descriptors = readings[-1].resident_mib, readings[-1].descriptors
-            tell(f"soak: round {len(readings)}, {mib:.1f} MiB, {descriptors} descriptors")
+            log(f"soak: round {len(readings)}, {mib:.1f} MiB, {descriptors} descriptors")
     return readings
 
 

@@ -22,12 +22,19 @@ def judge(readings: list[Reading], minutes: float) -> list[Row]:
     more = min(r.descriptors for r in late) - min(r.descriptors for r in early)
     return [
         Row(
-            "soak.rss_growth_mib",
-            f"resident memory of the preview service, {what}",
-            "MiB",
-            grown_mib,
-            None,
-            5,
+            name="soak.rss_growth_mib",
+            what=f"resident memory of the preview service, {what}",
+            unit="MiB",
+            values=[grown_mib],
+            bar=5,
+            single=True,
         ),
-        Row("soak.fds_growth", f"its file descriptors, {what}", "", more, None, 0),
+        Row(
+            name="soak.fds_growth",
+            what=f"its file descriptors, {what}",
+            unit="",
+            values=[more],
+            bar=0,
+            single=True,
+        ),
     ]

@@ -6,7 +6,6 @@ so for both; the median round speaks.
 
 import asyncio
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -17,6 +16,7 @@ from typing import Any
 import grpc
 import uvloop
 
+from bench.progress import log
 from bench.rows import Row
 from bench.stack import running_stack
 from bench.status_server import EMPTY_METHOD
@@ -62,8 +62,8 @@ def _against_an_empty_method() -> list[Row]:
             name="status.throughput",
             what=f"GetSystemStatus against an empty method, {CLIENTS} clients",
             unit="calls/s",
-            value=statistics.median(each.calls_per_s for each in status),
-            reference=statistics.median(each.calls_per_s for each in empty),
+            values=[each.calls_per_s for each in status],
+            references=[each.calls_per_s for each in empty],
             bar=0.85,
             better="higher",
         ),
@@ -71,8 +71,8 @@ def _against_an_empty_method() -> list[Row]:
             name="status.p99",
             what=f"the same calls: 99th percentile of the time each took, {CLIENTS} clients",
             unit="ms",
-            value=statistics.median(each.p99_ms for each in status),
-            reference=statistics.median(each.p99_ms for each in empty),
+            values=[each.p99_ms for each in status],
+            references=[each.p99_ms for each in empty],
             bar=1.3,
         ),
     ]
@@ -95,8 +95,8 @@ def _guarded_against_open() -> Row:
         name="status.tls",
         what=f"GetSystemStatus with TLS and a token against the same without, {CLIENTS} clients",
         unit="calls/s",
-        value=statistics.median(each.calls_per_s for each in guarded_rounds),
-        reference=statistics.median(each.calls_per_s for each in open_rounds),
+        values=[each.calls_per_s for each in guarded_rounds],
+        references=[each.calls_per_s for each in open_rounds],
         bar=0.75,
         better="higher",
     )
@@ -148,7 +148,7 @@ async def _in_turns(reference: list[Call], ours: list[Call], what: str) -> tuple
     for number in range(ROUNDS):
         of_reference.append(await _round(reference))
         of_ours.append(await _round(ours))
-        print(f"{what}: round {number + 1} of {ROUNDS}", file=sys.stderr)
+        log(f"{what}: round {number + 1} of {ROUNDS}")
     return of_reference, of_ours
 
 

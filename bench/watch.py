@@ -18,12 +18,13 @@ from typing import Any
 import grpc
 
 from bench.processes import cpu_share
+from bench.progress import log
 from bench.rows import Row
 from bench.stack import Stack, running_stack
 from bench.watch_load import INTERVAL_MS, SERVICE
 
 WATCHERS = 100
-ROUNDS = 3
+ROUNDS = 5
 ROUND_S = 5.0
 TURNS = 6
 CALLS = 250
@@ -57,22 +58,22 @@ def _streams() -> list[Row]:
         for number in range(ROUNDS):
             watched.append(_cost(stack, WATCHERS, 0))
             constant.append(_cost(stack, 0, WATCHERS))
-            _progress(f"round {number + 1} of {ROUNDS}")
+            log(f"watch: round {number + 1} of {ROUNDS}")
     return [
         Row(
             name="watch.cpu_100",
             what=f"CPU of {WATCHERS} watchers at 10 Hz against streaming constant bytes on the same stack",
             unit="% of a core",
-            value=statistics.median(each.cpu_percent for each in watched),
-            reference=statistics.median(each.cpu_percent for each in constant),
+            values=[each.cpu_percent for each in watched],
+            references=[each.cpu_percent for each in constant],
             bar=1.5,
         ),
         Row(
             name="watch.served_100",
             what="the same watchers: intervals with an answer, of the watcher that had the fewest",
             unit="of 1",
-            value=min(each.served for each in watched),
-            reference=None,
+            values=[each.served for each in watched],
+            judged="worst",
             bar=0.97,
             better="higher",
         ),
@@ -91,26 +92,25 @@ def _cost(stack: Stack, watchers: int, constants: int) -> Cost:
 
 
 def _healthy() -> Row:
-    alone: list[float] = []
-    among: list[float] = []
+    alone, among = [], []
     with running_stack("limited") as stack:
         target = f"127.0.0.1:{stack.port}"
         with grpc.insecure_channel(target, options=(("grpc.use_local_subchannel_pool", 1),)) as channel:
             call: Any = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
             _took_ms(call)
             for number in range(TURNS):
-                alone += _took_ms(call)
+                alone.append(_p99(_took_ms(call)))
                 with _load(stack, WATCHERS, 0, *_OTHERS):
                     time.sleep(SPENT_AFTER_S)
-                    among += _took_ms(call)
-                _progress(f"healthy caller, turn {number + 1} of {TURNS}")
+                    among.append(_p99(_took_ms(call)))
+                log(f"watch: healthy caller, turn {number + 1} of {TURNS}")
     return Row(
         name="watch.p99_healthy",
         what=f"GetSystemStatus, 99th percentile, among {WATCHERS} watchers, one stalled reader and one that "
         "floods, against alone",
         unit="ms",
-        value=_p99(among),
-        reference=_p99(alone),
+        values=among,
+        references=alone,
         bar=1.3,
     )
 
@@ -155,7 +155,3 @@ def _received(load: subprocess.Popen[str]) -> list[int]:
     load.stdin.flush()
     counts: list[int] = json.loads(load.stdout.readline())
     return counts
-
-
-def _progress(words: str) -> None:
-    print(f"watch: {words}", file=sys.stderr)
