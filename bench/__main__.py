@@ -17,6 +17,7 @@ GROUPS = {
     "watch": "bench.watch",
     "events": "bench.events",
     "idle": "bench.idle",
+    "cli": "bench.cli",
     "video": "bench.video",
     "viewer": "bench.viewer",
     "monitor": "bench.monitor",

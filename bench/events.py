@@ -13,6 +13,7 @@ from typing import Any
 import grpc
 import uvloop
 
+from bench.calling import OWN_CONNECTION
 from bench.progress import log
 from bench.rows import Row
 from bench.stack import running_stack
@@ -25,7 +26,6 @@ ROUNDS = 5
 EVENTS = 100
 PAUSE_S = 0.03
 GIVE_UP_S = 20.0
-_OWN_CONNECTION = (("grpc.use_local_subchannel_pool", 1),)
 
 
 def run(names: list[str]) -> list[Row]:
@@ -85,4 +85,4 @@ async def _raise(channel: Any) -> None:
 
 
 def _channel(port: int) -> Any:
-    return grpc.aio.insecure_channel(f"127.0.0.1:{port}", options=_OWN_CONNECTION)
+    return grpc.aio.insecure_channel(f"127.0.0.1:{port}", options=OWN_CONNECTION)
