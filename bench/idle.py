@@ -1,106 +1,77 @@
-"""What it costs when nobody watches: gateway and preview service, preview off, a robot publishing."""
+"""What both programs need while the preview is off: after the start, and after it was on once."""
 
-import json
-import logging
-import os
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from unittest.mock import patch
+from typing import Final
 
-from bench.processes import CpuShare, cpu_share, resident_mib
-from bench.rows import Row
-from console.client import GatewayClient, Unreachable
-from tests.support.free import free_domain, free_tcp_port, free_udp_port
-from tests.support.ros import simulated_robot
+from bench.processes import cpu_share, resident_mib
+from bench.product import Product, product
+from bench.progress import log
+from bench.rows import FEWEST_ROUNDS, Row
+from bench.video.viewing import PATIENCE_S, watch
+from console.client import PreviewProfile
+from console.receiver.address import StreamAddress
+from tests.support.receiver import Receiver
 
-_log = logging.getLogger(__name__)
-
-UP_WITHIN_S = 30.0
-SETTLE_S = 5.0
-"""After the start: discovery, the trials of the encoders."""
-WINDOW_S = 15.0
-_BIN = Path(sys.executable).parent
+SETTLE_S: Final = 5.0
+"""After the start (discovery, trials of the encoders) and after the preview was switched off."""
+WINDOW_S: Final = 8.0
+_WATCHED_S: Final = 5.0
+_STATES: Final = {
+    "": "preview off, a robot publishing on all its topics",
+    "_after": "after the preview was on once",
+}
+"""Ends of the rows' names, and what they are about."""
+_RSS_MIB: Final = {"": 220, "_after": 240}
+"""x264 and libsrt keep buffers of the stream that ended."""
 
 
 def run(names: list[str]) -> list[Row]:
-    with tempfile.TemporaryDirectory() as directory, _product(Path(directory)) as (gateway, preview):
+    with tempfile.TemporaryDirectory() as directory, product(Path(directory)) as running:
         time.sleep(SETTLE_S)
-        gateway_cpu, preview_cpu = _cpu_of_both(gateway.pid, preview.pid)
-        sizes = resident_mib(gateway.pid), resident_mib(preview.pid)
-    _log.warning(
-        "idle: gateway %.2f %% (of it Fast DDS %.2f %%) and %.0f MiB, preview %.2f %% and %.0f MiB",
-        gateway_cpu.whole,
-        gateway_cpu.middleware,
-        sizes[0],
-        preview_cpu.whole,
-        sizes[1],
-    )
-    rows = [
-        Row(
-            "idle.cpu",
-            "gateway and preview service together, preview off, a robot publishing on all its topics",
-            "% of a core",
-            gateway_cpu.whole + preview_cpu.whole,
-            None,
-            8,
-        ),
-        Row("idle.rss_mib", "resident memory of both in the same state", "MiB", sum(sizes), None, 220),
-    ]
+        rows = _rows(running, "")
+        _preview_on_and_off(running)
+        time.sleep(SETTLE_S)
+        rows += _rows(running, "_after")
     return [row for row in rows if not names or row.name in names]
 
 
-def _cpu_of_both(gateway: int, preview: int) -> tuple[CpuShare, CpuShare]:
-    """One window after the other: reading /proc for one must not count for the other."""
-    return cpu_share(gateway, WINDOW_S), cpu_share(preview, WINDOW_S)
+def _rows(running: Product, state: str) -> list[Row]:
+    cpu_percent, sizes_mib = [], []
+    for _ in range(FEWEST_ROUNDS):
+        # One window after the other: reading /proc for one must not count for the other.
+        gateway, preview = (cpu_share(each.pid, WINDOW_S) for each in (running.gateway, running.preview))
+        sizes = resident_mib(running.gateway.pid), resident_mib(running.preview.pid)
+        cpu_percent.append(gateway.whole + preview.whole)
+        sizes_mib.append(sum(sizes))
+        log(
+            f"idle{state}: gateway {gateway.whole:.2f} % (of it Fast DDS {gateway.middleware:.2f} %) and"
+            f" {sizes[0]:.0f} MiB, preview {preview.whole:.2f} % and {sizes[1]:.0f} MiB"
+        )
+    return [
+        Row(
+            name=f"idle.cpu{state}",
+            what=f"CPU of gateway and preview service together, {_STATES[state]}",
+            unit="% of a core",
+            values=cpu_percent,
+            bar=8,
+        ),
+        Row(
+            name=f"idle.rss{state}_mib",
+            what=f"resident memory of both, {_STATES[state]}",
+            unit="MiB",
+            values=sizes_mib,
+            bar=_RSS_MIB[state],
+        ),
+    ]
 
 
-@contextmanager
-def _product(directory: Path) -> Iterator[tuple[subprocess.Popen[bytes], subprocess.Popen[bytes]]]:
-    """Both programs beside a simulated robot in a ROS domain of their own; every topic has been heard."""
-    tcp = free_tcp_port()
-    socket = str(directory / "preview.sock")
-    preview = {"socket": socket, "source": {"kind": "test"}, "srt": {"port": free_udp_port()}}
-    gateway = {"grpc": {"port": tcp}, "preview": {"socket": socket}}
-    with ExitStack() as running:
-        domain = running.enter_context(free_domain())
-        ros = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        running.enter_context(patch.dict(os.environ, ros))
-        running.enter_context(simulated_robot(directory))
-        service = running.enter_context(_program("robot-preview", directory, preview))
-        door = running.enter_context(_program("robot-gateway", directory, gateway))
-        client = running.enter_context(GatewayClient(f"127.0.0.1:{tcp}"))
-        _wait_until_heard(client)
-        yield door, service
-
-
-@contextmanager
-def _program(name: str, directory: Path, settings: object) -> Iterator[subprocess.Popen[bytes]]:
-    file = directory / f"{name}.yaml"
-    file.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
-    with (directory / f"{name}.log").open("wb") as log:
-        process = subprocess.Popen([_BIN / name, "serve", "--config", file], stderr=log)
-        try:
-            yield process
-        finally:
-            process.terminate()
-            process.wait(10)
-
-
-def _wait_until_heard(client: GatewayClient) -> None:
-    deadline_s = time.monotonic() + UP_WITHIN_S
-    while time.monotonic() < deadline_s:
-        try:
-            overlay = client.overlay()
-        except Unreachable:
-            continue
-        status = overlay.status
-        sources = (status.odometry, status.vision, overlay.detections, status.platform.power.lipo_battery)
-        if status.preview.service_reachable and all(source.available for source in sources):
-            return
-        time.sleep(0.1)
-    raise RuntimeError("not all topics of the simulated robot were heard")
+def _preview_on_and_off(running: Product) -> None:
+    endpoint = running.client.enable_preview(PreviewProfile.BALANCED).preview.endpoint
+    if endpoint is None:
+        raise RuntimeError("the preview does not run")
+    with Receiver(StreamAddress(endpoint.host, endpoint.port, endpoint.latency_ms), queue_size=4) as viewer:
+        viewer.next_frame(PATIENCE_S)
+        watch(viewer, _WATCHED_S)
+    running.client.disable_preview()

@@ -6,12 +6,15 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
+from bench.progress import log
 from bench.rows import Row
 from bench.video.camera import camera
 from bench.video.product import Robot, robot
 
-MEASURE_S = 20.0
+ROUNDS = 5
+MEASURE_S = 8.0
 FPS = 30
 _LATENCY_MS = 125
 _SIZES = {
@@ -29,7 +32,26 @@ def run(names: list[str]) -> list[Row]:
 
 
 def _row(found: Robot, name: str, what: str, width: int, height: int) -> Row:
-    print(f"monitor: {MEASURE_S:g} s {what}", file=sys.stderr)
+    delays_ms, painted_fps = [], []
+    for number in range(ROUNDS):
+        log(f"monitor: round {number + 1} of {ROUNDS}, {what}")
+        answer = _measure(found, width, height)
+        painted_fps.append(answer["frames"] / MEASURE_S)
+        delays_ms.append(statistics.quantiles(answer["delays_ms"], n=100)[98])
+    if min(painted_fps) < 0.9 * FPS:
+        raise RuntimeError(f"only {min(painted_fps):.1f} frames a second were painted: nothing was measured")
+    fps = statistics.median(painted_fps)
+    return Row(
+        name=name,
+        what=f"wait for the window's event loop, 99th percentile, {fps:.1f} fps painted, {what}",
+        unit="ms",
+        values=delays_ms,
+        bar=30.0,
+    )
+
+
+def _measure(found: Robot, width: int, height: int) -> Any:
+    """Returns the waits of the event loop and the frames painted in one round."""
     ended = subprocess.run(
         [
             sys.executable,
@@ -48,14 +70,4 @@ def _row(found: Robot, name: str, what: str, width: int, height: int) -> Row:
     answer = json.loads(ended.stdout)
     if not answer:
         raise RuntimeError("no frame was painted")
-    painted_fps = answer["frames"] / MEASURE_S
-    if painted_fps < 0.9 * FPS:
-        raise RuntimeError(f"only {painted_fps:.1f} frames a second were painted: nothing was measured")
-    return Row(
-        name=name,
-        what=f"wait for the window's event loop, 99th percentile, {painted_fps:.1f} fps painted, {what}",
-        unit="ms",
-        value=statistics.quantiles(answer["delays_ms"], n=100)[98],
-        reference=None,
-        bar=30.0,
-    )
+    return answer

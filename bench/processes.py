@@ -62,6 +62,11 @@ def cpu_share(pid: int, window_s: float) -> CpuShare:
     return CpuShare(middleware, own)
 
 
+def cpu_seconds(pid: int) -> float:
+    """Returns the CPU time that a process has needed so far, in s."""
+    return sum(spent_ns for _, spent_ns in _cpu_times_ns(pid).values()) / 1e9
+
+
 def _cpu_times_ns(pid: int) -> dict[str, tuple[str, int]]:
     """Name and CPU time so far of every thread."""
     times = {}

@@ -21,7 +21,8 @@ from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.free import free_tcp_port
 
-COUNT = 400
+ROUNDS = 5
+COUNT = 200
 TOPIC = "/odometry/filtered"
 GIVE_UP_S = 10.0
 ASK_EVERY_S = 0.002
@@ -29,16 +30,18 @@ PAUSE_S = 0.1
 """Messages leave at random moments of this span, so that they meet the sampler at any phase."""
 
 
-def latencies_ms() -> list[float]:
-    """The time from `publish` until an answer of GetSystemStatus holds the value, of COUNT messages."""
+def latencies_ms() -> list[list[float]]:
+    """Returns the time from `publish` until GetSystemStatus has the value: ROUNDS of COUNT messages."""
     dice = random.Random(1)
     with _gateway() as gateway, _publisher() as publisher:
         _wait_for_discovery(gateway, publisher)
-        found = []
-        for number in range(1, COUNT + 1):
+        rounds: list[list[float]] = []
+        for number in range(ROUNDS * COUNT):
+            if number % COUNT == 0:
+                rounds.append([])
             time.sleep(dice.uniform(0, PAUSE_S))
-            found.append(_publish_until_seen(gateway, publisher, float(number)))
-    return found
+            rounds[-1].append(_publish_until_seen(gateway, publisher, float(number + 1)))
+    return rounds
 
 
 def _publish_until_seen(gateway: Any, publisher: Any, speed: float) -> float:

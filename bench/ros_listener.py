@@ -1,7 +1,8 @@
 """Reads the talker's four topics until its standard input closes: `python -m bench.ros_listener WAY`.
 
-WAY is "sampler" (ours) or "callbacks": an ordinary rclpy node on a SingleThreadedExecutor, whose callbacks do
-what ours does with a message. At the end it prints how many values it kept.
+WAY is "sampler" (ours), "callbacks" (an ordinary rclpy node on a SingleThreadedExecutor, whose callbacks do
+what ours does with a message) or "newest" (the same node, whose callbacks only keep the message; a timer does
+the rest, as often as our sampler). At the end it prints how many values it kept.
 """
 
 import sys
@@ -22,7 +23,7 @@ from bench.ros_talker import TOPICS
 from gateway.config import SourceSettings
 from gateway.ros.lifetime import ros_node
 from gateway.ros.readers import reader_for
-from gateway.ros.sampler import Sampler
+from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
 from gateway.ros.subscription import subscribe
 from gateway.status.board import Board
@@ -45,20 +46,50 @@ def sample() -> int:
         return sum(source.counts.values for source in sources)
 
 
-def call_back() -> int:
-    context = Context()
-    context.init(args=[], initialize_logging=False)
-    node = Node("bench_callbacks", context=context, enable_rosout=False)
+def convert_each() -> int:
     board, kept = Board(), Counter[str]()
 
     def on_message(message: Any, source: SourceSettings) -> None:
-        value = reader_for(source)(message, source)
-        board[source.spec] = Received(value, time.monotonic())
+        convert(message, source, board)
         kept[source.topic] += 1
 
+    spin_node(on_message, None, kept)
+    return kept.total()
+
+
+def convert_newest() -> int:
+    board, kept = Board(), Counter[str]()
+    newest: dict[str, tuple[Any, SourceSettings]] = {}
+
+    def on_message(message: Any, source: SourceSettings) -> None:
+        newest[source.topic] = message, source
+
+    def on_timer() -> None:
+        for topic, (message, source) in newest.items():
+            convert(message, source, board)
+            kept[topic] += 1
+        newest.clear()
+
+    spin_node(on_message, on_timer, kept)
+    return kept.total()
+
+
+def convert(message: Any, source: SourceSettings, board: Board) -> None:
+    board[source.spec] = Received(reader_for(source)(message, source), time.monotonic())
+
+
+def spin_node(
+    on_message: Callable[..., None], on_timer: Callable[[], None] | None, kept: Counter[str]
+) -> None:
+    """Runs an ordinary node until standard input closes."""
+    context = Context()
+    context.init(args=[], initialize_logging=False)
+    node = Node("bench_callbacks", context=context, enable_rosout=False)
     for source in SOURCES:
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         node.create_subscription(Odometry, source.topic, partial(on_message, source=source), qos)
+    if on_timer:
+        node.create_timer(1 / SAMPLING_HZ, on_timer)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=spin, args=(executor,))
@@ -68,7 +99,6 @@ def call_back() -> int:
     thread.join()
     node.destroy_node()
     context.shutdown()
-    return kept.total()
 
 
 def spin(executor: Any) -> None:
@@ -79,7 +109,7 @@ def spin(executor: Any) -> None:
 
 
 def wait_for_the_end(everything_arrives: Callable[[], bool]) -> None:
-    """Ready is who hears all four topics: a window in which discovery still goes on would be too cheap."""
+    """Reports ready once all four topics arrive: a window in which discovery goes on would be too cheap."""
     while not everything_arrives():
         time.sleep(0.05)
     print("ready", flush=True)
@@ -87,4 +117,5 @@ def wait_for_the_end(everything_arrives: Callable[[], bool]) -> None:
 
 
 if __name__ == "__main__":
-    print({"sampler": sample, "callbacks": call_back}[sys.argv[1]](), flush=True)
+    ways = {"sampler": sample, "callbacks": convert_each, "newest": convert_newest}
+    print(ways[sys.argv[1]](), flush=True)

@@ -1,35 +1,82 @@
-"""The one language of the benchmarks: a row is a figure, its reference and the promised limit."""
+"""A row: a figure of ours, round by round, its reference in the same rounds, and the promised limit."""
 
-from dataclasses import asdict, dataclass, fields
-from typing import Any, Literal
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, Self
+
+FEWEST_ROUNDS: Final = 5
+_SIGNIFICANT_DIGITS: Final = 6
 
 
-@dataclass(frozen=True, slots=True)
+class MeasurementError(Exception):
+    """The rounds do not make a row: too few, unpaired, or a reference of 0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
     """One measured figure.
 
     Args:
         name: fixed, "ros.intake" for example; the first part is the group.
-        what: one line for a person: what was measured against what.
-        unit: of value and reference.
-        value: what our product needs.
-        reference: what the reference needed in the same run. None where the bar is on the value itself.
+        what: one line for people: what was measured, and against what.
+        unit: of values and references; empty for a count.
+        values: what our product needed, one figure per round.
+        references: what the reference needed in the same rounds. Empty where the bar is on the value itself.
         bar: the promised limit, on the ratio where there is a reference, else on the value.
         better: "lower": at most the bar keeps the promise; "higher": at least the bar does.
+        judged: "median" of the rounds, or the "worst" of them where the promise is about every one.
+        discarded: rounds that were measured and left out, because they were not comparable.
+        single: whether one long round is all there is (a soak).
+
+    Raises:
+        MeasurementError: fewer than FEWEST_ROUNDS rounds, references that do not pair with them, or a
+            reference that is not above 0, with which a ratio means nothing.
     """
 
     name: str
     what: str
     unit: str
-    value: float
-    reference: float | None
+    values: Sequence[float]
     bar: float
+    references: Sequence[float] = ()
     better: Literal["lower", "higher"] = "lower"
+    judged: Literal["median", "worst"] = "median"
+    discarded: int = 0
+    single: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.values) < (1 if self.single else FEWEST_ROUNDS):
+            raise MeasurementError(f"{self.name}: {len(self.values)} rounds are too few")
+        if self.references and len(self.references) != len(self.values):
+            raise MeasurementError(f"{self.name}: every round needs its reference")
+        if any(reference <= 0 for reference in self.references):
+            raise MeasurementError(f"{self.name}: a reference of 0 makes no ratio")
+
+    @property
+    def value(self) -> float:
+        """Median or worst round of ours."""
+        if self.judged == "median":
+            return statistics.median(self.values)
+        return max(self.values) if self.better == "lower" else min(self.values)
+
+    @property
+    def reference(self) -> float | None:
+        """Median round of the reference."""
+        return statistics.median(self.references) if self.references else None
 
     @property
     def ratio(self) -> float | None:
         """Value by reference."""
-        return self.value / self.reference if self.reference else None
+        return None if self.reference is None else self.value / self.reference
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """Lowest and highest round of the figure that is judged: of the ratio where there is a reference."""
+        if not self.references:
+            return min(self.values), max(self.values)
+        ratios = [value / reference for value, reference in zip(self.values, self.references, strict=True)]
+        return min(ratios), max(ratios)
 
     @property
     def ok(self) -> bool:
@@ -38,10 +85,27 @@ class Row:
         return figure <= self.bar if self.better == "lower" else figure >= self.bar
 
     @classmethod
-    def from_json(cls, data: dict[str, Any]) -> "Row":
-        """The row that the JSON file of another run holds."""
-        return cls(**{field.name: data[field.name] for field in fields(cls)})
+    def from_json(cls, data: dict[str, Any]) -> Self:
+        """Returns the row that `as_json` wrote; what follows from the rounds is computed again.
+
+        Raises:
+            KeyError: a field is missing.
+            MeasurementError: as the constructor.
+        """
+        return cls(**{name: data[name] for name in cls.__slots__})
 
     def as_json(self) -> dict[str, Any]:
-        """The row as the JSON file holds it."""
-        return asdict(self) | {"ratio": self.ratio, "ok": self.ok}
+        """Returns the row for a JSON file, with what follows from the rounds for other readers."""
+        written = {name: getattr(self, name) for name in self.__slots__}
+        written["values"] = [_rounded(value) for value in self.values]
+        written["references"] = [_rounded(value) for value in self.references]
+        derived = {"value": self.value, "reference": self.reference, "ratio": self.ratio}
+        return (
+            written
+            | {name: None if figure is None else _rounded(figure) for name, figure in derived.items()}
+            | {"spread": [_rounded(figure) for figure in self.spread], "ok": self.ok}
+        )
+
+
+def _rounded(figure: float) -> float:
+    return float(f"{figure:.{_SIGNIFICANT_DIGITS}g}")

@@ -1,65 +1,77 @@
-"""Half an hour of enable, join, switch, leave, disable: what the preview service keeps of it.
+"""Half an hour of the preview service, and half an hour of the gateway: what they keep of what has ended.
 
-Not part of a run without names: `scripts/bench soak`; `python -m bench.soak --minutes 8` is a shorter one.
-Memory and descriptors are read while the preview is off. libsrt keeps closed sockets and their buffers for
-some seconds, and several rounds pass in each of these: so what is kept first grows to a level that depends on
-the pace, and moves about it. The second tenth of the rounds is compared with the last one, the lowest figure
-of each: a leak raises that one, too.
+Not part of a run without names: `scripts/bench soak`. A round of the preview service is enable, join, switch,
+leave and disable. libsrt keeps closed sockets and their buffers for some seconds, and several rounds pass in
+each of these. A round of the gateway is operators who come, read, watch, subscribe and go.
 """
 
-import argparse
-import sys
 import tempfile
 import time
+from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
+from typing import Final
 
-from rich.console import Console
-
-from bench import report
-from bench.processes import resident_mib
+from bench.product import product
+from bench.progress import log
 from bench.rows import Row
-from bench.soak_readings import Reading, judge
-from bench.video import product
+from bench.soak_readings import FEWEST_ROUNDS, Reading, judge
+from bench.video import product as sender
 from bench.video.camera import camera
-from bench.video.progress import tell
 from bench.video.viewing import PATIENCE_S
-from console.client import PreviewProfile
+from console.client import GatewayClient, PreviewProfile
 
-MINUTES = 30.0
-FEWEST_ROUNDS = 100
-"""A tenth of them is a window."""
-LATENCY_MS = 20
-_TELL_EVERY_ROUNDS = 25
-_PROFILES = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
+MINUTES: Final = 30.0
+LATENCY_MS: Final = 20
+OPERATORS: Final = 5
+_LOG_EVERY_ROUNDS: Final = 25
+_PROFILES: Final = (PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY)
 
 
 def run(names: list[str], minutes: float = MINUTES) -> list[Row]:
-    with (
-        tempfile.TemporaryDirectory() as workdir,
-        camera(Path(workdir)) as source,
-        product.robot(Path(workdir), source, LATENCY_MS) as robot,
-    ):
-        readings = _live(robot, minutes * 60)
-    rows = judge(readings, minutes)
+    rows: list[Row] = []
+    if not names or {"soak.rss_growth_mib", "soak.fds_growth"} & set(names):
+        rows += _preview(minutes)
+    if not names or {"soak.gateway_rss_growth_mib", "soak.gateway_fds_growth"} & set(names):
+        rows += _gateway(minutes)
     return [row for row in rows if not names or row.name in names]
 
 
-def _live(robot: product.Robot, seconds: float) -> list[Reading]:
-    """Rounds until the time is over; at least as many as a judgement needs."""
-    until_s = time.monotonic() + seconds
-    readings: list[Reading] = []
+def _preview(minutes: float) -> list[Row]:
     profiles = cycle(_PROFILES)
+    with (
+        tempfile.TemporaryDirectory() as workdir,
+        camera(Path(workdir)) as source,
+        sender.robot(Path(workdir), source, LATENCY_MS) as robot,
+    ):
+        readings = _readings(
+            lambda: _watch_video(robot, next(profiles), next(profiles)), robot.service.pid, minutes
+        )
+    rounds = f"enable, join, switch, leave and disable in {minutes:g} min"
+    return judge(readings, "soak.", "the preview service", rounds)
+
+
+def _gateway(minutes: float) -> list[Row]:
+    with tempfile.TemporaryDirectory() as workdir, product(Path(workdir)) as running:
+        readings = _readings(lambda: _come_and_go(running.target), running.gateway.pid, minutes)
+    rounds = f"{OPERATORS} operators who come, read, watch, subscribe and go in {minutes:g} min"
+    return judge(readings, "soak.gateway_", "the gateway", rounds)
+
+
+def _readings(once: Callable[[], None], pid: int, minutes: float) -> list[Reading]:
+    """Runs rounds until the time is over, at least as many as a judgement needs; reads after each."""
+    until_s = time.monotonic() + minutes * 60
+    readings: list[Reading] = []
     while time.monotonic() < until_s or len(readings) < FEWEST_ROUNDS:
-        _round(robot, next(profiles), next(profiles))
-        readings.append(_read(robot.service.pid))
-        if len(readings) % _TELL_EVERY_ROUNDS == 0:
+        once()
+        readings.append(Reading.of(pid))
+        if len(readings) % _LOG_EVERY_ROUNDS == 0:
             mib, descriptors = readings[-1].resident_mib, readings[-1].descriptors
-            tell(f"soak: round {len(readings)}, {mib:.1f} MiB, {descriptors} descriptors")
+            log(f"soak: round {len(readings)}, {mib:.1f} MiB, {descriptors} descriptors")
     return readings
 
 
-def _round(robot: product.Robot, first: PreviewProfile, second: PreviewProfile) -> None:
+def _watch_video(robot: sender.Robot, first: PreviewProfile, second: PreviewProfile) -> None:
     """One viewer stays from the beginning to the end, another one comes and goes after a switch."""
     with robot.preview(first), robot.viewer() as staying:
         staying.next_frame(PATIENCE_S)
@@ -69,18 +81,11 @@ def _round(robot: product.Robot, first: PreviewProfile, second: PreviewProfile) 
         staying.next_frame(PATIENCE_S)
 
 
-def _read(pid: int) -> Reading:
-    return Reading(resident_mib(pid), len(list(Path(f"/proc/{pid}/fd").iterdir())))
-
-
-def main() -> int:
-    """Ends 0 when nothing grew, 1 when something did."""
-    parser = argparse.ArgumentParser(prog="python -m bench.soak", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=MINUTES)
-    rows = run([], parser.parse_args().minutes)
-    Console(width=200).print(report.table(rows))
-    return 0 if all(row.ok for row in rows) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def _come_and_go(target: str) -> None:
+    """Each operator has a connection, and leaves two streams in the middle."""
+    for _ in range(OPERATORS):
+        with GatewayClient(target) as client:
+            client.status()
+            client.overlay()
+            next(client.watch_status(0.1))
+            next(client.events())

@@ -17,10 +17,10 @@ from PySide6.QtCore import QEventLoop, QPoint, QRect, QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QWidget
 
+from bench.progress import log
 from bench.rows import Row
 from bench.video import product, stamp
 from bench.video.camera import HEIGHT_PX, WIDTH_PX, camera
-from bench.video.progress import tell
 from bench.video.viewing import watch
 from console.viewer.session import VideoSession
 from console.window.video_view import VideoView
@@ -35,14 +35,13 @@ FPS = 30
 
 def run(_names: list[str]) -> list[Row]:
     with tempfile.TemporaryDirectory() as directory:
-        extra = statistics.median(extra_latency_ms(Path(directory), ROUNDS))
+        extra_ms = list(extra_latency_ms(Path(directory), ROUNDS))
     return [
         Row(
             name=NAME,
             what=f"capture to painted in the window, less capture to decoded by the receiver (720p{FPS})",
             unit="frames",
-            value=extra * FPS / 1000,
-            reference=None,
+            values=[each * FPS / 1000 for each in extra_ms],
             bar=1.5,
         )
     ]
@@ -56,7 +55,7 @@ def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]
                 watch(receiver, SETTLE_S)
                 bare = statistics.median(one.latency_ms for one in watch(receiver, WATCH_S))
             painted = statistics.median(_painted_ms(robot))
-            tell(f"decoded after {bare:.1f} ms, painted after {painted:.1f} ms")
+            log(f"decoded after {bare:.1f} ms, painted after {painted:.1f} ms")
             yield painted - bare
 
 

@@ -1,8 +1,9 @@
 """100 watchers of the status at 10 Hz: what they cost, whether all are served, and whom they disturb.
 
-The reference of the cost is the same server streaming constant bytes of the same size, as often. What the
-others cost a caller who asks for one status after the other is measured against the same caller alone. Both
-in turns; the others run at low priority, because on a robot they would run on other machines.
+The reference of the cost is the same server streaming constant bytes, as many as a status has, as often; both
+are counted per answer that arrived. What the others cost a caller who asks for one status after the other is
+measured against the same caller alone. Both in turns; callers and gateway share the cores of one machine,
+with equal priority.
 """
 
 import json
@@ -17,13 +18,15 @@ from typing import Any
 
 import grpc
 
-from bench.processes import cpu_share
+from bench.calling import OWN_CONNECTION
+from bench.processes import cpu_seconds
+from bench.progress import log
 from bench.rows import Row
 from bench.stack import Stack, running_stack
 from bench.watch_load import INTERVAL_MS, SERVICE
 
 WATCHERS = 100
-ROUNDS = 3
+ROUNDS = 5
 ROUND_S = 5.0
 TURNS = 6
 CALLS = 250
@@ -37,7 +40,8 @@ _OTHERS = ("stall", "flood")
 class Cost:
     """Of one round of streams."""
 
-    cpu_percent: float
+    cpu_us: float
+    """CPU time of the server for each answer that arrived."""
     served: float
     """Of the intervals of the round, how many the stream with the fewest answers got, as a share."""
 
@@ -57,22 +61,23 @@ def _streams() -> list[Row]:
         for number in range(ROUNDS):
             watched.append(_cost(stack, WATCHERS, 0))
             constant.append(_cost(stack, 0, WATCHERS))
-            _progress(f"round {number + 1} of {ROUNDS}")
+            log(f"watch: served {watched[-1].served:.3f}, constant bytes {constant[-1].served:.3f}")
+            log(f"watch: round {number + 1} of {ROUNDS}")
     return [
         Row(
             name="watch.cpu_100",
-            what=f"CPU of {WATCHERS} watchers at 10 Hz against streaming constant bytes on the same stack",
-            unit="% of a core",
-            value=statistics.median(each.cpu_percent for each in watched),
-            reference=statistics.median(each.cpu_percent for each in constant),
+            what=f"{WATCHERS} watchers at 10 Hz: CPU of an answer, against streaming as many constant bytes",
+            unit="us",
+            values=[each.cpu_us for each in watched],
+            references=[each.cpu_us for each in constant],
             bar=1.5,
         ),
         Row(
             name="watch.served_100",
             what="the same watchers: intervals with an answer, of the watcher that had the fewest",
             unit="of 1",
-            value=min(each.served for each in watched),
-            reference=None,
+            values=[each.served for each in watched],
+            judged="worst",
             bar=0.97,
             better="higher",
         ),
@@ -82,35 +87,34 @@ def _streams() -> list[Row]:
 def _cost(stack: Stack, watchers: int, constants: int) -> Cost:
     with _load(stack, watchers, constants) as load:
         time.sleep(0.5)
-        before, began_s = _received(load), time.monotonic()
-        cpu_percent = cpu_share(stack.pid, ROUND_S).whole
-        after, passed_s = _received(load), time.monotonic() - began_s
+        before, began_s, cpu_s = _received(load), time.monotonic(), cpu_seconds(stack.pid)
+        time.sleep(ROUND_S)
+        after, passed_s, spent_s = _received(load), time.monotonic() - began_s, cpu_seconds(stack.pid) - cpu_s
     intervals = passed_s * 1000 / INTERVAL_MS
-    fewest = min(late - early for early, late in zip(before, after, strict=True))
-    return Cost(cpu_percent, fewest / intervals)
+    answers = [late - early for early, late in zip(before, after, strict=True)]
+    return Cost(spent_s / sum(answers) * 1e6, min(answers) / intervals)
 
 
 def _healthy() -> Row:
-    alone: list[float] = []
-    among: list[float] = []
+    alone, among = [], []
     with running_stack("limited") as stack:
         target = f"127.0.0.1:{stack.port}"
-        with grpc.insecure_channel(target, options=(("grpc.use_local_subchannel_pool", 1),)) as channel:
+        with grpc.insecure_channel(target, options=OWN_CONNECTION) as channel:
             call: Any = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
             _took_ms(call)
             for number in range(TURNS):
-                alone += _took_ms(call)
+                alone.append(_p99(_took_ms(call)))
                 with _load(stack, WATCHERS, 0, *_OTHERS):
                     time.sleep(SPENT_AFTER_S)
-                    among += _took_ms(call)
-                _progress(f"healthy caller, turn {number + 1} of {TURNS}")
+                    among.append(_p99(_took_ms(call)))
+                log(f"watch: healthy caller, turn {number + 1} of {TURNS}")
     return Row(
         name="watch.p99_healthy",
         what=f"GetSystemStatus, 99th percentile, among {WATCHERS} watchers, one stalled reader and one that "
         "floods, against alone",
         unit="ms",
-        value=_p99(among),
-        reference=_p99(alone),
+        values=among,
+        references=alone,
         bar=1.3,
     )
 
@@ -133,7 +137,7 @@ def _p99(values: list[float]) -> float:
 def _load(stack: Stack, watchers: int, constants: int, *others: str) -> Iterator[subprocess.Popen[str]]:
     words = [str(stack.port), str(watchers), str(constants), *others]
     with subprocess.Popen(
-        ["nice", "-n", "15", sys.executable, "-m", "bench.watch_load", *words],
+        [sys.executable, "-m", "bench.watch_load", *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -155,7 +159,3 @@ def _received(load: subprocess.Popen[str]) -> list[int]:
     load.stdin.flush()
     counts: list[int] = json.loads(load.stdout.readline())
     return counts
-
-
-def _progress(words: str) -> None:
-    print(f"watch: {words}", file=sys.stderr)

@@ -16,16 +16,14 @@ from typing import Any
 import grpc
 import uvloop
 
+from bench.calling import OWN_CONNECTION
 from bench.status_server import CONSTANT_METHOD
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusRequest
 
 SERVICE = "/omniseer.gateway.v1.RobotGateway"
 INTERVAL_MS = 100
-CONSTANT_BYTES = 1600
-"""About what a whole status has."""
 _FLOOD_CALLS = 200
 """Open at once, by one connection."""
-_OWN_CONNECTION = (("grpc.use_local_subchannel_pool", 1),)
 
 
 class Load:
@@ -67,7 +65,7 @@ class Load:
         self._tasks.append(asyncio.create_task(work))
 
     def _channel(self) -> Any:
-        return grpc.aio.insecure_channel(f"127.0.0.1:{self._port}", options=_OWN_CONNECTION)
+        return grpc.aio.insecure_channel(f"127.0.0.1:{self._port}", options=OWN_CONNECTION)
 
     async def _read(self, number: int, method: str, request: bytes) -> None:
         async with self._channel() as channel:
@@ -94,7 +92,8 @@ async def main(port: int, watchers: int, constants: int, others: list[str]) -> N
     load = Load(port)
     request = WatchSystemStatusRequest(min_interval_ms=INTERVAL_MS).SerializeToString()
     load.streams(f"{SERVICE}/WatchSystemStatus", request, watchers)
-    load.streams(CONSTANT_METHOD, bytes(CONSTANT_BYTES), constants)
+    if constants:
+        load.streams(CONSTANT_METHOD, bytes(await _answer_bytes(port, request)), constants)
     await load.all_began()
     if "stall" in others:
         load.stall()
@@ -104,6 +103,13 @@ async def main(port: int, watchers: int, constants: int, others: list[str]) -> N
     while await asyncio.to_thread(sys.stdin.readline):
         print(json.dumps(load.received), flush=True)
     load.end()
+
+
+async def _answer_bytes(port: int, request: bytes) -> int:
+    """Returns the size of a watcher's answer."""
+    async with grpc.aio.insecure_channel(f"127.0.0.1:{port}", options=OWN_CONNECTION) as channel:
+        watch: Any = channel.unary_stream(f"{SERVICE}/WatchSystemStatus")
+        return len(await watch(request).read())
 
 
 if __name__ == "__main__":

@@ -1,20 +1,19 @@
-"""CPU of the preview service against gst-launch-1.0 with the same encoder, told the same.
+"""CPU of the preview service against gst-launch-1.0 with the same encoder and the same settings.
 
 Both send at once, the same frames to one viewer each, and are measured in the same window: what else the
 machine does, and how warm its caches are, is the same for both. A sender of fewer frames needs less, so
 a window in which too many are missing on either side does not count.
 """
 
-import statistics
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench.processes import cpu_share
+from bench.progress import log
 from bench.rows import Row
 from bench.video import product, reference
 from bench.video.camera import Camera, camera
-from bench.video.progress import tell
 from bench.video.viewing import Viewer, watch
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.properties import vbv_ms
@@ -42,8 +41,11 @@ class _Round:
 def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         rounds: list[_Round] = []
+        discarded = 0
         for _ in range(TRIES):
-            if (found := _round(source, robot)) is not None:
+            if (found := _round(source, robot)) is None:
+                discarded += 1
+            else:
                 rounds.append(found)
             if len(rounds) == ROUNDS:
                 break
@@ -54,8 +56,9 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
             name="video.cpu",
             what="CPU of the preview service against gst-launch-1.0 with the same encoder settings",
             unit="% of a core",
-            value=statistics.median(each.ours for each in rounds),
-            reference=statistics.median(each.theirs for each in rounds),
+            values=[each.ours for each in rounds],
+            references=[each.theirs for each in rounds],
+            discarded=discarded,
             bar=1.10,
         )
     ]
@@ -76,11 +79,11 @@ def _round(source: Camera, robot: product.Robot) -> _Round | None:
         shares = [measuring.submit(cpu_share, pid, WINDOW_S) for pid in (process.pid, robot.service.pid)]
         frames = list(measuring.map(lambda viewer: len(watch(viewer, WINDOW_S)), viewers))
         found = _Round(*(share.result().whole for share in shares))
-    told = f"gst-launch-1.0 {found.theirs:.1f} %, ours {found.ours:.1f} % of a core"
+    line = f"gst-launch-1.0 {found.theirs:.1f} %, ours {found.ours:.1f} % of a core"
     if min(frames) < LEAST_FRAMES:
-        tell(f"CPU with a viewer: {told}, but {min(frames)} frames in {WINDOW_S:g} s are too few")
+        log(f"CPU with a viewer: {line}, but {min(frames)} frames in {WINDOW_S:g} s are too few")
         return None
-    tell(f"CPU with a viewer: {told}")
+    log(f"CPU with a viewer: {line}")
     return found
 
 

@@ -1,13 +1,12 @@
 """An operator switches the preview on and watches: how long until the first frame."""
 
-import statistics
 import time
 from pathlib import Path
 
+from bench.progress import log
 from bench.rows import Row
 from bench.video import product
 from bench.video.camera import camera
-from bench.video.progress import tell
 from bench.video.viewing import PATIENCE_S, capture_time
 
 ROUNDS = 7
@@ -22,8 +21,7 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
             name="video.enable_to_frame_ms",
             what=f"SetPreviewMode sent, to the first decoded frame (SRT {LATENCY_MS} ms)",
             unit="ms",
-            value=statistics.median(times_ms),
-            reference=None,
+            values=times_ms,
             bar=450,
         )
     ]
@@ -42,6 +40,6 @@ def _once(robot: product.Robot) -> float:
         ("first frame captured", captured_s),
         ("decoded", frame.arrival_s),
     ]
-    told = "; ".join(f"{at_s - sent_s:.3f} s {what}" for what, at_s in steps if at_s is not None)
-    tell(f"enable: {told}")
+    line = "; ".join(f"{at_s - sent_s:.3f} s {what}" for what, at_s in steps if at_s is not None)
+    log(f"enable: {line}")
     return (frame.arrival_s - sent_s) * 1000

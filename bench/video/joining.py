@@ -11,14 +11,14 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+from bench.progress import log
 from bench.rows import Row
 from bench.video import product, reference
 from bench.video.camera import camera
-from bench.video.progress import tell
 from bench.video.viewing import Connect, first_frame_ms, watch
 from tests.support.free import free_udp_port
 
-ROUNDS = 3
+ROUNDS = 5
 JOINS = 8
 LATENCY_MS = 125
 SETTLE_S = 1.0
@@ -36,15 +36,16 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
             return reference.PlainViewer(port, LATENCY_MS)
 
         for _ in range(ROUNDS):
-            theirs += _joins(reference.sender(source, port, LATENCY_MS), reference_viewer, "reference")
-            ours += _joins(robot.preview(), robot.viewer, "ours")
+            sending = reference.sender(source, port, LATENCY_MS)
+            theirs.append(statistics.median(_joins(sending, reference_viewer, "reference")))
+            ours.append(statistics.median(_joins(robot.preview(), robot.viewer, "ours")))
     return [
         Row(
             name="video.first_frame",
             what=f"viewer connects to a running stream, to its first frame (SRT {LATENCY_MS} ms)",
             unit="ms",
-            value=statistics.median(ours),
-            reference=statistics.median(theirs),
+            values=ours,
+            references=theirs,
             bar=0.30,
         )
     ]
@@ -60,5 +61,5 @@ def _joins(sending: AbstractContextManager[Any], connect: Connect, name: str) ->
         for number in range(JOINS):
             time.sleep(max(0.0, begin_s + number * APART_S - time.monotonic()))
             waits.append(first_frame_ms(connect))
-    tell(f"{name}: first frames after {', '.join(f'{one:.0f}' for one in waits)} ms")
+    log(f"{name}: first frames after {', '.join(f'{one:.0f}' for one in waits)} ms")
     return waits

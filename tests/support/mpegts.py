@@ -76,6 +76,21 @@ def analyse(data: bytes) -> Stream:
     return _Analysis().run(data)
 
 
+CLOCK_LIMIT_MS = 40.0
+"""Between clock references, as docs/preview.md promises; ISO/IEC 13818-1 2.7.2 permits 100 ms."""
+TABLE_LIMIT_MS = 100.0
+"""Between PATs and between PMTs, as docs/preview.md promises."""
+
+
+def share_of_the_limits(stream: Stream) -> float:
+    """The longest distance of clock references and tables, as a share of its limit; at most 1 is right."""
+    return max(
+        stream.longest_without_pcr_ms / CLOCK_LIMIT_MS,
+        stream.longest_without_pat_ms / TABLE_LIMIT_MS,
+        stream.longest_without_pmt_ms / TABLE_LIMIT_MS,
+    )
+
+
 def share_beyond(times_ms: list[float], limit_ms: float) -> float:
     """The share of distances that are longer, 0 to 1; 1 where there is nothing to measure."""
     distances = [later - earlier for earlier, later in pairwise(times_ms)]

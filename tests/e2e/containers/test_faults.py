@@ -53,7 +53,7 @@ def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> 
         assert "preview service unreachable" in told.status.preview.last_error
         assert not told.status.preview.service_reachable
         back_s = restarted_s(demo, "preview", 0)
-        assert first_picture_s(viewer, back_s) - back_s < BACK_WITHIN_S
+        assert first_picture_s(viewer, back_s) - killed_s < BACK_WITHIN_S
         lookout.wait_for(PreviewState.RUNNING, back_s, BACK_WITHIN_S)
 
         assert not lookout.errors, "the gateway answered throughout"

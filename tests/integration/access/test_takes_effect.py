@@ -28,6 +28,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.eventually import eventually
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot
+from tests.support.promise import keeps_async
 
 
 def stub(robot: Robot, login: Login = NOTHING) -> Any:
@@ -145,6 +146,29 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
         robot.admin.revoke(credential.credential_id)
         await until(lambda: reported("client_left"), True)
         unread.cancel()
+
+
+@pytest.mark.timed
+async def test_a_change_of_the_credentials_is_in_force_within_a_second(tmp_path: Path) -> None:
+    async with guarded_gateway(new_robot(tmp_path)) as robot:
+        calls = stub(robot)
+
+        async def slowest_s() -> float:
+            return max([await added_and_revoked_s(robot, calls) for _ in range(5)])
+
+        await keeps_async(1.0, "s until a change is in force", slowest_s)
+
+
+async def added_and_revoked_s(robot: Robot, calls: Any) -> float:
+    """The longer of both."""
+    credential, login = robot.add(Role.VIEWER)
+    began_s = time.monotonic()
+    await until(lambda: ping(calls, login), "")
+    added_s = time.monotonic() - began_s
+    robot.admin.revoke(credential.credential_id)
+    began_s = time.monotonic()
+    await until(lambda: ping(calls, login), Reason.CREDENTIAL_REVOKED)
+    return max(added_s, time.monotonic() - began_s)
 
 
 @pytest.mark.timed

@@ -20,11 +20,11 @@ from omniseer.gateway.v1 import fault_pb2, preview_pb2, system_status_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
 from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
+from tests.support.promise import keeps
 from tests.support.qt import keep_screenshot, let_pass, press, until
 
 LOW, BALANCED, HIGH = PreviewProfile.LOW_BW, PreviewProfile.BALANCED, PreviewProfile.HIGH_QUALITY
-CLOSES_WITHIN_S = 6.0
-"""Promised are 2 s; the machine has other things to do. A call that is waited for takes 8 s."""
+CLOSES_WITHIN_S = 2.0
 
 
 @dataclass
@@ -195,7 +195,12 @@ def test_a_gateway_that_hangs_is_reported_and_the_window_lives_on(desk_work: Des
     assert not desk_work.window.banner.isVisible()
 
 
+@pytest.mark.timed
 def test_closing_ends_everything_although_the_gateway_hangs() -> None:
+    keeps(CLOSES_WITHIN_S, "s from closing to the end", closed_during_a_call_s)
+
+
+def closed_during_a_call_s() -> float:
     gateway = StreamingGatewayDouble()
     with serving(gateway) as port:
         with monitor(f"127.0.0.1:{port}") as window:
@@ -205,8 +210,9 @@ def test_closing_ends_everything_although_the_gateway_hangs() -> None:
             until(lambda: not window.preview.switch.isEnabled(), "a request is on its way")
             window.close()
             closed_s = time.monotonic()
-        assert time.monotonic() - closed_s < CLOSES_WITHIN_S
+        took_s = time.monotonic() - closed_s
         gateway.hold.set()
+    return took_s
 
 
 @pytest.mark.parametrize("state", [states.PREVIEW_DISABLED, states.PREVIEW_FAULTED])

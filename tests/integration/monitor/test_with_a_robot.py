@@ -7,6 +7,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -18,15 +19,14 @@ from bench.loop_delay import LoopDelay
 from console.window.lines import ComponentLine, FaultWidget
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
+from tests.support.promise import keeps
 from tests.support.qt import keep_screenshot, let_pass, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
 
-LOOP_DELAY_P99_MS = 500.0
-"""Generous: the machine has other things to do. bench/monitor.py measures what is promised."""
-CLOSES_WITHIN_S = 6.0
-"""Promised are 2 s; the machine has other things to do. A call that is waited for takes 8 s."""
+LOOP_DELAY_P99_MS = 30.0
+CLOSES_WITHIN_S = 2.0
 
 
 @dataclass
@@ -175,24 +175,31 @@ def boxes_are_drawn(watch: Watch) -> None:
     until(more_with_it, "boxes are drawn")
 
 
+@pytest.mark.timed
 def test_the_window_answers_while_video_plays_and_closes_at_once(watch: Watch) -> None:
     watch.key(Qt.Key.Key_P)
     watch.preview_is("RUNNING")
     watch.video_moves()
-    delay, painted = LoopDelay(), []
-    watch.window.video.painted.connect(lambda: painted.append(time.monotonic()))
-    delay.start()
-    let_pass(5)
-    p99_ms = statistics.quantiles(delay.stop(), n=100)[98]
-    assert len(painted) > 60, "real video"
-    assert p99_ms < LOOP_DELAY_P99_MS
+    keeps(LOOP_DELAY_P99_MS, "ms of loop delay, 99th percentile", partial(loop_delay_p99_ms, watch.window))
     # Everything hangs, and closing does not wait for it.
     assert watch.robot.gateway
     watch.robot.gateway.kill()
     closed_s = time.monotonic()
     press(watch.window, Qt.Key.Key_Q)
-    until(lambda: not watch.window.isVisible(), "it is closed")
+    until(lambda: not watch.window.isVisible(), "it is closed", CLOSES_WITHIN_S)
     assert time.monotonic() - closed_s < CLOSES_WITHIN_S
+
+
+def loop_delay_p99_ms(window: MonitorWindow) -> float:
+    delay = LoopDelay()
+    painted: list[float] = []
+    connection = window.video.painted.connect(lambda: painted.append(time.monotonic()))
+    delay.start()
+    let_pass(5)
+    delays_ms = delay.stop()
+    window.video.painted.disconnect(connection)
+    assert len(painted) > 60, "real video"
+    return statistics.quantiles(delays_ms, n=100)[98]
 
 
 def test_the_ruler_sees_a_loop_that_is_held_up() -> None:

@@ -2,7 +2,10 @@
 
 import signal
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from tempfile import mkdtemp
 
 import psutil
 import pytest
@@ -10,6 +13,7 @@ import pytest
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
 from tests.support.lossy_relay import LossyRelay
+from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -18,8 +22,6 @@ pytestmark = pytest.mark.gst
 
 ORDER = {"encoders": {"order": ["mpp-h265", "va-h265", "x264"], "probe_timeout_s": 4}}
 MAX_OUTAGE_S = 2.0
-"""The promise; where others take the machine's cores, what is measured may take several times that."""
-SLOW_MACHINE = 4.0
 EXIT_HUNG = 70
 STOP_WITHIN_S = 5.0
 """The containers' stop_grace_period."""
@@ -88,16 +90,20 @@ def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) ->
         ("later empty", "no frame"),
     ],
 )
+@pytest.mark.timed
 def test_an_encoder_that_fails_at_the_start_is_passed_over(tmp_path: Path, fault: str, words: str) -> None:
+    keeps_the_outage(tmp_path, partial(fails_at_the_start, fault, words))
+
+
+def fails_at_the_start(fault: str, words: str, directory: Path) -> float:
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+    with RunningPreview(directory, ORDER, doubles) as preview:
         enabled_at = time.monotonic()
         preview.enable()
         state = preview.running()
         outage_s = time.monotonic() - enabled_at
-        assert outage_s < MAX_OUTAGE_S * SLOW_MACHINE
         passed_over(state, "va-h265", words)
-        print(f"{fault}: first frame {outage_s:.2f} s after the request, trials included")
+        return outage_s
 
 
 @pytest.mark.parametrize(
@@ -109,9 +115,14 @@ def test_an_encoder_that_fails_at_the_start_is_passed_over(tmp_path: Path, fault
         ("later empty:40", "no frame"),
     ],
 )
+@pytest.mark.timed
 def test_a_viewer_gets_frames_again(tmp_path: Path, fault: str, words: str) -> None:
+    keeps_the_outage(tmp_path, partial(fails_later, fault, words))
+
+
+def fails_later(fault: str, words: str, directory: Path) -> float:
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+    with RunningPreview(directory, ORDER, doubles) as preview:
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
@@ -123,8 +134,7 @@ def test_a_viewer_gets_frames_again(tmp_path: Path, fault: str, words: str) -> N
         passed_over(state, "va-h265", words)
         # Another connection: the pipeline is rebuilt whole, its listener included.
         assert watcher.reconnects >= 1
-        assert watcher.longest_pause_s < MAX_OUTAGE_S * SLOW_MACHINE
-        print(f"{fault}: {watcher.longest_pause_s:.2f} s without a frame")
+        return watcher.longest_pause_s
 
 
 def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp_path: Path) -> None:
@@ -143,9 +153,14 @@ def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp
         assert state.counters.faults == 0
 
 
+@pytest.mark.timed
 def test_a_driver_that_hangs_in_a_profile_change_blocks_nothing(tmp_path: Path) -> None:
+    keeps_the_outage(tmp_path, hangs_in_a_profile_change)
+
+
+def hangs_in_a_profile_change(directory: Path) -> float:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+    with RunningPreview(directory, ORDER, doubles) as preview:
         preview.enable(pb.PROFILE_BALANCED)
         preview.running()
         with Watcher(preview.port) as watcher:
@@ -153,42 +168,55 @@ def test_a_driver_that_hangs_in_a_profile_change_blocks_nothing(tmp_path: Path) 
             preview.enable(pb.PROFILE_LOW_BW)
             # The loop answers while the driver does not.
             assert preview.stub.ListEncoders(pb.ListEncodersRequest(), timeout=20).encoders
-            state = fallen_back(preview, watcher, "stuck")
+            state = fallen_back(preview, watcher)
         passed_over(state, "va-h265", "hung when the profile was changed")
         assert state.profile == pb.PROFILE_LOW_BW
         # Whatever the driver keeps, the port is not among it.
         preview.disable()
         preview.disabled()
         assert udp_port_is_free(preview.port)
+    return watcher.longest_pause_s
 
 
+@pytest.mark.timed
 def test_a_driver_that_hangs_when_a_viewer_joins_blocks_nothing(tmp_path: Path) -> None:
+    keeps_the_outage(tmp_path, hangs_when_a_viewer_joins)
+
+
+def hangs_when_a_viewer_joins(directory: Path) -> float:
     doubles = {"mpph265enc": "later deaf:60", "vah265enc": "ok"}
-    with RunningPreview(tmp_path, ORDER, doubles) as preview:
+    with RunningPreview(directory, ORDER, doubles) as preview:
         preview.enable()
         preview.running()
         with Watcher(preview.port) as watcher:
             watcher.wait_for_frames(90)
             with Watcher(preview.port) as other:
-                state = fallen_back(preview, watcher, "deaf")
+                state = fallen_back(preview, watcher)
                 other.wait_for_frames(10)
         passed_over(state, "va-h265", "hung when it was asked for a key frame")
+    return watcher.longest_pause_s
 
 
+@pytest.mark.timed
 def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_blocks_nothing(tmp_path: Path) -> None:
+    keeps_the_outage(tmp_path, hangs_when_the_bit_rate_follows)
+
+
+def hangs_when_the_bit_rate_follows(directory: Path) -> float:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
     settings = ORDER | {"adaptive": {"enabled": True}}
-    with RunningPreview(tmp_path, settings, doubles) as preview, LossyRelay(preview.port, 0.0) as relay:
+    with RunningPreview(directory, settings, doubles) as preview, LossyRelay(preview.port, 0.0) as relay:
         preview.enable()
         preview.running()
         with Watcher(relay.port, latency_ms=120) as watcher:
             watcher.wait_for_frames(10)
             relay.loss = 0.4
-            state = fallen_back(preview, watcher, "stuck, adaptive")
+            state = fallen_back(preview, watcher)
         passed_over(state, "va-h265", "hung when its bit rate was changed")
+    return watcher.longest_pause_s
 
 
-def fallen_back(preview: RunningPreview, watcher: Watcher, fault: str) -> pb.ActualState:
+def fallen_back(preview: RunningPreview, watcher: Watcher) -> pb.ActualState:
     """Waits for the other encoder.
 
     The old frames flow on until the first one is given up; the port is free then, although its driver
@@ -198,13 +226,21 @@ def fallen_back(preview: RunningPreview, watcher: Watcher, fault: str) -> pb.Act
         lambda a: a.encoder.name == "va-h265" and a.state == pb.LIFECYCLE_STATE_RUNNING, "fallback"
     )
     watcher.wait_for_frames(10)
-    assert watcher.longest_pause_s < MAX_OUTAGE_S * SLOW_MACHINE
-    print(f"{fault}: {watcher.longest_pause_s:.2f} s without a frame")
     return state
 
 
+def keeps_the_outage(tmp_path: Path, scenario: Callable[[Path], float]) -> None:
+    """Judges how long a scenario leaves a viewer without a frame; each attempt in a directory of its own."""
+    keeps(MAX_OUTAGE_S, "s without a frame", lambda: scenario(Path(mkdtemp(dir=tmp_path))))
+
+
+@pytest.mark.timed
 def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:
-    with RunningPreview(tmp_path, ORDER, {"mpph265enc": "later crash:40", "vah265enc": "ok"}) as preview:
+    keeps_the_outage(tmp_path, crashes_the_process)
+
+
+def crashes_the_process(directory: Path) -> float:
+    with RunningPreview(directory, ORDER, {"mpph265enc": "later crash:40", "vah265enc": "ok"}) as preview:
         preview.enable()
         preview.running()
         assert preview.process.wait(20) == -signal.SIGSEGV
@@ -220,8 +256,7 @@ def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: P
         outage_s = watcher.arrivals_s[0] - died_at
         assert state.encoder.name == "va-h265"
         assert "crashed while it was in use (Segmentation fault)" in state.encoder.fallback_reason
-        assert outage_s < MAX_OUTAGE_S * SLOW_MACHINE
-        print(f"crash: {outage_s:.2f} s without a frame")
+        return outage_s
 
 
 def test_an_encoder_is_not_blamed_for_a_process_that_was_killed(tmp_path: Path) -> None:

@@ -6,15 +6,14 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.judges import complaints, decoded_frames
-from tests.support.mpegts import analyse, share_beyond
+from tests.support.mpegts import analyse, share_of_the_limits
+from tests.support.promise import keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 
 pytestmark = [pytest.mark.gst, pytest.mark.timed]
 
 SECONDS = 4
-RARELY = 0.05
-"""A busy machine drops a frame before the encoder now and then, and nothing goes in its place."""
 
 
 @pytest.mark.parametrize(
@@ -33,14 +32,18 @@ def test_the_judges_have_nothing_to_say(
     with RunningPreview(tmp_path, settings) as preview:
         preview.enable(profile)
         preview.running()
-        recording = record(preview.port, SECONDS)
+        recording = b""
+
+        def of_its_limit() -> float:
+            nonlocal recording
+            recording = record(preview.port, SECONDS)
+            return share_of_the_limits(analyse(recording))
+
+        keeps(1.0, "longest distance of clocks and tables, of its limit", of_its_limit)
     stream = analyse(recording)
     assert stream.codec == codec
     assert stream.counter_gaps == []
     assert stream.broken_tables == 0
-    assert share_beyond(stream.table_times_ms["PAT"], 100) <= RARELY
-    assert share_beyond(stream.table_times_ms["PMT"], 100) <= RARELY
-    assert share_beyond(stream.clock_times_ms, 40) <= RARELY
     assert stream.access_units[0].key, "a viewer that joins begins with a key frame"
     keys = [frame for frame in stream.access_units if frame.key]
     assert len(keys) >= SECONDS - 1

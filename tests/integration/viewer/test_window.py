@@ -1,8 +1,9 @@
 """The window as a person sees it: what is on the (virtual) screen, read back pixel by pixel."""
 
+import statistics
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, StreamingGatewayDouble, serving
 from tests.support.markup import MARKUP, mark_up, no_widget_takes_markup, shown_by_qt
+from tests.support.promise import keeps
 from tests.support.qt import KEPT_IN, application, let_pass, press, until
 from tests.support.running_preview import RunningPreview
 from tests.support.video_ground import VideoGround
@@ -69,9 +71,10 @@ def banner_is_on_screen(view: ViewWindow) -> bool:
 
 @pytest.mark.timed
 def test_the_window_adds_less_than_one_and_a_half_frames_to_the_latency(tmp_path: Path) -> None:
-    """In one round of three: what other programs take of the machine is not the window's doing."""
-    with closing(extra_latency_ms(tmp_path, rounds=3)) as rounds:
-        assert any(extra_ms < 1.5 * 1000 / FPS for extra_ms in rounds)
+    def extra_frames() -> float:
+        return statistics.median(extra_latency_ms(tmp_path, rounds=3)) * FPS / 1000
+
+    keeps(1.5, "frames from decoded to painted", extra_frames)
 
 
 def test_a_freeze_is_painted_at_once_and_gone_when_the_video_is_back(

@@ -1,22 +1,73 @@
-"""Rows survive the way through a file."""
+"""Rows: what they compute of their rounds, what they refuse, and the way through a file."""
 
 import json
+from typing import Any
 
 import pytest
 
-from bench.rows import Row
+from bench.rows import MeasurementError, Row
+
+
+def row(**changed: Any) -> Row:
+    fields: dict[str, Any] = {
+        "name": "status.throughput",
+        "what": "calls",
+        "unit": "calls/s",
+        "values": [40.0, 30.0, 50.0, 41.0, 39.0],
+        "references": [50.0, 50.0, 50.0, 40.0, 50.0],
+        "bar": 0.85,
+        "better": "higher",
+    }
+    return Row(**(fields | changed))
+
+
+def test_median_ratio_and_spread() -> None:
+    measured = row()
+    assert (measured.value, measured.reference, measured.ratio) == (40.0, 50.0, 0.8)
+    assert measured.spread == (0.6, 1.025)
+    assert not measured.ok
+
+
+def test_without_a_reference_the_bar_and_the_spread_are_on_the_value() -> None:
+    measured = row(references=(), bar=40.0)
+    assert (measured.reference, measured.ratio) == (None, None)
+    assert measured.spread == (30.0, 50.0)
+    assert measured.ok
+
+
+@pytest.mark.parametrize(("better", "worst"), [("lower", 50.0), ("higher", 30.0)])
+def test_the_worst_round_is_the_one_farthest_from_the_promise(better: str, worst: float) -> None:
+    assert row(references=(), judged="worst", better=better).value == worst
 
 
 @pytest.mark.parametrize(
-    "row",
+    ("changed", "reason"),
     [
-        Row("soak.fds_growth", "descriptors", "", 0.0, None, 0),
-        Row("status.throughput", "calls", "calls/s", 4000.0, 5000.0, 0.85, "higher"),
+        ({"values": [1.0] * 4, "references": [1.0] * 4}, "too few"),
+        ({"values": [], "references": [], "single": True}, "too few"),
+        ({"references": [1.0] * 4}, "every round needs its reference"),
+        ({"references": [50.0, 50.0, 0.0, 50.0, 50.0]}, "reference of 0"),
     ],
 )
-def test_a_row_of_another_run_is_the_same_row(row: Row) -> None:
-    written = json.dumps(row.as_json())
-    assert Row.from_json(json.loads(written)) == row
+def test_rounds_that_make_no_row_are_refused(changed: dict[str, Any], reason: str) -> None:
+    with pytest.raises(MeasurementError, match=reason):
+        row(**changed)
+
+
+def test_one_long_round_is_enough_where_the_row_says_so() -> None:
+    assert row(values=[0.0], references=(), single=True, better="lower", bar=0).ok
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        row(),
+        row(values=[0.0], references=(), single=True, discarded=2, judged="worst"),
+    ],
+)
+def test_a_row_of_another_run_is_the_same_row(written: Row) -> None:
+    read = Row.from_json(json.loads(json.dumps(written.as_json())))
+    assert read.as_json() == written.as_json()
 
 
 def test_what_is_no_row_is_refused() -> None:

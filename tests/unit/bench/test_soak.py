@@ -17,19 +17,19 @@ def readings(resident_mib_per_round: float = 0.0, rounds_per_descriptor: int = R
 
 
 def test_what_stays_level_passes() -> None:
-    memory, descriptors = judge(readings(), 30)
+    memory, descriptors = judge(readings(), "soak.", "the program", "work")
     assert (memory.value, descriptors.value) == (0, 0)
     assert memory.ok
     assert descriptors.ok
 
 
 def test_ten_kib_a_round_are_seen() -> None:
-    memory, descriptors = judge(readings(resident_mib_per_round=0.01), 30)
+    memory, descriptors = judge(readings(resident_mib_per_round=0.01), "soak.", "the program", "work")
     assert memory.value == pytest.approx(8, rel=0.05)
     assert not memory.ok
     assert descriptors.ok
 
 
 def test_one_descriptor_in_three_hundred_rounds_is_seen() -> None:
-    _, descriptors = judge(readings(rounds_per_descriptor=300), 30)
+    _, descriptors = judge(readings(rounds_per_descriptor=300), "soak.", "the program", "work")
     assert not descriptors.ok
