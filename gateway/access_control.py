@@ -1,7 +1,8 @@
 """Who may call: credentials, certificates and the audit log, put together from the settings."""
 
 import asyncio
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final
 
 import grpc
@@ -9,7 +10,6 @@ import grpc
 from gateway.access.audit import AuditLog
 from gateway.access.authenticator import Authenticator
 from gateway.access.lockout import Lockout
-from gateway.access.refusal_limiter import RefusalLimiter
 from gateway.access.reloader import CredentialReloader, LoadedAccess
 from gateway.config import SecuritySettings
 from gateway.rpc.calls.ports import EventSink, StreamKey
@@ -42,8 +42,10 @@ class AccessControl:
     def __init__(self, settings: SecuritySettings, events: EventSink, stream_key: StreamKey) -> None:
         directory = settings.credentials
         file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
-        self._audit_log = AuditLog(file, settings.audit.max_kib * _KIB, settings.audit.generations)
-        self.audit = Audit(events, self._audit_log, RefusalLimiter())
+        refused_file = file.with_name(f"{file.stem}-refused{file.suffix}") if file else None
+        limits = settings.audit.max_kib * _KIB, settings.audit.generations
+        self._done_log, self._refused_log = AuditLog(file, *limits), AuditLog(refused_file, *limits)
+        self.audit = Audit(events, self._done_log, self._refused_log)
         self.auth: Auth | None = None
         self._reloader: CredentialReloader | None = None
         self._tls: ServerTls | None = None
@@ -67,12 +69,17 @@ class AccessControl:
 
     def view(self) -> AccessView:
         """Returns the state of credentials, certificates and audit log, for the fault rules."""
-        error = self._audit_log.error
+        error = self._done_log.error or self._refused_log.error
         return self._reloader.view(error) if self._reloader else AccessView(audit_error=error)
 
-    def recording(self) -> AbstractContextManager[None]:
-        """Returns a block during which the audit log is written."""
-        return self._audit_log.writing()
+    @contextmanager
+    def recording(self) -> Iterator[None]:
+        """Writes the audit log while the block lasts."""
+        with self._done_log.writing(), self._refused_log.writing():
+            try:
+                yield
+            finally:
+                self.audit.record_all()
 
     async def run(self) -> None:
         """Follows changes of the credential files, until cancelled."""
@@ -89,7 +96,7 @@ class AccessControl:
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
         count = len(loaded.store.credentials)
-        self._audit_log.record(
+        self._done_log.record(
             ControlAction(
                 who="",
                 address="this robot",

@@ -99,6 +99,7 @@ async def _observe(gateway: Gateway) -> None:
         health.set_serving(SERVICE, serving=not seen.ros_stalled)
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
         gateway.interceptors.presence.report_joined()
+        gateway.interceptors.audit.record_due()
         await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
 
 

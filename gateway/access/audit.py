@@ -26,7 +26,8 @@ from gateway.status.event import ControlAction
 
 _log = logging.getLogger(__name__)
 
-_QUEUE: Final = 256
+_QUEUE: Final = 1024
+"""Lines that wait for the disk: enough for a burst of each caller of `Repeats`."""
 _STOP_WITHIN_S: Final = 2.0
 _FILE_MODE: Final = 0o600
 _COMPLAIN_EVERY: Final = 100
@@ -55,7 +56,7 @@ class AuditLog:
     def record(self, action: ControlAction) -> None:
         """Takes one action. Never waits."""
         _log.info(
-            "audit: %s (%s) from %s: %s (%s): %s, %s",
+            "audit: %s (%s) from %s: %s (%s): %s, %s%s",
             action.who or "unauthenticated caller",
             action.role or "no role",
             action.address,
@@ -63,11 +64,12 @@ class AuditLog:
             action.request or "no parameters",
             action.result.value,
             action.answer,
+            f" ({action.count} times)" if action.count > 1 else "",
         )
         if self._path is None:
             return
         try:
-            self._queue.put_nowait(_line(action, datetime.now(UTC)))
+            self._queue.put_nowait(_line(action))
         except queue.Full:
             self._lose("the disk is too slow")
 
@@ -129,9 +131,10 @@ class AuditLog:
             _log.error("audit: %s; %d lines are lost so far", why, self.lost)
 
 
-def _line(action: ControlAction, at: datetime) -> str:
-    fields = {
-        "time": at.isoformat(timespec="milliseconds"),
+def _line(action: ControlAction) -> str:
+    """Returns a JSON object; for several actions, with their number and the times of the first ones."""
+    fields: dict[str, str | int | list[str]] = {
+        "time": _timestamp(action.unix_s),
         "who": action.who,
         "role": action.role,
         "credential": action.credential,
@@ -142,7 +145,13 @@ def _line(action: ControlAction, at: datetime) -> str:
         "answer": action.answer,
         "request_id": action.request_id,
     }
+    if action.count > 1:
+        fields |= {"count": action.count, "times": [_timestamp(each) for each in action.earlier_unix_s]}
     return json.dumps(fields, ensure_ascii=True) + "\n"
+
+
+def _timestamp(unix_s: float) -> str:
+    return datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds")
 
 
 def _sync(path: Path) -> None:

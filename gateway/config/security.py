@@ -39,9 +39,9 @@ class AuditSettings(Section):
     file: Path | None = None
     """JSON lines; by default audit.jsonl beside the credentials, none without credentials."""
     max_kib: int = Field(default=1024, ge=4, le=1_048_576)
-    """Size at which the file is rotated."""
+    """Size at which the file, and the one of refused actions beside it, is rotated."""
     generations: int = Field(default=4, ge=1, le=100)
-    """Files that are kept, the newest included."""
+    """How many of each are kept, the newest included."""
 
 
 class SecuritySettings(Section):

@@ -1,6 +1,7 @@
 """Events: what happened on the robot that an operator may want to know, one detail type per kind."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TypeAlias
 
@@ -76,6 +77,9 @@ class ControlAction:
         role: the caller's; empty like `who`.
         credential: ID of the one that was shown; empty like `who`.
         request_id: as in the logs.
+        unix_s: when it ended; calendar clock, seconds since 1970.
+        count: how many actions this one stands for; the newest of them is described.
+        earlier_unix_s: when the first of the others ended, oldest first; not more than a few.
     """
 
     who: str
@@ -87,6 +91,9 @@ class ControlAction:
     role: str = ""
     credential: str = ""
     request_id: str = ""
+    unix_s: float = field(default_factory=time.time, compare=False)
+    count: int = 1
+    earlier_unix_s: tuple[float, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """The event log: a ring of the newest events, which every subscriber reads from its own position.
 
 Subscribers have no queue here. One that is too slow finds that the ring has moved on, and gets a gap with the
-number of events it missed.
+number of events it missed. Control actions outlast the ring: callers that are refused, or come and go, can't
+push out who did what to the robot.
 """
 
 import time
@@ -13,10 +14,12 @@ from itertools import islice
 from typing import Final
 
 from common.errors import InvalidRequestError
-from gateway.status.event import Event, LoggedEvent
+from gateway.status.event import ControlAction, ControlResult, Event, LoggedEvent
 
 CAPACITY: Final = 1024
 """Events that are kept; the sequence of an older one is not used again."""
+MAX_OLDER_ACTIONS: Final = 256
+"""Control actions that are kept after they have left the ring; refused ones are not."""
 ON_OVERLAY: Final = 8
 """Length of the overlay's short list."""
 
@@ -80,6 +83,7 @@ class EventLog:
     ) -> None:
         self.run_id = run_id
         self._ring: deque[LoggedEvent] = deque(maxlen=capacity)
+        self._older: deque[LoggedEvent] = deque(maxlen=MAX_OLDER_ACTIONS)
         self._unix_ms = unix_ms
         self.sequence = 0
         """Sequence of the newest event; 0 before the first."""
@@ -90,6 +94,8 @@ class EventLog:
         """Appends an event, and returns it with its number."""
         self.sequence += 1
         logged = LoggedEvent(self.sequence, now_s, self._unix_ms(), event)
+        if len(self._ring) == self._ring.maxlen and _outlasts_the_ring(self._ring[0].event):
+            self._older.append(self._ring[0])
         self._ring.append(logged)
         if event.sentence is not None:
             self._overlay_sequence += 1
@@ -101,7 +107,7 @@ class EventLog:
         return tuple(self._on_overlay)
 
     def read(self, after: Position | None, limit: int) -> Reading:
-        """Returns what follows a position.
+        """Returns what follows a position, up to the next gap.
 
         Args:
             after: None starts with the oldest event that is kept.
@@ -112,20 +118,32 @@ class EventLog:
         """
         lost = self.sequence - len(self._ring)
         here, gap = self._locate(after, lost)
-        events = tuple(islice(self._ring, here - lost, here - lost + limit))
+        if here >= lost:
+            events = tuple(islice(self._ring, here - lost, here - lost + limit))
+        else:
+            following = (each for each in self._older if each.sequence > here)
+            numbered = zip(range(here + 1, here + 1 + limit), following, strict=False)
+            events = tuple(each for sequence, each in numbered if each.sequence == sequence)
         return Reading(gap, events, Position(self.run_id, here + len(events)))
 
     def _locate(self, after: Position | None, lost: int) -> tuple[int, Gap | None]:
         """Returns the sequence to continue after, and the gap before it."""
-        if after is None:
-            return lost, None
-        if after.run_id != self.run_id:
-            return lost, Gap(GapReason.NEW_RUN, lost, Position(self.run_id, lost))
-        if after.sequence > self.sequence:
+        sequence = after.sequence if after and after.run_id == self.run_id else 0
+        if sequence > self.sequence:
             raise InvalidRequestError(
-                f"event {after.sequence} of this run has not happened yet; the newest is {self.sequence}"
+                f"event {sequence} of this run has not happened yet; the newest is {self.sequence}"
             )
-        if after.sequence < lost:
-            missed = lost - after.sequence
-            return lost, Gap(GapReason.NO_LONGER_KEPT, missed, Position(self.run_id, lost))
-        return after.sequence, None
+        following = (each.sequence - 1 for each in self._older if each.sequence > sequence)
+        here = next(following, max(lost, sequence))
+        if after is None:
+            return here, None
+        if after.run_id != self.run_id:
+            return here, Gap(GapReason.NEW_RUN, here, Position(self.run_id, here))
+        if here > sequence:
+            return here, Gap(GapReason.NO_LONGER_KEPT, here - sequence, Position(self.run_id, here))
+        return here, None
+
+
+def _outlasts_the_ring(event: Event) -> bool:
+    action = event.detail
+    return isinstance(action, ControlAction) and action.result is not ControlResult.REFUSED

@@ -59,6 +59,10 @@ class Robot:
     def audit_file(self) -> Path:
         return self.directory.path / "audit.jsonl"
 
+    @property
+    def refused_file(self) -> Path:
+        return self.directory.path / "audit-refused.jsonl"
+
     def add(
         self, role: Role, kind: Kind = Kind.TOKEN, name: str = "anna", **wanted: Any
     ) -> "tuple[Credential, Login]":

@@ -1,6 +1,11 @@
 """Records every control action: who asked for what, from where, and with what result."""
 
 import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Final
 
 from google.protobuf import text_format
@@ -10,7 +15,7 @@ from common import request_id
 from common.errors import DomainError, TooMuchError
 from common.interceptors import Interceptor
 from common.reasons import Reason
-from gateway.access.refusal_limiter import RefusalLimiter
+from gateway.access.repeats import Repeats
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import Method
 from gateway.rpc.calls.ports import AuditSink, EventSink
@@ -20,6 +25,8 @@ from gateway.status.fault import Severity
 _COMPONENT: Final = "gateway"
 _MAX_TEXT: Final = 200
 """Characters of a request or an answer: a request may be as long as its sender likes."""
+_NOW_S: Final = 1.0
+"""Age of an action whose event has its time, near enough."""
 
 
 class Audit(Interceptor[CallContext]):
@@ -27,14 +34,21 @@ class Audit(Interceptor[CallContext]):
 
     Args:
         events: operators see the actions there.
-        log: keeps them.
-        refusals: limits how many refusals of one caller are recorded: a flood of them must fill neither.
+        done: keeps those that may have changed the robot.
+        refused: keeps the refused ones, which no number of them can push out of `done`.
+        clock: monotonic seconds.
     """
 
-    def __init__(self, events: EventSink, log: AuditSink, refusals: RefusalLimiter) -> None:
+    def __init__(
+        self,
+        events: EventSink,
+        done: AuditSink,
+        refused: AuditSink,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._events = events
-        self._log = log
-        self._refusals = refusals
+        self._done = Repeats(partial(self._write, done), clock)
+        self._refused = Repeats(partial(self._write, refused), clock)
 
     def applies_to(self, method: Method) -> bool:
         """Returns whether the method is a control action."""
@@ -51,13 +65,15 @@ class Audit(Interceptor[CallContext]):
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Records how the action ended.
 
-        Left out are refusals for a rate or a lockout, refusals beyond a caller's share, and calls that ended
-        before they were admitted: a caller that leaves while it is authenticated has done nothing.
+        Left out are refusals for a rate or a lockout, and calls that ended before they were admitted: a
+        caller that leaves while it is authenticated has done nothing.
         """
         if error is None:
             self._record(call, ControlResult.ACCEPTED, _answer(call))
+        elif isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:
+            return
         elif isinstance(error, DomainError):
-            self._record_refusal(call, error)
+            self._record(call, ControlResult.REFUSED, str(error))
         elif call.request is None:
             return
         elif isinstance(error, asyncio.CancelledError | GeneratorExit):
@@ -65,14 +81,15 @@ class Audit(Interceptor[CallContext]):
         else:
             self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
 
-    def _record_refusal(self, call: CallContext, error: DomainError) -> None:
-        if isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:
-            return
-        left_out = self._refusals.take(call.principal.name if call.principal else call.peer.address_prefix)
-        if left_out is None:
-            return
-        more = f" ({left_out} attempts before this one were not recorded)" if left_out else ""
-        self._record(call, ControlResult.REFUSED, f"{error}{more}")
+    def record_due(self) -> None:
+        """Records repeated actions whose time has come; to be called a few times a second."""
+        self._done.record_due()
+        self._refused.record_due()
+
+    def record_all(self) -> None:
+        """Records the repeated actions that are still only counted, at the end of the program."""
+        self._done.record_all()
+        self._refused.record_all()
 
     def _record(self, call: CallContext, result: ControlResult, answer: str) -> None:
         principal = call.principal
@@ -87,7 +104,11 @@ class Audit(Interceptor[CallContext]):
             credential=principal.credential_ids[0] if principal else "",
             request_id=request_id.current(),
         )
-        self._log.record(action)
+        repeats = self._refused if result is ControlResult.REFUSED else self._done
+        repeats.take(action, call.peer.address_prefix)
+
+    def _write(self, sink: AuditSink, action: ControlAction) -> None:
+        sink.record(action)
         self._events.note(_event(action))
 
 
@@ -126,12 +147,20 @@ def _answer(call: CallContext) -> str:
 
 
 def _event(action: ControlAction) -> Event:
-    """Returns the event that shows an action to operators."""
+    """Returns the event that shows an action to operators; says when it happened if that is not now."""
+    if action.count > 1 or time.time() - action.unix_s > _NOW_S:
+        first, *_ = (*action.earlier_unix_s, action.unix_s)
+        times = f"{_clock_time(first)} to {_clock_time(action.unix_s)} UTC"
+        action = replace(action, answer=f"{action.answer} (calls: {action.count}, {times})")
     request = f" ({action.request})" if action.request else ""
     who = action.who or action.address
     message = f"{who} called {action.method}{request}, {action.result.value}: {action.answer}"
     severity = Severity.INFO if action.result is ControlResult.ACCEPTED else Severity.WARNING
     return Event(severity, _COMPONENT, message, action)
+
+
+def _clock_time(unix_s: float) -> str:
+    return f"{datetime.fromtimestamp(unix_s, UTC):%H:%M:%S}"
 
 
 def _as_text(request: Message) -> str:

@@ -38,6 +38,7 @@ ADD = "docker compose run --rm -T credentials add anna --role operator"
 REVOKE = "docker compose run --rm -T credentials revoke anna"
 LIST = "docker compose run --rm -T credentials list"
 READ_AUDIT = f"docker compose exec gateway cat {AUDIT}/audit.jsonl"
+READ_REFUSED = f"docker compose exec gateway cat {AUDIT}/audit-refused.jsonl"
 HEALTH = "docker compose exec gateway python -m common.healthcheck unix:/tmp/health.sock preview"
 
 
@@ -70,8 +71,9 @@ class Guarded:
     ben: Credentials
 
     def audit(self, who: str) -> list[dict[str, str]]:
-        """The records of somebody, oldest first, as the page says to read them."""
-        lines = typed(self.deployment, READ_AUDIT).stdout.splitlines()
+        """The records of somebody, done before refused, oldest first, as the page says to read them."""
+        files = [typed(self.deployment, command).stdout for command in (READ_AUDIT, READ_REFUSED)]
+        lines = [line for file in files for line in file.splitlines()]
         return [record for record in map(json.loads, lines) if record["who"] == who]
 
 
@@ -121,7 +123,7 @@ def reason(deployment: Deployment, shown: Credentials | None) -> str:
     return caught.value.reason or type(caught.value).__name__
 
 
-@pytest.mark.parametrize("command", [UP, INIT, ADD, REVOKE, LIST, READ_AUDIT, HEALTH])
+@pytest.mark.parametrize("command", [UP, INIT, ADD, REVOKE, LIST, READ_AUDIT, READ_REFUSED, HEALTH])
 def test_the_pages_say_what_is_typed_here(command: str) -> None:
     pages = "".join(
         (ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("deploy.md", "security.md")
@@ -296,7 +298,9 @@ def test_no_secret_is_in_any_log(guarded: Guarded) -> None:
         assert stream
         assert stream.passphrase
         operator.disable_preview()
-    written = robot.run("logs").stdout + typed(robot, READ_AUDIT).stdout
+    written = "".join(
+        [robot.run("logs").stdout, *(typed(robot, each).stdout for each in (READ_AUDIT, READ_REFUSED))]
+    )
     assert "SetPreviewMode" in written
     assert not SECRET.search(written)
     for secret in (shown.token, guarded.ben.token or "", stream.passphrase):

@@ -14,7 +14,7 @@ import pytest
 from common.reasons import Reason
 from console.client.refusal import refusal_in
 from gateway.access.credential import Kind
-from gateway.access.refusal_limiter import BURST
+from gateway.access.repeats import BURST
 from gateway.access.role import Role
 from gateway.access.token import new_token
 from gateway.rpc.mapping.enums import SEVERITIES
@@ -279,6 +279,10 @@ async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:
         )
 
 
+def records_of(file: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text().splitlines()]
+
+
 async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     operator, login = robot.add(Role.OPERATOR)
@@ -298,18 +302,22 @@ async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) ->
             )
         status = await calls.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=5)
         assert (status.gateway.requests_served, status.gateway.requests_refused) == (1, 3)
-    records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
-    assert [(each["who"], each["role"], each["credential"], each["result"]) for each in records] == [
-        ("anna", "operator", operator.credential_id, "accepted"),
-        ("ben", "viewer", viewer.credential_id, "refused"),
-        ("", "", "", "refused"),
-        ("anna", "operator", operator.credential_id, "refused"),
+    records = records_of(robot.audit_file), records_of(robot.refused_file)
+    assert [[(each["who"], each["role"], each["credential"]) for each in file] for file in records] == [
+        [("anna", "operator", operator.credential_id)],
+        [
+            ("ben", "viewer", viewer.credential_id),
+            ("", "", ""),
+            ("anna", "operator", operator.credential_id),
+        ],
     ]
-    assert all(each["action"] == "SetPreviewMode" for each in records)
-    assert all(
-        each["address"].startswith("127.0.0.1:") and each["time"].endswith("+00:00") for each in records
-    )
-    assert robot.audit_file.stat().st_mode & 0o777 == 0o600
+    assert [{each["result"] for each in file} for file in records] == [{"accepted"}, {"refused"}]
+    for each in (*records[0], *records[1]):
+        assert each["action"] == "SetPreviewMode"
+        assert each["address"].startswith("127.0.0.1:")
+        assert each["time"].endswith("+00:00")
+    for file in (robot.audit_file, robot.refused_file):
+        assert file.stat().st_mode & 0o777 == 0o600
 
 
 async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path: Path) -> None:
@@ -336,8 +344,10 @@ async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path:
                     seen.append(answer.event.control_action.who or "a stranger")
         assert seen == expected
         events.cancel()
-    records = [json.loads(line) for line in robot.audit_file.read_text().splitlines()]
-    assert [each["who"] or "a stranger" for each in records] == expected
+    records = records_of(robot.refused_file)
+    assert [each["who"] or "a stranger" for each in records] == [*expected, "a stranger"]
+    assert [each.get("count", 1) for each in records] == [1] * len(expected) + [50 - BURST]
+    assert not robot.audit_file.exists()
 
 
 async def test_who_guesses_waits_and_others_at_the_same_address_do_not(tmp_path: Path) -> None:

@@ -2,8 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     SubscribeEventsRequest,
     WatchSystemStatusRequest,
 )
+from tests.support.detour import detour
 from tests.support.running_gateway import Operator, raw_unary, running_gateway
 
 STATUS = "/omniseer.gateway.v1.RobotGateway/GetSystemStatus"
@@ -74,25 +74,6 @@ async def test_streams_beyond_the_share_are_refused(tmp_path: Path) -> None:
                     await asyncio.sleep(0.05)
         again.cancel()
         events.cancel()
-
-
-@asynccontextmanager
-async def detour(address: str, port: int) -> AsyncIterator[int]:
-    """A port whose connections go on to `port`, from another address of this machine."""
-
-    async def carry(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        try:
-            while data := await reader.read(65_536):
-                writer.write(data)
-        finally:
-            writer.close()
-
-    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        there, back = await asyncio.open_connection("127.0.0.1", port, local_addr=(address, 0))
-        await asyncio.gather(carry(reader, back), carry(there, writer))
-
-    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
-        yield server.sockets[0].getsockname()[1]
 
 
 async def test_one_computer_that_takes_all_it_can_get_leaves_room_for_others(tmp_path: Path) -> None:

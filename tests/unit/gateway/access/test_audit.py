@@ -3,6 +3,7 @@
 import json
 import os
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,18 @@ def test_every_record_is_a_line_and_nothing_breaks_one(tmp_path: Path) -> None:
     assert lines(tmp_path / "a") == [str(number) for number in range(50)]
     assert log.lost == 0
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o600
+
+
+def test_a_line_that_stands_for_several_has_their_number_and_times(tmp_path: Path) -> None:
+    log = AuditLog(tmp_path / "a", 1 << 20, 2)
+    with log.writing():
+        log.record(replace(action(0), unix_s=0.5))
+        log.record(replace(action(0), unix_s=62.25, count=7000, earlier_unix_s=(2.5, 3.0)))
+    one, several = [json.loads(line) for line in (tmp_path / "a").read_text().splitlines()]
+    assert one["time"] == "1970-01-01T00:00:00.500+00:00"
+    assert one.keys() & {"count", "times"} == set()
+    assert (several["time"], several["count"]) == ("1970-01-01T00:01:02.250+00:00", 7000)
+    assert several["times"] == ["1970-01-01T00:00:02.500+00:00", "1970-01-01T00:00:03.000+00:00"]
 
 
 def test_lines_survive_a_power_loss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,9 +122,9 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path, monkeypatch: pytest.M
     with log.writing():
         log.record(action(0))
         assert hangs.wait(10)
-        for number in range(1000):
+        for number in range(2000):
             log.record(action(number))
-        assert log.lost == 1000 - 256
+        assert log.lost == 2000 - 1024
         assert "too slow" in log.error
         goes_on.set()
 

@@ -5,13 +5,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import InvalidRequestError
-from gateway.status.event import Event, ModeChanged
-from gateway.status.event_log import ON_OVERLAY, EventLog, Gap, GapReason, Position
+from gateway.status.event import ControlAction, ControlResult, Event, ModeChanged
+from gateway.status.event_log import (
+    CAPACITY,
+    MAX_OLDER_ACTIONS,
+    ON_OVERLAY,
+    EventLog,
+    Gap,
+    GapReason,
+    Position,
+)
 from gateway.status.fault import Severity
 
 
 def news(words: str, sentence: str | None = None) -> Event:
     return Event(Severity.INFO, "mission", words, ModeChanged(words), sentence)
+
+
+def action(result: ControlResult = ControlResult.ACCEPTED) -> Event:
+    detail = ControlAction("anna", "10.0.0.5:4", "SetPreviewMode", "enabled: true", result, "done")
+    return Event(Severity.INFO, "gateway", "an action", detail)
 
 
 def filled(count: int, kept: int = 4, run_id: str = "run") -> EventLog:
@@ -72,6 +85,53 @@ def test_the_overlay_has_the_newest_few_with_a_count_of_its_own() -> None:
     assert log.sequence == 2 * (ON_OVERLAY + 3)
 
 
+@pytest.mark.parametrize(
+    ("result", "kept"),
+    [(ControlResult.ACCEPTED, [2, 3, 5]), (ControlResult.FAILED, [2, 3, 5]), (ControlResult.REFUSED, [])],
+)
+def test_actions_outlast_the_ring_and_refusals_do_not(result: ControlResult, kept: list[int]) -> None:
+    log = EventLog("run", 4, unix_ms=lambda: 0)
+    for each in (news("x"), action(result), action(result), news("x"), action(result), *[news("x")] * 10):
+        log.add(each, 0.0)
+    subscriber = Subscriber()
+    while subscriber.position != Position("run", 15):
+        subscriber.read(log, 100, None)
+    assert [sequence for _, sequence in subscriber.told] == [*kept, 12, 13, 14, 15]
+    holes = [(gap.missed, gap.position.sequence) for gap in subscriber.gaps]
+    assert holes == ([(1, 4), (6, 11)] if kept else [])
+
+
+@pytest.mark.parametrize(
+    ("after", "gap", "read"),
+    [
+        (None, None, [2, 3]),
+        (Position("run", 0), Gap(GapReason.NO_LONGER_KEPT, 1, Position("run", 1)), [2, 3]),
+        (Position("run", 1), None, [2, 3]),
+        (Position("run", 2), None, [3]),
+        (Position("run", 3), Gap(GapReason.NO_LONGER_KEPT, 3, Position("run", 6)), [7, 8]),
+        (Position("run", 6), None, [7, 8]),
+        (Position("earlier", 9), Gap(GapReason.NEW_RUN, 1, Position("run", 1)), [2, 3]),
+    ],
+)
+def test_a_reading_ends_where_a_gap_begins(after: Position | None, gap: Gap | None, read: list[int]) -> None:
+    log = EventLog("run", 2, unix_ms=lambda: 0)
+    for each in (news("x"), action(), action(), *[news("x")] * 5):
+        log.add(each, 0.0)
+    reading = log.read(after, 100)
+    assert (reading.gap, [each.sequence for each in reading.events]) == (gap, read)
+    assert reading.position == Position("run", read[-1])
+    assert sequences(log, after, 1) == read[:1]
+
+
+def test_the_older_actions_are_bounded() -> None:
+    log = EventLog("run", unix_ms=lambda: 0)
+    for _ in range(CAPACITY + MAX_OLDER_ACTIONS + 50):
+        log.add(action(), 0.0)
+    for _ in range(2 * CAPACITY):
+        log.add(news("x"), 0.0)
+    assert len(log.read(None, 10_000).events) == MAX_OLDER_ACTIONS
+
+
 class Subscriber:
     """Keeps what it is told, as a client would, and can prove that nothing is missing in silence."""
 
@@ -99,6 +159,7 @@ class Subscriber:
 STEPS = st.lists(
     st.one_of(
         st.tuples(st.just("happen"), st.integers(1, 12)),
+        st.tuples(st.just("act"), st.integers(1, 3)),
         st.tuples(st.just("restart"), st.just(0)),
         st.tuples(st.just("read"), st.integers(1, 20)),
         st.tuples(st.just("break off"), st.integers(0, 6)),
@@ -119,6 +180,9 @@ def test_each_event_comes_once_and_in_order_or_a_gap_accounts_for_it(
             case "happen":
                 for _ in range(count):
                     log.add(news("x"), 0.0)
+            case "act":
+                for _ in range(count):
+                    log.add(action(), 0.0)
             case "restart":
                 runs.append(EventLog(f"run {len(runs)}", kept, unix_ms=lambda: 0))
             case "read":

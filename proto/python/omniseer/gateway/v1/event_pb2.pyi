@@ -103,7 +103,8 @@ Global___EventPosition: _TypeAlias = EventPosition  # noqa: Y015
 @_typing.final
 class Event(_message.Message):
     """Something happened that an operator may want to know. Kept for a while: the gateway remembers
-    the newest 1024 events of its run, so that a client that lost its connection misses none.
+    the newest 1024 events of its run, so that a client that lost its connection misses none, and
+    beyond them the newest 256 control actions that were not refused.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -354,7 +355,9 @@ Global___ClientLeft: _TypeAlias = ClientLeft  # noqa: Y015
 
 @_typing.final
 class ControlAction(_message.Message):
-    """A call that changes the robot, or tried to."""
+    """A call that changes the robot, or tried to. Repeated calls of a caller are one event with those
+    of the last minute; its answer ends with their number and times.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 

@@ -264,7 +264,7 @@ class SubscribeEventsRequest(_message.Message):
     @_builtins.property
     def after(self) -> _event_pb2.EventPosition:
         """Where to resume: the position of the last event, gap or caught_up that was received. Unset:
-        from the oldest event that the gateway keeps, without a gap.
+        from the oldest event that the gateway keeps, without a gap before it.
         """
 
     def __init__(

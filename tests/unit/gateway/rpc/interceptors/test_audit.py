@@ -1,6 +1,9 @@
 """Every control action is recorded once: who, from where, what, and with what result."""
 
 import asyncio
+import re
+import time
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -9,7 +12,7 @@ from common.errors import InvalidRequestError, NotAllowedError, NotAuthenticated
 from common.interceptors import Interceptor
 from common.reasons import Reason
 from gateway.access.credential import Principal
-from gateway.access.refusal_limiter import BURST, RefusalLimiter
+from gateway.access.repeats import BURST, WINDOW_S
 from gateway.access.role import Role
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.interceptors.audit import Audit, AuditStart
@@ -21,11 +24,12 @@ from omniseer.gateway.v1.robot_gateway_pb2 import SetPreviewModeRequest, SetPrev
 from tests.support.calls import call_of, serve
 
 ON = SetPreviewModeRequest(enabled=True)
+CLOCK = r"\d\d:\d\d:\d\d"
 ANNA = Principal("anna", Role.OPERATOR, ("a1",))
 
 
 class Records:
-    """Both places where actions go."""
+    """A place where actions go."""
 
     def __init__(self) -> None:
         self.events: list[Event] = []
@@ -54,8 +58,9 @@ class Ground:
     """An audit interceptor between its neighbours."""
 
     def __init__(self) -> None:
-        self.records = Records()
-        self.audit = Audit(self.records, self.records, RefusalLimiter())
+        self.now_s = 1000.0
+        self.records, self.refused = Records(), Records()
+        self.audit = Audit(self.records, self.records, self.refused, lambda: self.now_s)
 
     async def call(
         self,
@@ -76,16 +81,19 @@ class Ground:
 async def recorded(
     outcome: SetPreviewModeResponse | BaseException, request: bytes = ON.SerializeToString()
 ) -> ControlAction:
-    """The one record that a call with this outcome makes, the same in both places."""
+    """The one record that a call with this outcome makes, in its file and as an event."""
     ground = Ground()
     try:
         await ground.call(outcome, request)
     except (InvalidRequestError, ZeroDivisionError, asyncio.CancelledError) as error:
         assert error is outcome or not request, "the caller gets it all the same"  # noqa: PT017
-    [action] = ground.records.actions
     [event] = ground.records.events
-    assert event.detail is action
-    return action
+    assert isinstance(event.detail, ControlAction)
+    refused = event.detail.result is ControlResult.REFUSED
+    assert (ground.records.actions, ground.refused.actions) == (
+        ([], [event.detail]) if refused else ([event.detail], [])
+    )
+    return event.detail
 
 
 async def test_an_accepted_action_has_the_robots_answer() -> None:
@@ -176,7 +184,7 @@ async def test_a_request_that_breaks_the_rules_is_recorded() -> None:
     ground = Ground()
     with pytest.raises(InvalidRequestError):
         await ground.call(SetPreviewModeResponse(), request=b"\xff")
-    [action] = ground.records.actions
+    [action] = ground.refused.actions
     assert action.result is ControlResult.REFUSED
     assert "can't be parsed" in action.answer
 
@@ -193,8 +201,8 @@ async def test_what_auth_refuses_is_recorded_until_there_are_too_many(error: Exc
     for _ in range(BURST + 5):
         with pytest.raises(type(error)):
             await ground.call(SetPreviewModeResponse(), auth=Authenticated(None, error))
-    assert len(ground.records.actions) == len(ground.records.events) == BURST
-    assert {each.result for each in ground.records.actions} == {ControlResult.REFUSED}
+    assert len(ground.refused.actions) == len(ground.records.events) == BURST
+    assert {each.result for each in ground.refused.actions} == {ControlResult.REFUSED}
     assert ground.records.events[0].severity is Severity.WARNING
 
 
@@ -204,7 +212,7 @@ async def test_a_caller_that_is_locked_out_is_not_recorded() -> None:
         await ground.call(
             SetPreviewModeResponse(), auth=Authenticated(None, TooMuchError("wait", Reason.LOCKED_OUT))
         )
-    assert ground.records.actions == []
+    assert ground.records.events == []
 
 
 class Leaving(Interceptor[CallContext]):
@@ -219,15 +227,59 @@ async def test_a_caller_that_leaves_before_it_is_authenticated_has_done_nothing(
     with pytest.raises(asyncio.CancelledError):
         await serve([ground.audit, Leaving(), Validation(10_000)], "SetPreviewMode", None)
     assert ground.records.actions == []
+    assert ground.refused.actions == []
     assert ground.records.events == []
 
 
-async def test_a_flood_of_refused_requests_fills_neither_log_nor_events() -> None:
+@pytest.mark.parametrize("refused", [True, False])
+async def test_a_flood_fills_neither_log_nor_events_and_is_recorded_by_its_number(
+    refused: bool,
+) -> None:  # a case
+    ground = Ground()
+    log = ground.refused if refused else ground.records
+    for _ in range(BURST + 20):
+        with pytest.raises(InvalidRequestError) if refused else nullcontext():
+            request = b"\xff" if refused else ON.SerializeToString()
+            await ground.call(SetPreviewModeResponse(message="running"), request)
+    assert len(log.actions) == len(ground.records.events) == BURST
+    ground.now_s += WINDOW_S
+    ground.audit.record_due()
+    assert [each.count for each in log.actions] == [1] * BURST + [20]
+    assert re.search(rf" \(calls: 20, {CLOCK} to {CLOCK} UTC\)$", ground.records.events[-1].message)
+    assert len(ground.records.actions) + len(ground.refused.actions) == BURST + 1
+
+
+async def test_an_action_that_was_held_back_alone_is_an_event_with_its_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ground = Ground()
+    for _ in range(BURST + 1):
+        await ground.call(SetPreviewModeResponse(message="running"))
+    late_s = time.time() + WINDOW_S
+    monkeypatch.setattr(time, "time", lambda: late_s)
+    ground.now_s += WINDOW_S
+    ground.audit.record_due()
+    event = ground.records.events[-1]
+    assert re.search(rf"accepted: running \(calls: 1, {CLOCK} to {CLOCK} UTC\)$", event.message)
+    assert ground.records.actions[-1].answer == "running"
+
+
+async def test_refusals_hold_no_accepted_action_back() -> None:
     ground = Ground()
     for _ in range(BURST + 20):
         with pytest.raises(InvalidRequestError):
             await ground.call(SetPreviewModeResponse(), request=b"\xff")
-    assert len(ground.records.actions) == len(ground.records.events) == BURST
+    await ground.call(SetPreviewModeResponse())
+    await ground.call(SetPreviewModeResponse())
+    assert [each.count for each in ground.records.actions] == [1, 1]
+
+
+async def test_what_is_only_counted_is_recorded_at_the_end() -> None:
+    ground = Ground()
+    for _ in range(BURST + 20):
+        await ground.call(SetPreviewModeResponse())
+    ground.audit.record_all()
+    assert sum(each.count for each in ground.records.actions) == BURST + 20
 
 
 async def test_looking_is_no_control_action() -> None:
