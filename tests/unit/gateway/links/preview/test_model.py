@@ -37,7 +37,7 @@ def report(
         state=state,
         profile=profile,
         last_error=error,
-        listener=Listener(7100, 125),
+        listener=Listener(7100, 125, "127.0.0.1"),
         stream=STREAM if state is S.RUNNING else None,
         encoder=None,
         measurement=measurement,
