@@ -95,8 +95,8 @@ def test_the_preview_knows_where_its_port_is_published(
     monkeypatch.setenv("PREVIEW_BIND", bind)
     services = config(overlay)["services"]
     (port,) = services["preview"]["ports"]
-    told = services["preview"]["environment"]["PREVIEW__SRT__PUBLISHED_ON"]
-    assert told.strip("[]") == port["host_ip"]
+    address = services["preview"]["environment"]["PREVIEW__SRT__PUBLISHED_ON"]
+    assert address.strip("[]") == port["host_ip"]
 
 
 @pytest.mark.parametrize(
