@@ -195,7 +195,7 @@ _RUNNING = PreviewReport(
     state=PreviewState.RUNNING,
     profile=Profile.BALANCED,
     last_error="",
-    listener=Listener(port=7100, latency_ms=125),
+    listener=Listener(port=7100, latency_ms=125, address="127.0.0.1"),
     stream=Stream(1280, 720, 30.0, 2500, Codec.H265, False, "RTT 180 ms, 6 % loss: 2500 -> 1200 kbit/s"),
     encoder=Encoder("x264", hardware=False, wanted="mpp-h265", fallback_reason="no such element"),
     measurement=Measurement(29.9, 1210.0, 2, 12, 180.0, 6.0),

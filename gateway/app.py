@@ -9,11 +9,14 @@ from typing import Final
 
 import grpc
 
+from common.findings import Verdict
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
 from gateway.links.preview.control import PreviewLink
+from gateway.links.preview.exposure import video_exposure
 from gateway.metrics.endpoint import serving_metrics
 from gateway.rpc.server import SERVICE, serving
+from gateway.status.preview import Listener
 from gateway.status.snapshot import Snapshot
 
 _log = logging.getLogger(__name__)
@@ -94,17 +97,29 @@ async def _metrics(gateway: Gateway) -> AsyncIterator[None]:
 async def _observe(gateway: Gateway) -> None:
     """Updates faults, events and the health service, whether or not an operator is connected."""
     link, health = gateway.preview_link, gateway.health
+    listener: Listener | None = None
     while True:
         seen = gateway.state.observe(gateway.access.view())
         health.set_serving(SERVICE, serving=not seen.ros_stalled)
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()
+        if seen.preview.listener and seen.preview.listener != listener:
+            listener = seen.preview.listener
+            _log_exposure(gateway.settings, listener)
         await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
 
 
 def _has_changed(link: PreviewLink, seen: Snapshot) -> bool:
     return link.view is not seen.preview
+
+
+def _log_exposure(settings: GatewaySettings, listener: Listener) -> None:
+    found = video_exposure(settings, listener)
+    if found.verdict is Verdict.GOOD:
+        _log.info("%s", found.what)
+    else:
+        _log.warning("%s (%s). %s", found.what, found.why, found.remedy)
 
 
 def _warn_of_exposure(security: SecuritySettings) -> None:

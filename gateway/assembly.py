@@ -85,12 +85,10 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     """
     # Milliseconds since the computer's start: a later gateway's revisions exceed an earlier one's.
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
-    model = PreviewModel(
-        partial(secrets.token_urlsafe, _PASSPHRASE_BYTES) if settings.preview_encrypted else None
-    )
+    model = PreviewModel(settings.encrypts_preview, partial(secrets.token_urlsafe, _PASSPHRASE_BYTES))
     name = f"preview service at {settings.preview.socket}"
     link = ServiceLink(name, outside.preview_connector(), Reconciler(first_revision, model))
-    control = PreviewControl(link, model, settings.preview.settle_ms / 1000)
+    control = PreviewControl(link, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
     access = AccessControl(settings.security, state, control)

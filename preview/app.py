@@ -41,7 +41,13 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     Health(SERVICE).register(server)
     bind.bind_unix(server, settings.socket)
     await server.start()
-    _log.info("serving on %s", settings.socket)
+    srt = settings.srt
+    _log.info(
+        "serving on %s; viewers reach the listener at %s, UDP port %d",
+        settings.socket,
+        srt.reached_at,
+        srt.port,
+    )
     trials = asyncio.create_task(prober.try_all(encoders.allowed), name="trials")
     try:
         await supervisor.run(stop)

@@ -99,6 +99,8 @@ class SrtSettings(Section):
     """SRT listener."""
 
     bind: str = "0.0.0.0"  # noqa: S104  # viewers are on other machines; the gateway decides on encryption
+    published_on: str | None = Field(default=None, min_length=1)
+    """In a container: the machine's address on which the port is published, which `bind` does not show."""
     port: int = Field(default=7100, ge=1, le=65535)
     latency_ms: int = Field(default=125, ge=0, le=8000)
     """SRTO_LATENCY: how long a receiver waits for a lost packet; the larger one of both sides applies."""
@@ -106,6 +108,11 @@ class SrtSettings(Section):
     """More are refused. One that vanished counts until SRT gives it up, 5 s later."""
     key_length_bytes: Literal[16, 24, 32] = 16
     """SRTO_PBKEYLEN of encrypted sessions: 16 is AES-128, 32 is AES-256."""
+
+    @property
+    def reached_at(self) -> str:
+        """The address on which viewers reach the listener."""
+        return self.published_on or self.bind
 
 
 class EncoderSettings(Section):

@@ -164,6 +164,7 @@ class Supervisor:
             profile=self._desired.profile,
             last_error=self._last_error,
             counters=self._lifecycle.counters,
+            address=self._settings.srt.reached_at,
             port=self._settings.srt.port,
             latency_ms=self._settings.srt.latency_ms,
             stream=pipeline.stream if pipeline else None,

@@ -125,6 +125,7 @@ class ActualState:
         profile: of the newest desired state; a running pipeline follows at once.
         last_error: last error since the preview was enabled; empty for none.
         counters: counts since the process started.
+        address: where viewers reach the listener: as bound, or as its container's port is published.
         port: UDP port of the listener.
         latency_ms: SRT latency of the listener (SRTO_LATENCY).
         stream: None while no pipeline exists.
@@ -138,6 +139,7 @@ class ActualState:
     profile: Profile
     last_error: str
     counters: Counters
+    address: str
     port: int
     latency_ms: int
     stream: StreamState | None = None

@@ -79,7 +79,8 @@ def robot(
     gateway = {
         "log_level": "warning",
         "grpc": {"port": tcp},
-        "preview": {"socket": str(socket)},
+        # Plain, as the reference is, also where the listener is not on loopback.
+        "preview": {"socket": str(socket), "encrypted": False},
         "sources": [],
     }
     with (

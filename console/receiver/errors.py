@@ -44,7 +44,8 @@ def from_srt(address: StreamAddress, detail: str, *, had_data: bool) -> StreamEr
             f"{address.uri} did not accept the passphrase"
             if address.passphrase
             else f"{address.uri} asks for a passphrase",
-            "Type: robotctl login. The robot gives each session's passphrase to authenticated clients only",
+            "Type: robotctl login. The robot gives each session's passphrase to authenticated clients, or, "
+            "without credentials, to clients on the robot itself and in tunnels",
             final=True,
         )
     if had_data:

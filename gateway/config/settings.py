@@ -28,8 +28,8 @@ class PreviewSettings(Section):
     advertised_host: str | None = Field(default=None, min_length=1)
     """Host of the stream for viewers; by default the address at which the caller reached the gateway."""
     encrypted: bool | None = None
-    """Whether each session gets its own passphrase; the preview's configuration sets the key length. By
-    default it does if callers must authenticate."""
+    """Whether each session gets its own passphrase; the preview's configuration sets the key length.
+    `GatewaySettings.encrypts_preview` has the default."""
 
 
 class PlatformSettings(Section):
@@ -63,11 +63,20 @@ class GatewaySettings(Settings):
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """An empty list makes a gateway that needs no ROS."""
 
-    @property
-    def preview_encrypted(self) -> bool:
-        """Whether the stream has a passphrase."""
-        requested = self.preview.encrypted
-        return self.security.credentials is not None if requested is None else requested
+    def encrypts_preview(self, address: str) -> bool:
+        """Returns whether the stream of a listener has a passphrase.
+
+        By default it does if callers must authenticate, and, unless `security.insecure` is set, wherever
+        other machines can reach the listener.
+
+        Args:
+            address: where viewers reach the listener; empty if unknown, which counts as any address.
+        """
+        if self.preview.encrypted is not None:
+            return self.preview.encrypted
+        if self.security.credentials is not None:
+            return True
+        return not (self.security.insecure or is_loopback(address))
 
     def status_rules(self) -> Rules:
         """Returns what the status expects of each source; the mux inputs are shown last."""

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from common.errors import UserError
-from common.findings import Finding, good, note, wrong
+from common.findings import Finding, Verdict, good, note, wrong
 from gateway.access.command import credentials_command
 from gateway.access.credential import Validity
 from gateway.access.directory import CredentialDirectory
@@ -14,6 +14,7 @@ from gateway.access.reloader import TlsFiles, load_access
 from gateway.config import SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
 from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
+from gateway.doctor.video import video_finding
 
 
 def examine(config: Path | None) -> Iterator[Finding]:
@@ -33,7 +34,10 @@ def examine(config: Path | None) -> Iterator[Finding]:
     if access_files := settings.security.access_files():
         yield _access(*access_files)
     yield operator_endpoint(settings.grpc.host, settings.grpc.port)
-    yield preview_endpoint(settings.preview.socket)
+    preview = preview_endpoint(settings.preview.socket)
+    yield preview
+    if preview.verdict is Verdict.GOOD:
+        yield video_finding(settings)
     yield from device_findings()
     yield from _ros(settings.sources)
 

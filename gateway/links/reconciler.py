@@ -49,6 +49,9 @@ class Model(Protocol[SpecT, ReportT, ViewT]):
     def adopt(self, spec: SpecT, report: ReportT) -> tuple[SpecT, bool]:
         """Returns the spec that continues what the service does, and whether it must be applied for that."""
 
+    def adapt(self, spec: SpecT, report: ReportT) -> SpecT:
+        """Returns the spec with what depends on the service's setup; called with each request and report."""
+
     def take_report(self, spec: SpecT, report: ReportT, *, reapplying: bool) -> None:
         """Called with each report; `reapplying` if the service has lost a spec that had been applied."""
 
@@ -100,6 +103,8 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
     def request(self, spec: SpecT, request_id: str = "") -> Desired[SpecT]:
         """Replaces the desired state; returns it with its revision."""
         revision = max(self.desired.revision, self._applied_revision()) + 1
+        if self.report:
+            spec = self._model.adapt(spec, self.report.value)
         self.desired = Desired(revision, spec, request_id)
         self._owned, self._applied_once, self._attempted = True, False, False
         self._update_view()
@@ -115,6 +120,7 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
             self._adopt(report)
         elif report.applied_revision > self.desired.revision:
             self.desired = replace(self.desired, revision=report.applied_revision + 1)
+        self._adapt(report)
         in_force = report.applied_revision == self.desired.revision
         self._applied_once = self._applied_once or in_force
         self._model.take_report(self.desired.spec, report, reapplying=self._applied_once and not in_force)
@@ -155,6 +161,15 @@ class Reconciler(Generic[SpecT, ReportT, ViewT]):
         revision = report.applied_revision
         self.desired = Desired(revision + 1 if must_be_applied else revision, spec)
         self._owned = True
+
+    def _adapt(self, report: ReportT) -> None:
+        """Adapts the desired state to a service that may have been set up differently before."""
+        spec, revision = self._model.adapt(self.desired.spec, report), self.desired.revision
+        if spec != self.desired.spec:
+            # A service ignores another spec of a revision that it has applied. Otherwise the revision stays,
+            # for those who wait until it settles.
+            applied = report.applied_revision == revision
+            self.desired = replace(self.desired, revision=revision + 1 if applied else revision, spec=spec)
 
     def _is_outdated(self, report: ReportT) -> bool:
         """Whether the reply to a request, which came by another call, has overtaken this report."""

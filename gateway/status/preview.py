@@ -33,10 +33,15 @@ class Codec(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """The SRT listener for viewers: UDP port, and latency as SRTO_RCVLATENCY in ms."""
+    """The SRT listener for viewers: UDP port, and latency as SRTO_RCVLATENCY in ms.
+
+    Attributes:
+        address: where viewers reach it; empty if an older preview service does not report it.
+    """
 
     port: int
     latency_ms: int
+    address: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,9 @@ class LampModel:
     def adopt(self, spec: LampSpec, report: LampReport) -> tuple[LampSpec, bool]:  # noqa: ARG002  # the protocol's
         return LampSpec(report.percent), False
 
+    def adapt(self, spec: LampSpec, report: LampReport) -> LampSpec:  # noqa: ARG002  # the protocol's
+        return spec
+
     def take_report(self, spec: LampSpec, report: LampReport, *, reapplying: bool) -> None:
         pass
 

@@ -65,7 +65,7 @@ class PreviewDouble(PreviewServiceServicer):
         self.actual = pb.ActualState(
             instance_id=uuid.uuid4().hex,
             state=pb.LIFECYCLE_STATE_DISABLED,
-            listener=pb.Listener(port=7100, latency_ms=125),
+            listener=pb.Listener(port=7100, latency_ms=125, address="127.0.0.1"),
         )
         if behaviour is Behaviour.REPORTS_AN_UNKNOWN_STATE:
             self.actual.state = 42  # type: ignore[assignment]  # the point of it

@@ -1,11 +1,10 @@
 """Answers to operators who switch the preview."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gateway.links.link import ServiceLink
-from gateway.links.preview.model import PreviewModel
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.status.preview import PreviewState, PreviewView, Profile
 
@@ -25,7 +24,6 @@ class PreviewControl:
     """
 
     link: PreviewLink
-    model: PreviewModel
     settle_s: float
 
     async def set_mode(self, *, enabled: bool, profile: Profile | None, remaining_s: float | None) -> str:
@@ -46,7 +44,7 @@ class PreviewControl:
             return f"preview is already running, {spec.profile_name}; nothing changed"
         # The same request again makes a faulted preview retry at once.
         if not same or (enabled and state is PreviewState.FAULTED):
-            desired = self.link.request(self.model.spec(spec, enabled=enabled, profile=profile))
+            desired = self.link.request(spec.switched(enabled=enabled, profile=profile))
         patience_s = self.settle_s
         if remaining_s is not None:
             patience_s = max(0.0, min(patience_s, remaining_s - DEADLINE_MARGIN_S))
@@ -65,8 +63,7 @@ class PreviewControl:
         spec = self.link.desired.spec
         if spec.passphrase:
             _log.info("preview: a caller has lost access; the stream gets a new passphrase")
-            no_passphrase = PreviewSpec(enabled=True, profile=spec.profile)
-            self.link.request(self.model.spec(no_passphrase, enabled=True, profile=None))
+            self.link.request(replace(spec, passphrase=""))
 
 
 def _result(spec: PreviewSpec, view: PreviewView) -> str:

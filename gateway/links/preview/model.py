@@ -23,35 +23,34 @@ class PreviewModel:
     """A Model of the preview.
 
     Args:
-        new_passphrase: makes one per session; None if streams are not encrypted.
+        encrypts: whether the stream of a listener at this address has a passphrase.
+        new_passphrase: makes one per session.
     """
 
     initial: Final = PreviewSpec()
 
-    def __init__(self, new_passphrase: Callable[[], str] | None = None) -> None:
+    def __init__(self, encrypts: Callable[[str], bool], new_passphrase: Callable[[], str]) -> None:
+        self._encrypts = encrypts
         self._new_passphrase = new_passphrase
         self._totals = CounterTotals()
         self._state = PreviewState.DISABLED
 
-    def spec(self, last: PreviewSpec, *, enabled: bool, profile: Profile | None) -> PreviewSpec:
-        """Returns the spec of a request after `last`; without a profile `last`'s stays, else BALANCED."""
-        profile = profile or last.profile
-        if not enabled:
-            return PreviewSpec(enabled=False, profile=profile)
-        passphrase = last.passphrase if last.enabled else ""
-        if not passphrase and self._new_passphrase:
-            passphrase = self._new_passphrase()
-        return PreviewSpec(enabled=True, profile=profile or Profile.BALANCED, passphrase=passphrase)
-
     def adopt(self, spec: PreviewSpec, report: PreviewReport) -> tuple[PreviewSpec, bool]:
-        """Takes the running preview over; an encrypted one needs a passphrase that this gateway knows."""
+        """Takes the running preview over; applied again unless it is plain, as its passphrase is unknown."""
         enabled = report.state in _ENABLED
         # Before its first request the service reports its default profile, which no operator chose.
         chosen = report.profile if report.applied_revision else None
         spec = replace(spec, enabled=enabled, profile=chosen or spec.profile)
-        if enabled and self._new_passphrase:
-            return self.spec(spec, enabled=True, profile=None), True
-        return spec, False
+        plain = report.stream is not None and not report.stream.encrypted
+        return spec, enabled and not plain
+
+    def adapt(self, spec: PreviewSpec, report: PreviewReport) -> PreviewSpec:
+        """Gives an enabled preview a passphrase, or none, depending on where its listener is reached."""
+        address = report.listener.address if report.listener else ""
+        encrypted = spec.enabled and self._encrypts(address)
+        if encrypted == bool(spec.passphrase):
+            return spec
+        return replace(spec, passphrase=self._new_passphrase() if encrypted else "")
 
     def take_report(self, spec: PreviewSpec, report: PreviewReport, *, reapplying: bool) -> None:
         """Adds the counters to the totals."""

@@ -11,12 +11,24 @@ class PreviewSpec:
 
     Attributes:
         profile: None if none was ever chosen, which an enabled preview always has.
-        passphrase: of the session, from enable to disable; empty for a stream that is not encrypted.
+        passphrase: of the session, from enable to disable; empty for a stream that is not encrypted, and
+            until the service has reported where its listener is reached.
     """
 
     enabled: bool = False
     profile: Profile | None = None
     passphrase: str = field(default="", repr=False)
+
+    def switched(self, *, enabled: bool, profile: Profile | None) -> "PreviewSpec":
+        """Returns the spec of a request after this one.
+
+        Without a profile the present one stays, else BALANCED.
+        """
+        profile = profile or self.profile
+        if not enabled:
+            return PreviewSpec(enabled=False, profile=profile)
+        passphrase = self.passphrase if self.enabled else ""
+        return PreviewSpec(enabled=True, profile=profile or Profile.BALANCED, passphrase=passphrase)
 
     def __str__(self) -> str:
         return f"on, {self.profile_name}" if self.enabled else "off"

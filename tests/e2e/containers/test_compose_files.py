@@ -86,6 +86,19 @@ def test_the_preview_publishes_one_udp_port_and_reaches_nothing(overlay: str) ->
     assert options["com.docker.network.bridge.enable_ip_masquerade"] == "false"
 
 
+@pytest.mark.parametrize("overlay", OVERLAYS)
+@pytest.mark.parametrize("bind", ["", "127.0.0.1", "10.0.0.5", "[::1]"])
+def test_the_preview_knows_where_its_port_is_published(
+    overlay: str, bind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The gateway decides by it whether the stream is encrypted."""
+    monkeypatch.setenv("PREVIEW_BIND", bind)
+    services = config(overlay)["services"]
+    (port,) = services["preview"]["ports"]
+    address = services["preview"]["environment"]["PREVIEW__SRT__PUBLISHED_ON"]
+    assert address.strip("[]") == port["host_ip"]
+
+
 @pytest.mark.parametrize(
     ("overlay", "devices", "groups"),
     [

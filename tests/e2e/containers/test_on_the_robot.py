@@ -3,29 +3,99 @@
 import json
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
 import pytest
 
+from console.client import GatewayClient, PreviewState, Unreachable
+from console.client.results import StreamEndpoint
+from console.receiver.address import StreamAddress
+from console.receiver.errors import StreamRefusedError
 from tests.e2e.containers.deployment import Deployment, deployed
 from tests.support.helper import helper
+from tests.support.receiver import Receiver
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
+from tests.support.watcher import Watcher
 
 pytestmark = [pytest.mark.docker, pytest.mark.ros, pytest.mark.timeout(900)]
 
 
 @contextmanager
-def on_the_robot(directory: Path) -> Iterator[Deployment]:
+def on_the_robot(directory: Path, bind: str = "127.0.0.1") -> Iterator[Deployment]:
     """Gateway and preview in a ROS domain of their own that does not leave this machine."""
-    config = directory / "gateway.yaml"
     with deployed(
-        directory, up=False, GATEWAY_CONFIG=str(config), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST"
+        directory,
+        up=False,
+        GATEWAY_CONFIG=str(directory / "gateway.yaml"),
+        ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+        PREVIEW_BIND=bind,
     ) as deployment:
-        config.write_text(f"grpc: {{port: {deployment.gateway_port}}}\n", encoding="utf-8")
+        configure(directory, deployment)
         yield deployment
+
+
+def configure(directory: Path, deployment: Deployment, more: str = "") -> None:
+    """Writes the gateway's configuration."""
+    config = f"grpc: {{port: {deployment.gateway_port}}}\n{more}"
+    (directory / "gateway.yaml").write_text(config, encoding="utf-8")
+
+
+def stream_of(operator: GatewayClient) -> StreamEndpoint:
+    """Where to watch a preview that runs."""
+
+    def running() -> StreamEndpoint | None:
+        with suppress(Unreachable):
+            preview = operator.enable_preview().preview
+            return preview.endpoint if preview.state is PreviewState.RUNNING else None
+        return None
+
+    return wait_until(running, "the preview runs", 40)
+
+
+def plain_player_is_refused(port: int) -> bool:
+    with Receiver(StreamAddress("127.0.0.1", port)) as receiver:
+        try:
+            receiver.next_frame(timeout_s=20)
+        except StreamRefusedError as error:
+            return "passphrase" in str(error)
+        return False
+
+
+@pytest.mark.usefixtures("images")
+@pytest.mark.parametrize(
+    ("bind", "encrypted", "logged"),
+    [
+        ("0.0.0.0", True, "the video is encrypted; its listener is at 0.0.0.0"),  # noqa: S104  # the default
+        (
+            "127.0.0.1",
+            False,
+            "the video is not encrypted; only this machine reaches its listener at 127.0.0.1",
+        ),
+    ],
+)
+def test_the_published_address_decides_whether_the_video_is_encrypted(
+    tmp_path: Path, bind: str, encrypted: bool, logged: str
+) -> None:
+    """What docs/deploy.md says of PREVIEW_BIND, and of players without a passphrase."""
+    with on_the_robot(tmp_path, bind) as deployment, deployment.client() as operator:
+        deployment.compose.start()
+        stream = stream_of(operator)
+        assert (stream.encrypted, bool(stream.passphrase)) == (encrypted, encrypted)
+        with Watcher(deployment.preview_port, stream.passphrase) as watcher:
+            watcher.wait_for_frames(10)
+        assert plain_player_is_refused(deployment.preview_port) is encrypted
+        assert logged in deployment.logs("gateway")
+
+        configure(tmp_path, deployment, "preview: {encrypted: false}\n")
+        deployment.run("up", "--detach", "--force-recreate", "gateway")
+        wait_until(lambda: not stream_of(operator).encrypted, "the running preview is plain", 40)
+        with Watcher(deployment.preview_port) as watcher:
+            watcher.wait_for_frames(10)
+        warned = f"anyone who reaches its listener at {bind}" in deployment.logs("gateway")
+        assert warned is encrypted, "where other machines reach it"
 
 
 @pytest.mark.usefixtures("images")

@@ -2,8 +2,11 @@
 
 import asyncio
 import logging
+import os
 import socket
+import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -52,6 +55,96 @@ async def test_the_api_hands_out_what_opens_the_stream_and_no_log_does(
         assert len(passphrase) >= 10
         assert passphrase not in log
         assert passphrase not in caplog.text
+
+
+EVERYWHERE = {"bind": "0.0.0.0"}  # noqa: S104  # what this test is about
+
+
+@pytest.mark.parametrize(
+    ("srt", "settings", "encrypted", "logged"),
+    [
+        (EVERYWHERE, {}, True, "the video is encrypted; its listener is at 0.0.0.0, UDP port {}"),
+        (
+            EVERYWHERE,
+            {"preview": {"encrypted": False}},
+            False,
+            "the video is not encrypted; anyone who reaches its listener at 0.0.0.0, UDP port {} can watch "
+            "(preview.encrypted is false in the gateway's configuration)",
+        ),
+        (
+            EVERYWHERE,
+            {"security": {"insecure": True}},
+            False,
+            "anyone who reaches its listener at 0.0.0.0, UDP port {} can watch (security.insecure is set",
+        ),
+        ({}, {}, False, "the video is not encrypted; only this machine reaches its listener at 127.0.0.1"),
+        # As in a container: bound to all of its own addresses, and published on one of the machine's.
+        (EVERYWHERE | {"published_on": "127.0.0.1"}, {}, False, "only this machine reaches its listener"),
+        (EVERYWHERE | {"published_on": "10.0.0.5"}, {}, True, "its listener is at 10.0.0.5, UDP port {}"),
+    ],
+)
+async def test_without_credentials_the_listener_decides(
+    tmp_path: Path,
+    *,
+    srt: dict[str, str],
+    settings: dict[str, Any],
+    encrypted: bool,
+    logged: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    with RunningPreview(tmp_path, {"srt": srt}) as preview:
+        async with running_gateway(preview.socket, **settings) as operator:
+            await eventually(operator.status, lambda it: it.preview.service_reachable, "contact")
+            endpoint = (await operator.switch(True)).preview.endpoint
+            assert (endpoint.encrypted, bool(endpoint.passphrase)) == (encrypted, encrypted)
+            # As a caller in a tunnel, who has no credential.
+            assert (await operator.status()).preview.endpoint.passphrase == endpoint.passphrase
+            # Our own client, and a program that is not ours.
+            await asyncio.to_thread(watch, preview.port, endpoint.passphrase)
+            assert await asyncio.to_thread(plays, preview.port, endpoint.passphrase)
+            assert await asyncio.to_thread(plays, preview.port, "") is not encrypted
+        assert logged.format(preview.port) in caplog.text
+        assert f"viewers reach the listener at {srt.get('published_on', srt.get('bind', '127.0.0.1'))}" in (
+            preview.log.read_text(encoding="utf-8")
+        )
+
+
+async def test_what_was_requested_before_the_service_came_is_encrypted_as_well(tmp_path: Path) -> None:
+    async with running_gateway(tmp_path / "preview.sock") as operator:
+        reply = await operator.switch(True)
+        assert reply.preview.state == states.PREVIEW_FAULTED
+        with RunningPreview(tmp_path, {"srt": EVERYWHERE}) as preview:
+            assert preview.socket == tmp_path / "preview.sock"
+            status = await eventually(
+                operator.status, lambda it: it.preview.state == states.PREVIEW_RUNNING, "it runs"
+            )
+            assert status.preview.endpoint.encrypted
+            await asyncio.to_thread(watch, preview.port, status.preview.endpoint.passphrase)
+            assert not await asyncio.to_thread(plays, preview.port, "")
+
+
+def plays(port: int, passphrase: str) -> bool:
+    """Whether ffmpeg gets pictures."""
+    address = f"srt://127.0.0.1:{port}?mode=caller"
+    command = [
+        "ffmpeg",
+        "-v",
+        "error",
+        "-nostdin",
+        "-i",
+        f"{address}&passphrase={passphrase}" if passphrase else address,
+    ]
+    # The libraries of the ROS wheels don't concern foreign programs.
+    environment = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
+    done = subprocess.run(
+        [*command, "-frames:v", str(PICTURES), "-f", "null", "-"],
+        env=environment,
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    return done.returncode == 0
 
 
 def offered_key_bytes(port: int) -> int:

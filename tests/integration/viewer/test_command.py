@@ -65,6 +65,17 @@ def test_the_json_has_exactly_the_documented_keys(running: VideoGround, tmp_path
     assert decoded_frames(file) >= 20
 
 
+def test_a_stream_on_the_network_is_encrypted_and_opens_without_a_login(tmp_path: Path) -> None:
+    """As through a tunnel to a robot without credentials."""
+    with video_ground(tmp_path, {"srt": {"bind": "0.0.0.0"}}) as ground:  # noqa: S104  # what this test is about
+        ground.switch_on()
+        status = json.loads(robotctl_process("--target", ground.target, "--json", "status").stdout)
+        assert status["preview"]["endpoint"]["encrypted"]
+        assert "passphrase" not in status["preview"]["endpoint"]
+        done = robotctl_process("--target", ground.target, "view", "--headless", "--frames", "20")
+        assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_it_ends_cleanly_on_a_signal(running: VideoGround, tmp_path: Path) -> None:
     file = tmp_path / "kept.ts"
     command = [str(ROBOTCTL), "--target", running.target, "view", "--headless", "--record", str(file)]

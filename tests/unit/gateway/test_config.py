@@ -139,16 +139,32 @@ def test_half_a_guard_is_none(tmp_path: Path, text: str, words: str) -> None:
     assert words in str(seen.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "encrypted"),
-    [
-        ("{}", False),
-        ("{security: {credentials: /c}}", True),
-        ("{security: {credentials: /c}, preview: {encrypted: false}}", False),
-        ("{preview: {encrypted: true}}", True),
-    ],
-)
-def test_where_callers_are_known_the_video_is_theirs_alone(
-    tmp_path: Path, text: str, encrypted: bool
+# Who is asked for a credential, what the owner accepts and asks for; then whether the stream of a listener on
+# loopback, and of one that other machines reach, is encrypted.
+ENCRYPTION = [
+    ("{}", False, True),
+    ("{security: {insecure: true}}", False, False),
+    ("{grpc: {host: 0.0.0.0}, security: {insecure: true}}", False, False),
+    ("{security: {credentials: /c}}", True, True),
+    ("{security: {credentials: /c, tls: {enabled: false}}}", True, True),
+    ("{security: {credentials: /c, insecure: true}}", True, True),
+    ("{grpc: {host: 0.0.0.0}, security: {credentials: /c}}", True, True),
+    ("{preview: {encrypted: true}}", True, True),
+    ("{preview: {encrypted: true}, security: {insecure: true}}", True, True),
+    ("{preview: {encrypted: true}, security: {credentials: /c}}", True, True),
+    ("{preview: {encrypted: false}}", False, False),
+    ("{preview: {encrypted: false}, security: {insecure: true}}", False, False),
+    ("{preview: {encrypted: false}, security: {credentials: /c}}", False, False),
+]
+LOOPBACK = ("127.0.0.1", "127.3.2.1", "::1", "[::1]", "localhost")
+# An empty address is that of a service that does not report it.
+REACHED = ("0.0.0.0", "::", "10.0.0.5", "fe80::1", "robot.local", "::ffff:10.0.0.5", "")  # noqa: S104  # data
+
+
+@pytest.mark.parametrize(("text", "on_loopback", "beyond"), ENCRYPTION)
+def test_the_video_is_encrypted_where_others_reach_it_unless_that_is_accepted(
+    tmp_path: Path, text: str, on_loopback: bool, beyond: bool
 ) -> None:
-    assert load(tmp_path, text).preview_encrypted is encrypted
+    settings = load(tmp_path, text)
+    assert {settings.encrypts_preview(address) for address in LOOPBACK} == {on_loopback}
+    assert {settings.encrypts_preview(address) for address in REACHED} == {beyond}

@@ -3,6 +3,7 @@
 import os
 import socket
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,9 +11,13 @@ from common.findings import Finding, Verdict
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
+from gateway.config import GatewaySettings
 from gateway.doctor.devices import device_findings
 from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
 from gateway.doctor.examination import examine
+from gateway.links.preview.exposure import video_exposure
+from gateway.status.preview import Listener
+from tests.support.preview_double import Behaviour, double_process
 
 
 def test_a_configuration_that_is_wrong_ends_it(tmp_path: Path) -> None:
@@ -99,3 +104,45 @@ def test_credentials_are_looked_at_as_the_gateway_does(tmp_path: Path) -> None:
     assert access_of(tmp_path).what.startswith("valid credentials: 1; the certificate is valid until 2")
     (tmp_path / "c/server-key.pem").write_text("no key", encoding="utf-8")
     assert access_of(tmp_path).verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    ("security", "preview", "address", "verdict", "words"),
+    [
+        ({}, {}, "0.0.0.0", Verdict.GOOD, "is encrypted; its listener is at 0.0.0.0, UDP port 7100"),  # noqa: S104  # data
+        ({}, {}, "::", Verdict.GOOD, "is encrypted; its listener is at [::], UDP port 7100"),
+        ({}, {}, "", Verdict.GOOD, "is encrypted; its listener is at an unknown address, UDP port 7100"),
+        ({}, {}, "127.0.0.1", Verdict.GOOD, "is not encrypted; only this machine reaches"),
+        ({}, {"encrypted": True}, "127.0.0.1", Verdict.GOOD, "is encrypted"),
+        ({}, {"encrypted": False}, "127.0.0.1", Verdict.GOOD, "is not encrypted; only this machine reaches"),
+        ({}, {"encrypted": False}, "10.0.0.5", Verdict.NOTE, "preview.encrypted is false"),
+        ({"insecure": True}, {}, "10.0.0.5", Verdict.NOTE, "security.insecure is set"),
+        ({"insecure": True}, {"encrypted": False}, "10.0.0.5", Verdict.NOTE, "preview.encrypted is false"),
+        ({"credentials": "/c"}, {"encrypted": False}, "10.0.0.5", Verdict.NOTE, "preview.encrypted is false"),
+    ],
+)
+def test_whether_the_video_is_encrypted(
+    *, security: dict[str, Any], preview: dict[str, Any], address: str, verdict: Verdict, words: str
+) -> None:
+    settings = GatewaySettings.model_validate({"security": security, "preview": preview})
+    finding = video_exposure(settings, Listener(7100, 125, address))
+    assert finding.verdict is verdict
+    assert words in f"{finding.what} ({finding.why})"
+    if verdict is not Verdict.GOOD:
+        assert "PREVIEW_BIND=127.0.0.1" in finding.remedy
+
+
+@pytest.mark.parametrize("behaviour", ["works", "reports-an-unknown-state"])
+def test_the_doctor_asks_the_service_where_its_listener_is(tmp_path: Path, behaviour: str) -> None:
+    config, socket_path = tmp_path / "gateway.yaml", tmp_path / "preview.sock"
+    config.write_text(f"{{sources: [], preview: {{socket: {socket_path}}}}}", encoding="utf-8")
+    assert "video" not in {finding.check for finding in examine(config)}, "there is nothing to ask"
+    with double_process(socket_path, Behaviour(behaviour)):
+        (finding,) = (each for each in examine(config) if each.check == "video")
+    if behaviour == "works":
+        assert finding.what == (
+            "the video is not encrypted; only this machine reaches its listener at 127.0.0.1, UDP port 7100"
+        )
+    else:
+        assert finding.verdict is Verdict.NOTE
+        assert "unknown state" in finding.what

@@ -119,7 +119,7 @@ class PreviewOverGrpc(Ground):
         return ServiceLink(
             "preview",
             PreviewConnector(self._socket),
-            Reconciler(1000, PreviewModel()),
+            Reconciler(1000, PreviewModel(lambda _address: False, str)),
             silence_s=SILENCE_S,
             apply_deadline_s=APPLY_DEADLINE_S,
         )

@@ -219,19 +219,25 @@ class Listener(_message.Message):
 
     PORT_FIELD_NUMBER: _builtins.int
     LATENCY_MS_FIELD_NUMBER: _builtins.int
+    ADDRESS_FIELD_NUMBER: _builtins.int
     port: _builtins.int
     """UDP port."""
     latency_ms: _builtins.int
     """SRT latency in ms (SRTO_LATENCY)."""
+    address: _builtins.str
+    """Address on which viewers reach it: where it is bound, or where the port of its container is
+    published. The gateway encrypts by default unless this is loopback; empty counts as any address.
+    """
     def __init__(
         self,
         *,
         port: _builtins.int = ...,
         latency_ms: _builtins.int = ...,
+        address: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["latency_ms", b"latency_ms", "port", b"port"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["address", b"address", "latency_ms", b"latency_ms", "port", b"port"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -21,12 +21,12 @@ class Ground:
     """A preview whose service reports what the test says; no connection is made."""
 
     def __init__(self) -> None:
-        model = PreviewModel()
+        model = PreviewModel(lambda _address: True, lambda: "made-up-passphrase")
         self.reconciler: PreviewReconciler = Reconciler(1000, model)
         self.link: PreviewLink = ServiceLink(
             "preview", PreviewConnector(Path("/nonexistent")), self.reconciler
         )
-        self.control = PreviewControl(self.link, model, settle_s=5.0)
+        self.control = PreviewControl(self.link, settle_s=5.0)
 
     def report(self, state: PreviewState, *, applied: bool = True, last_error: str = "") -> None:
         desired = self.link.desired
@@ -110,11 +110,11 @@ async def test_the_robot_does_not_keep_trying_what_its_service_refuses(ground: G
 
 
 def test_a_new_passphrase_is_logged_as_such(ground: Ground, caplog: pytest.LogCaptureFixture) -> None:
-    encrypted = PreviewSpec(enabled=True, profile=Profile.BALANCED, passphrase="old")
-    ground.link.request(encrypted)
+    ground.link.request(PreviewSpec(enabled=True, profile=Profile.BALANCED, passphrase="old"))
     with caplog.at_level(logging.INFO):
         ground.control.renew_passphrase()
     assert "new passphrase" in caplog.text
+    assert ground.link.desired.spec.passphrase == "made-up-passphrase"
 
 
 async def test_another_profile_is_a_new_request(ground: Ground) -> None:

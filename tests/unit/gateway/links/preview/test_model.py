@@ -1,9 +1,9 @@
 """The preview's rows of the failure table of gateway.links, and a random walk against its invariants."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +17,7 @@ from gateway.status.preview import Counters, Listener, Measurement, PreviewState
 from gateway.status.preview import PreviewState as S
 
 FIRST = 1000
+LOOPBACK, ELSEWHERE = "127.0.0.1", "10.0.0.5"
 STREAM = Stream(1280, 720, 30.0, 2500, None, False, "")
 
 
@@ -30,6 +31,8 @@ def report(
     faults: int = 0,
     error: str = "",
     measurement: Measurement | None = None,
+    address: str | None = LOOPBACK,
+    encrypted: bool = False,
 ) -> PreviewReport:
     return PreviewReport(
         instance_id=instance,
@@ -37,8 +40,8 @@ def report(
         state=state,
         profile=profile,
         last_error=error,
-        listener=Listener(7100, 125),
-        stream=STREAM if state is S.RUNNING else None,
+        listener=None if address is None else Listener(7100, 125, address),
+        stream=replace(STREAM, encrypted=encrypted) if state is S.RUNNING else None,
         encoder=None,
         measurement=measurement,
         counters=Counters(starts=starts, faults=faults),
@@ -48,23 +51,23 @@ def report(
 class Preview(PreviewReconciler):
     """A reconciler of the preview, whose requests are worded as operators word them."""
 
-    def __init__(self, new_passphrase: Callable[[], str] | None = None) -> None:
-        self.model = PreviewModel(new_passphrase)
+    def __init__(self) -> None:
+        numbers = iter(range(10))
+        self.model = PreviewModel(lambda address: address != LOOPBACK, lambda: f"passphrase-{next(numbers)}")
         super().__init__(FIRST, self.model)
 
     def switch(self, enabled: bool, profile: Profile | None = None) -> Desired[PreviewSpec]:
-        return self.request(self.model.spec(self.desired.spec, enabled=enabled, profile=profile))
+        return self.request(self.desired.spec.switched(enabled=enabled, profile=profile))
 
 
-def numbered_passphrases() -> Callable[[], str]:
-    numbers = iter(range(10))
-    return lambda: f"passphrase-{next(numbers)}"
-
-
-def connected() -> Preview:
+def connected(address: str | None = LOOPBACK) -> Preview:
     preview = Preview()
-    preview.take_report(report(), 0.0)
+    preview.take_report(report(address=address), 0.0)
     return preview
+
+
+def control_of(preview: Preview) -> PreviewControl:
+    return PreviewControl(ServiceLink("preview", PreviewConnector(Path("/nonexistent")), preview), 1.0)
 
 
 def running(preview: Preview) -> Desired[PreviewSpec]:
@@ -177,10 +180,58 @@ def test_a_restarted_gateway_adopts_the_running_preview_and_changes_nothing() ->
     assert pending.spec.enabled
 
 
-def test_a_restarted_gateway_with_encryption_starts_a_new_session() -> None:
-    preview = Preview(lambda: "made-up-passphrase")
-    preview.take_report(report(S.RUNNING, 77, profile=Profile.LOW_BW), 0.0)
-    assert preview.pending() == Desired(78, PreviewSpec(True, Profile.LOW_BW, "made-up-passphrase"))
+@pytest.mark.parametrize("encrypted", [False, True])
+def test_a_restarted_gateway_with_encryption_starts_a_new_session(encrypted: bool) -> None:
+    preview = Preview()
+    adopted = report(S.RUNNING, 77, profile=Profile.LOW_BW, address=ELSEWHERE, encrypted=encrypted)
+    preview.take_report(adopted, 0.0)
+    assert preview.pending() == Desired(78, PreviewSpec(True, Profile.LOW_BW, "passphrase-0"))
+
+
+@pytest.mark.parametrize("state", [S.RUNNING, S.STARTING, S.FAULTED])
+def test_a_restarted_gateway_without_encryption_opens_the_session_of_one_with_it(state: PreviewState) -> None:
+    preview = Preview()
+    preview.take_report(report(state, 77, profile=Profile.LOW_BW, encrypted=True), 0.0)
+    assert preview.pending() == Desired(78, PreviewSpec(True, Profile.LOW_BW))
+
+
+@pytest.mark.parametrize("address", [ELSEWHERE, "", None])
+def test_what_is_asked_for_before_the_first_contact_is_encrypted_by_where_the_listener_turns_out_to_be(
+    address: str | None,
+) -> None:
+    preview = Preview()
+    desired = preview.switch(True, Profile.LOW_BW)
+    assert desired.spec.passphrase == ""
+    preview.take_report(report(address=address), 0.0)
+    # Under the revision that its caller waits for.
+    expected = PreviewSpec(True, Profile.LOW_BW, "passphrase-0")
+    assert preview.pending() == Desired(desired.revision, expected)
+
+
+def test_a_service_that_comes_back_on_other_addresses_never_gets_the_plain_session() -> None:
+    preview = connected()
+    desired = running(preview)
+    preview.take_loss("gone")
+    preview.take_report(report(instance="b", address=ELSEWHERE), 2.0)
+    pending = preview.pending()
+    assert pending
+    assert pending.spec == PreviewSpec(True, Profile.LOW_BW, "passphrase-0")
+    preview.take_report(report(S.RUNNING, pending.revision, instance="b", address=ELSEWHERE), 3.0)
+    preview.take_loss("gone")
+    preview.take_report(report(instance="c"), 4.0)
+    pending = preview.pending()
+    assert pending
+    assert pending.spec == desired.spec, "on loopback again, it is plain again"
+
+
+def test_the_same_process_with_another_listener_gets_a_revision_of_its_own() -> None:
+    preview = connected()
+    desired = running(preview)
+    preview.take_report(report(S.RUNNING, desired.revision, address=ELSEWHERE), 2.0)
+    pending = preview.pending()
+    assert pending
+    assert pending.revision == desired.revision + 1
+    assert pending.spec.passphrase == "passphrase-0"
 
 
 def test_a_switch_has_settled_only_when_the_stream_has_the_new_profile() -> None:
@@ -216,10 +267,8 @@ def test_figures_stay_while_the_service_is_unreachable_and_go_with_the_preview()
 
 
 def test_a_running_session_gets_another_passphrase_and_stays_as_it_is() -> None:
-    preview = Preview(numbered_passphrases())
-    control = PreviewControl(
-        ServiceLink("preview", PreviewConnector(Path("/nonexistent")), preview), preview.model, 1.0
-    )
+    preview = connected(ELSEWHERE)
+    control = control_of(preview)
     untouched = preview.desired
     control.renew_passphrase()
     assert preview.desired is untouched, "nothing runs"
@@ -233,16 +282,14 @@ def test_a_running_session_gets_another_passphrase_and_stays_as_it_is() -> None:
 
 
 def test_a_session_without_encryption_has_no_passphrase_to_renew() -> None:
-    preview = Preview()
+    preview = connected()
     desired = preview.switch(True)
-    PreviewControl(
-        ServiceLink("preview", PreviewConnector(Path("/nonexistent")), preview), preview.model, 1.0
-    ).renew_passphrase()
+    control_of(preview).renew_passphrase()
     assert preview.desired is desired
 
 
 def test_a_passphrase_lasts_for_a_session_and_shows_in_no_text() -> None:
-    preview = Preview(numbered_passphrases())
+    preview = connected(ELSEWHERE)
     first = preview.switch(True, Profile.LOW_BW)
     switched = preview.switch(True, Profile.HIGH_QUALITY)
     off = preview.switch(False)
@@ -263,9 +310,13 @@ LOSSES = st.tuples(st.just("loss"), st.none(), st.none())
 
 @given(steps=st.lists(REQUESTS | REPORTS | LOSSES, max_size=40))
 def test_the_view_agrees_with_every_history(steps: list[tuple[str, object, object]]) -> None:
-    """Revisions and counts only grow; without contact the preview reads faulted if it shall run."""
+    """Revisions and counts only grow; without contact the preview reads faulted if it shall run.
+
+    The listener of process b is reached from other machines: it is never sent a stream without a passphrase.
+    """
     preview, reachable = Preview(), False
-    applied = {"a": 0, "b": 0}
+    applied, addresses = {"a": 0, "b": 0}, {"a": LOOPBACK, "b": ELSEWHERE}
+    sent: dict[tuple[str, int], PreviewSpec] = {}
     previous = preview.view
     for kind, first, second in steps:
         revision = preview.desired.revision
@@ -275,10 +326,14 @@ def test_the_view_agrees_with_every_history(steps: list[tuple[str, object, objec
         elif kind == "report":
             assert isinstance(first, str)
             assert isinstance(second, PreviewState)
-            preview.take_report(report(second, applied[first], instance=first), 0.0)
+            preview.take_report(report(second, applied[first], instance=first, address=addresses[first]), 0.0)
             pending = preview.pending()
             if pending:
                 applied[first] = pending.revision
+                assert bool(pending.spec.passphrase) == (pending.spec.enabled and first == "b")
+                assert sent.setdefault((first, pending.revision), pending.spec) == pending.spec
+            elif first == "b":
+                assert bool(preview.desired.spec.passphrase) == preview.desired.spec.enabled
             reachable = True
         else:
             preview.take_loss("gone")

@@ -129,7 +129,7 @@ def everything() -> Snapshot:
         profile=Profile.LOW_BW,
         last_error="what went wrong",
         service_reachable=True,
-        listener=Listener(7100, 125),
+        listener=Listener(7100, 125, "127.0.0.1"),
         stream=Stream(1280, 720, 15.0, 1000, Codec.H265, True, "RTT 180 ms"),
         encoder=Encoder("x264", True, "mpp-h265", "no such element"),
         measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),

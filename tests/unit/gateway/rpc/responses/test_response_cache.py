@@ -19,7 +19,15 @@ class World:
     def __init__(self) -> None:
         self.now_s, self.taken = 100.0, 0
         self.preview = PreviewView(
-            PreviewState.DISABLED, None, "", True, Listener(7100, 125), None, None, None, Counters()
+            PreviewState.DISABLED,
+            None,
+            "",
+            True,
+            Listener(7100, 125, "127.0.0.1"),
+            None,
+            None,
+            None,
+            Counters(),
         )
         self.cache = ResponseCache(self, lambda: self.now_s)
 

@@ -1,0 +1,25 @@
+"""Who can watch the stream, by where its listener is reached and whether it is encrypted."""
+
+from common.bind import bracketed
+from common.findings import Finding, good, note
+from gateway.config import GatewaySettings, is_loopback
+from gateway.status.preview import Listener
+
+
+def video_exposure(settings: GatewaySettings, listener: Listener) -> Finding:
+    """Returns a finding for the log and the doctor: a note if anyone may watch."""
+    at = f"{bracketed(listener.address) or 'an unknown address'}, UDP port {listener.port}"
+    if settings.encrypts_preview(listener.address):
+        return good("video", f"the video is encrypted; its listener is at {at}")
+    if is_loopback(listener.address):
+        return good("video", f"the video is not encrypted; only this machine reaches its listener at {at}")
+    cause = (
+        "preview.encrypted is false" if settings.preview.encrypted is False else "security.insecure is set"
+    )
+    return note(
+        "video",
+        f"the video is not encrypted; anyone who reaches its listener at {at} can watch",
+        f"{cause} in the gateway's configuration",
+        "Remove that setting, or let this machine alone reach the listener: 'srt: {bind: 127.0.0.1}' in the "
+        "preview's configuration, with containers PREVIEW_BIND=127.0.0.1 in .env",
+    )
