@@ -103,10 +103,10 @@ class Runner:
         target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
-        elements, framing = self._parts.adjustable, self._framing
+        apply_target, framing = self._parts.apply_target, self._framing
 
         def apply() -> None:
-            builder.apply_target(elements, plan)
+            apply_target(plan)
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
