@@ -48,6 +48,8 @@ class Row:
     style: SeverityStyle
     text: str
     age: str = ""
+    remedy: str = ""
+    """What to do about a fault, where the text does not say it."""
 
 
 @dataclass(frozen=True, slots=True)
