@@ -21,6 +21,7 @@ from console.window.labels import (
     set_tool_tip,
     width_of,
 )
+from console.window.layout import fill
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 
 _LONGEST_AGE = "59 min 00 s"
@@ -78,9 +79,7 @@ class LineList(QWidget, Generic[LineT]):
         self._line = line
         self._lines: list[LineT] = []
         self._shown = 0
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(2)
+        self._layout = fill(QVBoxLayout(self), spacing=2)
 
     @property
     def shown(self) -> Sequence[LineT]:

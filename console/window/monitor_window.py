@@ -17,6 +17,7 @@ from console.presentation.preview_switch import PROFILES
 from console.window.handover import ThreadHandover
 from console.window.header import ConnectionBanner, Header
 from console.window.keys import bind_keys
+from console.window.layout import fill
 from console.window.plot import Plots
 from console.window.preview_panel import PreviewPanel
 from console.window.side_panel import SidePanel
@@ -78,11 +79,7 @@ class MonitorWindow(QWidget):
 
     def _lay_out(self) -> None:
         left = QWidget()
-        column = QVBoxLayout(left)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.video, 1)
-        column.addWidget(self.preview)
-        column.addWidget(self.plots)
+        fill(QVBoxLayout(left), (self.video, 1), self.preview, self.plots)
         self.splitter.addWidget(left)
         self.splitter.addWidget(self.side)
         self.splitter.setChildrenCollapsible(False)

@@ -10,6 +10,7 @@ from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from console.window.event_list import EventList
 from console.window.labels import set_bold, set_text
+from console.window.layout import fill
 from console.window.lines import LineList, StatusLine
 
 _MIN_WIDTH_CHARS = 34
@@ -26,11 +27,7 @@ class SidePanel(QWidget):
         self.faults = LineList(lambda: StatusLine("", "warning", bold=True))
         self.components = LineList(lambda: StatusLine("Computer battery", "no data"))
         self.events = EventList()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._scrolled(), 4)
-        layout.addWidget(_heading("Events"))
-        layout.addWidget(self.events, 1)
+        fill(QVBoxLayout(self), (self._scrolled(), 4), _heading("Events"), (self.events, 1))
 
     def show_state(self, state: MonitorState, now_s: float) -> None:
         """Shows the latest state."""
@@ -46,11 +43,8 @@ class SidePanel(QWidget):
 
     def _scrolled(self) -> QScrollArea:
         inner = QWidget()
-        column = QVBoxLayout(inner)
-        column.setContentsMargins(0, 0, 4, 0)
-        for part in (self.faults_title, self.faults, self.status_title, self.components):
-            column.addWidget(part)
-        column.addStretch(1)
+        parts = (self.faults_title, self.faults, self.status_title, self.components)
+        fill(QVBoxLayout(inner), *parts, margins=(0, 0, 4, 0)).addStretch(1)
         scroll = QScrollArea()
         scroll.setWidget(inner)
         scroll.setWidgetResizable(True)
