@@ -12,7 +12,6 @@ from console.client.mapping.methods import (
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
     DesiredPreview,
-    WatchRequest,
 )
 from console.client.options import ClientOptions
 from console.client.streams import Outage, Streams
@@ -123,7 +122,7 @@ class AsyncGatewayClient:
         Raises:
             GatewayError: No gateway answers at the beginning, or it refuses; not for a later outage.
         """
-        return self._streams.status(WatchRequest(min_interval_s, include_detections))
+        return self._streams.status(min_interval_s, include_detections=include_detections)
 
     def events(
         self,

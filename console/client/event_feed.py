@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from console.client.mapping.methods import EventsRequest
+from console.client.mapping.methods import events_request
 from console.client.results import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, GapReason
 
 
@@ -20,9 +20,9 @@ class EventFeed:
         self.position = after
         self._least = least
 
-    def request(self) -> EventsRequest:
+    def request(self) -> bytes:
         """Returns the request that resumes at the present position."""
-        return EventsRequest(self.position, self._least)
+        return events_request(self.position, self._least)
 
     def take(self, item: Event | EventGap | CaughtUp | None) -> Iterator[Event | EventGap | CaughtUp]:
         """Yields the item unless it is a duplicate, preceded by a gap where events are missing before it."""
