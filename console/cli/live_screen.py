@@ -15,7 +15,7 @@ from console.cli.tables import STYLES, headline, rows_table
 from console.client import GatewayError, SystemStatus
 from console.presentation.formatting import age, plural
 from console.presentation.preview_switch import Note
-from console.presentation.status_table import status_rows
+from console.presentation.status_table import View, table_rows
 
 _GAP: Final = "   "
 
@@ -73,7 +73,7 @@ def live_view(
         outage = Text.assemble((old, "bold red"), f" - {update.error.what}")
     return Fitted(
         Group(headline(update.status, target), outage, Text()),
-        rows_table(status_rows(update.status)),
+        rows_table(table_rows(View(update.status))),
         Group(Text(message.text, style=STYLES[message.style]) if message else Text(), _help(keys)),
     )
 

@@ -4,7 +4,7 @@ from console.client.results import Fault
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import age
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
-from console.presentation.status_table import Density, Row, View, table_rows
+from console.presentation.status_table import Row, View, table_rows
 
 
 def fault_rows(state: MonitorState, now_s: float) -> list[Row]:
@@ -19,9 +19,14 @@ def component_rows(state: MonitorState, now_s: float) -> list[Row]:
     """Returns the compact table of the status; empty before the first snapshot."""
     if state.snapshot is None:
         return []
-    snapshot, age_ms = state.snapshot, state.snapshot_age_ms(now_s)
-    outdated = state.outdated(now_s)
-    return table_rows(View(snapshot.status, Density.COMPACT, snapshot.detections, age_ms, outdated))
+    view = View(
+        state.snapshot.status,
+        compact=True,
+        detections=state.snapshot.detections,
+        silent_ms=state.snapshot_age_ms(now_s),
+        outdated=state.outdated(now_s),
+    )
+    return table_rows(view)
 
 
 def _fault_row(fault: Fault, snapshot_age_ms: int) -> Row:
