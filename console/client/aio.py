@@ -5,7 +5,7 @@ from typing import Self
 
 from console.client import results
 from console.client.clock import Clock, Offset
-from console.client.credentials import NO_CREDENTIALS, Credentials
+from console.client.credentials import Credentials
 from console.client.event_feed import EventFeed
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
@@ -49,7 +49,7 @@ class AsyncGatewayClient:
         options = options or ClientOptions()
         self.target = parse_target(target)
         self.clock = Clock()
-        self._transport = GrpcTransport(self.target, options, credentials or NO_CREDENTIALS)
+        self._transport = GrpcTransport(self.target, options, credentials or Credentials())
         self._calls = UnaryCalls(self._transport, options)
         self._streams = Streams(self._transport, options)
 

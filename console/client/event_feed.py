@@ -50,13 +50,9 @@ class EventFeed:
             return None
         run_id, before = item.position.run_id, item.position.sequence - 1
         if run_id != here.run_id:
-            return EventGap(
-                reason=GapReason.NEW_RUN, missed_count=before, position=EventPosition(run_id, before)
-            )
-        if self._least is FaultSeverity.UNKNOWN and before > here.sequence:
-            return EventGap(
-                reason=GapReason.UNKNOWN,
-                missed_count=before - here.sequence,
-                position=EventPosition(run_id, before),
-            )
-        return None
+            reason, missed = GapReason.NEW_RUN, before
+        elif self._least is FaultSeverity.UNKNOWN and before > here.sequence:
+            reason, missed = GapReason.UNKNOWN, before - here.sequence
+        else:
+            return None
+        return EventGap(reason=reason, missed_count=missed, position=EventPosition(run_id, before))
