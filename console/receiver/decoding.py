@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from common.errors import UserError
-from common.gst import Gst, GstVideo
+from common.gst import Gst, GstVideo, stop_element
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
@@ -99,8 +99,7 @@ class DecodingBranch:
         """Stops and removes the branch. Not on a GStreamer thread."""
         self._sink.disconnect(self._handler)
         for one in self._elements:
-            one.set_locked_state(True)
-            one.set_state(Gst.State.NULL)
+            stop_element(one)
             pipeline.remove(one)
 
     def owns(self, element: Any) -> bool:
