@@ -70,6 +70,12 @@ class InvalidRequestError(DomainError):
         self.violations = violations
 
 
+class DefectError(DomainError):
+    """A defect of ours; the log has the details, and the caller gets none of them."""
+
+    reason = Reason.INTERNAL
+
+
 class UnknownServiceError(DomainError):
     """The health service knows no service of the requested name."""
 

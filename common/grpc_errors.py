@@ -11,6 +11,7 @@ from google.rpc.status_pb2 import Status
 from grpc_status.rpc_status import to_status
 
 from common.errors import (
+    DefectError,
     DomainError,
     InvalidRequestError,
     NotAllowedError,
@@ -19,7 +20,6 @@ from common.errors import (
     UnknownServiceError,
 )
 from common.interceptors import Call, Interceptor
-from common.reasons import Reason
 
 _log = logging.getLogger(__name__)
 
@@ -31,9 +31,9 @@ STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     NotAllowedError: grpc.StatusCode.PERMISSION_DENIED,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
+    DefectError: grpc.StatusCode.INTERNAL,
 }
 """Total: a test walks the subclasses of DomainError. Every other exception is a defect, so INTERNAL."""
-_DEFECT: Final = "internal error; see the robot's log"
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -48,11 +48,10 @@ class ErrorInterceptor(Interceptor[Call]):
         """Aborts the call, which raises grpc.aio.AbortError, unless that, or the caller, ended it."""
         if isinstance(error, grpc.aio.AbortError) or not isinstance(error, Exception):
             return
-        code = status_code(error, call)
-        if code is grpc.StatusCode.INTERNAL:
+        if not isinstance(error, DomainError):
             _log.error("%s failed", call.method.path, exc_info=error)
-            await call.rpc.abort(code, _DEFECT, metadata_of_defect(_DEFECT))
-        assert isinstance(error, DomainError)  # noqa: S101  # anything else is INTERNAL
+            error = DefectError("internal error; see the robot's log")
+        code = status_code(error, call)
         await call.rpc.abort(code, str(error), metadata_of(error, code))
 
 
@@ -71,7 +70,9 @@ def status_code(error: BaseException | None, call: Call) -> grpc.StatusCode:
 
 def metadata_of(error: DomainError, code: grpc.StatusCode) -> tuple[tuple[str, str | bytes], ...]:
     """Returns the trailing metadata that carries the error's details for programs."""
-    status = _status(code, str(error), error.reason)
+    number: int = code.value[0]
+    status = Status(code=number, message=str(error))
+    status.details.add().Pack(ErrorInfo(reason=error.reason.value, domain=DOMAIN))
     if error.violations:
         fields = [
             BadRequest.FieldViolation(field=each.field, description=each.description)
@@ -82,20 +83,4 @@ def metadata_of(error: DomainError, code: grpc.StatusCode) -> tuple[tuple[str, s
         retry = RetryInfo()
         retry.retry_delay.FromNanoseconds(round(error.retry_after_s * _NS_PER_S))
         status.details.add().Pack(retry)
-    return _metadata(status)
-
-
-def metadata_of_defect(message: str) -> tuple[tuple[str, str | bytes], ...]:
-    """Returns the trailing metadata of a defect of ours: the caller gets the message and no more."""
-    return _metadata(_status(grpc.StatusCode.INTERNAL, message, Reason.INTERNAL))
-
-
-def _status(code: grpc.StatusCode, message: str, reason: Reason) -> Status:
-    number: int = code.value[0]
-    status = Status(code=number, message=message)
-    status.details.add().Pack(ErrorInfo(reason=reason.value, domain=DOMAIN))
-    return status
-
-
-def _metadata(status: Status) -> tuple[tuple[str, str | bytes], ...]:
     return tuple(to_status(status).trailing_metadata)

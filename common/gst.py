@@ -54,6 +54,11 @@ def stop(pipeline: Any) -> None:
         return
     # The newest child is first in the list: from the source on, so that nothing flows into what has stopped.
     for child in reversed(pipeline.children):
-        child.set_locked_state(True)
-        child.set_state(Gst.State.NULL)
+        stop_element(child)
     pipeline.set_state(Gst.State.NULL)
+
+
+def stop_element(element: Any) -> None:
+    """Sets an element to NULL, locked: a state change of its pipeline does not restart it."""
+    element.set_locked_state(True)
+    element.set_state(Gst.State.NULL)

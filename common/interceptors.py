@@ -166,7 +166,7 @@ class Chain(grpc.aio.ServerInterceptor):
                 return None
             self._wrapped[path] = self._handler(
                 path,
-                _with_rpc_context(_behavior_of(handler)),
+                _behavior_of(handler),
                 request_streaming=handler.request_streaming,
                 response_streaming=handler.response_streaming,
                 deserializer=handler.request_deserializer,
@@ -279,14 +279,7 @@ _KINDS: Final[Mapping[tuple[bool, bool], Callable[..., Handler]]] = {
 def _behavior_of(handler: Handler) -> Behavior:
     behavior = handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
     assert behavior is not None, "a handler has one of four kinds"  # noqa: S101  # grpc's own
-    return behavior
-
-
-def _with_rpc_context(behavior: Behavior) -> Behavior:
-    def adapted(request: Any, call: Call) -> Any:
-        return behavior(request, call.rpc)
-
-    return adapted
+    return lambda request, call: behavior(request, call.rpc)
 
 
 def _overrides(interceptor: Interceptor[Any], hook: str) -> bool:

@@ -21,7 +21,7 @@ from console.cli.tables import overlay_view, status_view
 from console.cli.watch import watch
 from console.cli.windows import monitor, view
 from console.client import GatewayClient, parse_target
-from console.doctor.examination import Examination
+from console.doctor.examination import examine, reached
 
 AnswerT = TypeVar("AnswerT")
 
@@ -78,10 +78,9 @@ def doctor(session: Session) -> None:
 
     Exit code 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
     """
-    examination = Examination(parse_target(session.target), session.credentials())
-    findings = list(examination.findings())
+    findings = list(examine(parse_target(session.target), session.credentials()))
     print_findings(findings, as_json=session.as_json, out=session.out)
-    code = exit_code(findings) if examination.reached else ExitCode.UNREACHABLE
+    code = exit_code(findings) if reached(findings) else ExitCode.UNREACHABLE
     raise typer.Exit(int(code))
 
 

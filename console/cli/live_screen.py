@@ -15,24 +15,9 @@ from console.cli.tables import STYLES, headline, rows_table
 from console.client import GatewayError, SystemStatus
 from console.presentation.formatting import age, plural
 from console.presentation.preview_switch import Note
-from console.presentation.status_table import status_rows
+from console.presentation.status_table import View, table_rows
 
 _GAP: Final = "   "
-
-
-@dataclass(frozen=True, slots=True)
-class Update:
-    """The newest status, and why there is no newer one.
-
-    Args:
-        status: The newest that was received.
-        error: The outage since; None while there is none.
-        silent_ms: Time since the status was received.
-    """
-
-    status: SystemStatus
-    error: GatewayError | None = None
-    silent_ms: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,16 +49,31 @@ class Fitted:
 
 
 def live_view(
-    update: Update, target: str, message: Note | None = None, keys: Iterable[tuple[Key, str, bool]] = ()
+    status: SystemStatus,
+    target: str,
+    *,
+    error: GatewayError | None = None,
+    silent_ms: int = 0,
+    message: Note | None = None,
+    keys: Iterable[tuple[Key, str, bool]] = (),
 ) -> Fitted:
-    """Returns the status table under a headline, above the newest message and the keys."""
+    """Returns the status table under a headline, above the newest message and the keys.
+
+    Args:
+        status: The newest that was received.
+        target: The robot's address.
+        error: The outage since; None while there is none.
+        silent_ms: Time since the status was received.
+        message: About the newest request.
+        keys: Each with what it does, and whether that is in effect already.
+    """
     outage = Text()
-    if update.error:
-        old = f"NO ANSWER, the values below are {age(update.silent_ms)} old"
-        outage = Text.assemble((old, "bold red"), f" - {update.error.what}")
+    if error:
+        old = f"NO ANSWER, the values below are {age(silent_ms)} old"
+        outage = Text.assemble((old, "bold red"), f" - {error.what}")
     return Fitted(
-        Group(headline(update.status, target), outage, Text()),
-        rows_table(status_rows(update.status)),
+        Group(headline(status, target), outage, Text()),
+        rows_table(table_rows(View(status))),
         Group(Text(message.text, style=STYLES[message.style]) if message else Text(), _help(keys)),
     )
 

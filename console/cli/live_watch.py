@@ -7,12 +7,11 @@ import asyncio
 import signal
 import time
 from collections.abc import Callable, Coroutine, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 from console.cli.keyboard import Key, Keyboard, has_keyboard, keys_in
-from console.cli.live_screen import Fitted, Screen, Update, live_view
+from console.cli.live_screen import Fitted, Screen, live_view
 from console.cli.preview_keys import PreviewKeys
 from console.cli.session import Session
 from console.client import DesiredPreview, GatewayError, Outage, WatchedStatus
@@ -44,6 +43,7 @@ class _LiveWatch:
         self._ending = asyncio.Event()
         self._changed = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
+        self._error: GatewayError | None = None
 
     async def run(self) -> None:
         """Runs until it is ended."""
@@ -67,7 +67,8 @@ class _LiveWatch:
                 task.cancel()
 
     async def _show(self) -> None:
-        self._screen = Screen(self._session.out, self._keyboard, self._last_view)
+        # What stays on the terminal is without the keys, which have no effect any more.
+        self._screen = Screen(self._session.out, self._keyboard, self._view)
         signals = {
             signal.SIGTSTP: self._on_suspend,
             signal.SIGCONT: self._on_continue,
@@ -111,26 +112,23 @@ class _LiveWatch:
 
     def _take(self, item: WatchedStatus | Outage) -> None:
         if isinstance(item, WatchedStatus):
-            self._update, self._received_s = Update(item.status), time.monotonic()
+            self._status, self._error, self._received_s = item.status, None, time.monotonic()
         else:
-            self._update = replace(self._update, error=item.error)
+            self._error = item.error
         self._changed.set()
 
     async def _redraw(self) -> None:
         while not self._ending.is_set():
             self._changed.clear()
-            keys = self._preview_keys.help(self._update.status.preview) if self._keyboard else ()
-            view = live_view(self._aged(), self._robot.target, self._preview_keys.message(), keys)
-            self._screen.draw(view)
-            await _sleep(_REDRAW_EVERY_S, self._changed)
+            keys = self._preview_keys.help(self._status.preview) if self._keyboard else ()
+            self._screen.draw(self._view(message=self._preview_keys.message(), keys=keys))
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_REDRAW_EVERY_S):
+                    await self._changed.wait()
 
-    def _aged(self) -> Update:
+    def _view(self, **parts: Any) -> Fitted:
         silent_ms = round((time.monotonic() - self._received_s) * _MS_PER_S)
-        return replace(self._update, silent_ms=silent_ms if self._update.error else 0)
-
-    def _last_view(self) -> Fitted:
-        """Returns the view that stays on the terminal, without the keys, which have no effect any more."""
-        return live_view(self._aged(), self._robot.target)
+        return live_view(self._status, self._robot.target, error=self._error, silent_ms=silent_ms, **parts)
 
     @contextmanager
     def _keys(self) -> Iterator[None]:
@@ -152,7 +150,7 @@ class _LiveWatch:
         for key in keys_in(typed):
             if key is Key.QUIT:
                 self._ending.set()
-            elif request := self._preview_keys.press(key, self._update.status.preview):
+            elif request := self._preview_keys.press(key, self._status.preview):
                 self._start(self._send(request))
         self._changed.set()
 
@@ -192,12 +190,3 @@ def _signals(actions: Mapping[signal.Signals, Callable[[], object]]) -> Iterator
     finally:
         for number in handled:
             loop.remove_signal_handler(number)
-
-
-async def _sleep(seconds: float, unless: asyncio.Event) -> None:
-    """Sleeps until the event is set, at most for so long."""
-    try:
-        async with asyncio.timeout(max(0.0, seconds)):
-            await unless.wait()
-    except TimeoutError:
-        pass

@@ -10,7 +10,7 @@ from rich.text import Text
 from console.client.results import Detections, OverlaySnapshot, SystemStatus
 from console.presentation.formatting import age
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row, View, status_rows
+from console.presentation.status_table import Row, View, table_rows
 
 STYLES: Final = {
     SeverityStyle.GOOD: "green",
@@ -22,7 +22,7 @@ STYLES: Final = {
 
 def status_view(status: SystemStatus, target: str) -> RenderableType:
     """Returns the whole status under a headline."""
-    return Group(headline(status, target), Text(), rows_table(status_rows(status)))
+    return Group(headline(status, target), Text(), rows_table(table_rows(View(status))))
 
 
 def headline(status: SystemStatus, target: str) -> Text:

@@ -5,14 +5,13 @@ from typing import Self
 
 from console.client import results
 from console.client.clock import Clock, Offset
-from console.client.credentials import NO_CREDENTIALS, Credentials
+from console.client.credentials import Credentials
 from console.client.event_feed import EventFeed
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
     DesiredPreview,
-    WatchRequest,
 )
 from console.client.options import ClientOptions
 from console.client.streams import Outage, Streams
@@ -50,7 +49,7 @@ class AsyncGatewayClient:
         options = options or ClientOptions()
         self.target = parse_target(target)
         self.clock = Clock()
-        self._transport = GrpcTransport(self.target, options, credentials or NO_CREDENTIALS)
+        self._transport = GrpcTransport(self.target, options, credentials or Credentials())
         self._calls = UnaryCalls(self._transport, options)
         self._streams = Streams(self._transport, options)
 
@@ -123,7 +122,7 @@ class AsyncGatewayClient:
         Raises:
             GatewayError: No gateway answers at the beginning, or it refuses; not for a later outage.
         """
-        return self._streams.status(WatchRequest(min_interval_s, include_detections))
+        return self._streams.status(min_interval_s, include_detections=include_detections)
 
     def events(
         self,

@@ -59,9 +59,6 @@ class Credentials:
         return None
 
 
-NO_CREDENTIALS: Final = Credentials()
-
-
 def _is_loopback(target: str) -> bool:
     host = target.rpartition(":")[0].strip("[]")
     if host == "localhost":

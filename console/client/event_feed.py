@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from console.client.mapping.methods import EventsRequest
+from console.client.mapping.methods import events_request
 from console.client.results import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, GapReason
 
 
@@ -20,9 +20,9 @@ class EventFeed:
         self.position = after
         self._least = least
 
-    def request(self) -> EventsRequest:
+    def request(self) -> bytes:
         """Returns the request that resumes at the present position."""
-        return EventsRequest(self.position, self._least)
+        return events_request(self.position, self._least)
 
     def take(self, item: Event | EventGap | CaughtUp | None) -> Iterator[Event | EventGap | CaughtUp]:
         """Yields the item unless it is a duplicate, preceded by a gap where events are missing before it."""
@@ -50,13 +50,9 @@ class EventFeed:
             return None
         run_id, before = item.position.run_id, item.position.sequence - 1
         if run_id != here.run_id:
-            return EventGap(
-                reason=GapReason.NEW_RUN, missed_count=before, position=EventPosition(run_id, before)
-            )
-        if self._least is FaultSeverity.UNKNOWN and before > here.sequence:
-            return EventGap(
-                reason=GapReason.UNKNOWN,
-                missed_count=before - here.sequence,
-                position=EventPosition(run_id, before),
-            )
-        return None
+            reason, missed = GapReason.NEW_RUN, before
+        elif self._least is FaultSeverity.UNKNOWN and before > here.sequence:
+            reason, missed = GapReason.UNKNOWN, before - here.sequence
+        else:
+            return None
+        return EventGap(reason=reason, missed_count=missed, position=EventPosition(run_id, before))

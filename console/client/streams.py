@@ -10,16 +10,16 @@ from console.client.errors import DeadlineExceeded, GatewayError, Overloaded, Un
 from console.client.event_feed import EventFeed
 from console.client.mapping.methods import (
     GET_SYSTEM_STATUS,
+    NO_FIELDS,
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
     Method,
-    WatchRequest,
+    watch_request,
 )
 from console.client.options import ClientOptions
 from console.client.results import CaughtUp, Event, EventGap, WatchedStatus
 from console.client.unary import UnaryTransport
 
-RequestT = TypeVar("RequestT")
 ResultT = TypeVar("ResultT")
 
 _LONGEST_INTERVAL_S: Final = 60.0
@@ -58,9 +58,7 @@ class ResponseStream(Protocol):
 class StreamTransport(UnaryTransport, Protocol):
     """What streams need of a transport."""
 
-    def open(
-        self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool
-    ) -> ResponseStream:
+    def open(self, method: Method[Any], request: bytes, *, newest_only: bool) -> ResponseStream:
         """Starts a server-streaming call."""
 
 
@@ -82,11 +80,13 @@ class Streams:
         self.reconnects = 0
         """Connections after the first one of each stream, of all streams together."""
 
-    async def status(self, request: WatchRequest) -> AsyncGenerator[WatchedStatus | Outage]:
+    async def status(
+        self, interval_s: float, *, include_detections: bool = False
+    ) -> AsyncGenerator[WatchedStatus | Outage]:
         """Yields statuses and outages; polls where the gateway does not stream its status."""
-        interval_s = request.min_interval_s
         if interval_s <= _LONGEST_INTERVAL_S:
             silent_s = max(_STATUS_SILENT_S, interval_s)
+            request = watch_request(interval_s, include_detections=include_detections)
             watched = self._reconnecting(WATCH_SYSTEM_STATUS, lambda: request, silent_s, newest_only=True)
             try:
                 async with aclosing(watched):
@@ -115,7 +115,8 @@ class Streams:
         answered = False
         while True:
             try:
-                status = await self._transport.call(GET_SYSTEM_STATUS, None, self._options.answer_within_s)
+                within_s = self._options.answer_within_s
+                status = await self._transport.call(GET_SYSTEM_STATUS, NO_FIELDS, within_s)
             except (Unreachable, DeadlineExceeded, Overloaded) as error:
                 if not answered:
                     raise
@@ -128,8 +129,8 @@ class Streams:
 
     async def _reconnecting(
         self,
-        method: Method[RequestT, ResultT],
-        request: Callable[[], RequestT],
+        method: Method[ResultT],
+        request: Callable[[], bytes],
         silent_s: float,
         *,
         newest_only: bool,

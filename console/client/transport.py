@@ -12,7 +12,6 @@ from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, Gat
 from console.client.mapping.methods import Method
 from console.client.options import ClientOptions
 
-RequestT = TypeVar("RequestT")
 ResultT = TypeVar("ResultT")
 
 _MOST_WAITING: Final = 64
@@ -43,7 +42,7 @@ class GrpcTransport:
         )
         self._closed = asyncio.Event()
 
-    async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
+    async def call(self, method: Method[ResultT], request: bytes, timeout_s: float) -> ResultT:
         """Returns the result of one attempt at a unary call.
 
         Raises:
@@ -51,7 +50,7 @@ class GrpcTransport:
         """
         self.check_open()
         try:
-            attempt: Any = self._channel.unary_unary(method.path, request_serializer=method.encode)
+            attempt: Any = self._channel.unary_unary(method.path)
             answer = await attempt(request, timeout=timeout_s, metadata=self._metadata)
         except grpc.RpcError as failure:
             raise error_from(failure, self._target, timeout_s) from None
@@ -63,7 +62,7 @@ class GrpcTransport:
             raise Cancelled("this client was closed") from None
         return self.decode(method, answer)
 
-    def open(self, method: Method[RequestT, ResultT], request: RequestT, *, newest_only: bool) -> "Responses":
+    def open(self, method: Method[Any], request: bytes, *, newest_only: bool) -> "Responses":
         """Starts a server-streaming call.
 
         Args:
@@ -75,11 +74,11 @@ class GrpcTransport:
             Cancelled: The client is closed.
         """
         self.check_open()
-        stream: Any = self._channel.unary_stream(method.path, request_serializer=method.encode)
+        stream: Any = self._channel.unary_stream(method.path)
         call = stream(request, metadata=self._metadata)
         return Responses(call, method, self, newest_only=newest_only)
 
-    def decode(self, method: Method[Any, ResultT], answer: bytes) -> ResultT:
+    def decode(self, method: Method[ResultT], answer: bytes) -> ResultT:
         """Returns the result of an answer.
 
         Raises:
@@ -128,7 +127,7 @@ class Responses:
     """The items of one server-streaming call, received by a task of its own."""
 
     def __init__(
-        self, call: Any, method: Method[Any, Any], transport: GrpcTransport, *, newest_only: bool
+        self, call: Any, method: Method[Any], transport: GrpcTransport, *, newest_only: bool
     ) -> None:
         self._method = method
         self._transport = transport

@@ -7,11 +7,18 @@ from typing import Protocol, TypeVar
 
 from console.client.clock import Clock, Offset
 from console.client.errors import Unreachable
-from console.client.mapping.methods import GET_SYSTEM_STATUS, PING, SET_PREVIEW_MODE, DesiredPreview, Method
+from console.client.mapping.methods import (
+    GET_SYSTEM_STATUS,
+    NO_FIELDS,
+    PING,
+    SET_PREVIEW_MODE,
+    DesiredPreview,
+    Method,
+    preview_request,
+)
 from console.client.options import ClientOptions
 from console.client.results import PreviewChange, PreviewProfile, PreviewState, PreviewStatus
 
-RequestT = TypeVar("RequestT")
 ResultT = TypeVar("ResultT")
 
 # An attempt gets at least this long, so that the last one is not sent just to fail.
@@ -21,7 +28,7 @@ _SHORTEST_ATTEMPT_S = 0.05
 class UnaryTransport(Protocol):
     """What unary calls need of a transport."""
 
-    async def call(self, method: Method[RequestT, ResultT], request: RequestT, timeout_s: float) -> ResultT:
+    async def call(self, method: Method[ResultT], request: bytes, timeout_s: float) -> ResultT:
         """Returns the result of one attempt, or raises a `GatewayError`."""
 
     async def sleep(self, seconds: float) -> None:
@@ -46,11 +53,11 @@ class UnaryCalls:
         self.retries = 0
         """Attempts beyond the first, of all calls together."""
 
-    async def read(self, method: Method[None, ResultT]) -> ResultT:
+    async def read(self, method: Method[ResultT]) -> ResultT:
         """Returns the answer of a method without parameters, within `answer_within_s`."""
-        return await self.call(method, None, self._options.answer_within_s)
+        return await self.call(method, NO_FIELDS, self._options.answer_within_s)
 
-    async def call(self, method: Method[RequestT, ResultT], request: RequestT, within_s: float) -> ResultT:
+    async def call(self, method: Method[ResultT], request: bytes, within_s: float) -> ResultT:
         """Returns the answer of a call, retried while the gateway is unreachable and time is left.
 
         Args:
@@ -87,7 +94,7 @@ class UnaryCalls:
 
     async def set_preview(self, request: DesiredPreview, settle_within_s: float) -> PreviewChange:
         """Sends a preview request, then polls the status until it is fulfilled, failed or time is up."""
-        change = await self.call(SET_PREVIEW_MODE, request, self._options.preview_within_s)
+        change = await self.call(SET_PREVIEW_MODE, preview_request(request), self._options.preview_within_s)
         until = self._clock() + settle_within_s
         while change.accepted and not _settled(change.preview, request) and self._clock() < until:
             await self._transport.sleep(self._options.settle_poll_s)

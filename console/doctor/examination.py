@@ -1,78 +1,67 @@
 """The examination, from the network inwards; it stops at the first fault that blocks the rest."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
 
 from common.findings import Finding, Verdict, good, wrong
 from common.version import project_version
 from console.client import Credentials, GatewayClient, PreviewState, SystemStatus, errors
 from console.doctor import network, robot
 
+_ON_THE_WAY: Final = ("name", "tcp", "grpc")
+"""The checks of the way to the gateway."""
 
-class Examination:
-    """One examination.
+
+def examine(
+    target: str, credentials: Credentials | None = None, wall_clock: Callable[[], float] = time.time
+) -> Iterator[Finding]:
+    """Yields the findings as they are made.
 
     Args:
         target: HOST:PORT.
         credentials: Token and certificates for the robot.
         wall_clock: This computer's wall clock, in seconds since 1970.
-
-    Attributes:
-        reached: Whether the gateway answered; valid after the last finding.
     """
-
-    def __init__(
-        self,
-        target: str,
-        credentials: Credentials | None = None,
-        wall_clock: Callable[[], float] = time.time,
-    ) -> None:
-        self._target = target
-        self._credentials = credentials
-        self._wall_clock = wall_clock
-        self.reached = False
-
-    def findings(self) -> Iterator[Finding]:
-        """Yields the findings as they are made."""
-        host, port = network.split(self._target)
-        name = network.name_finding(host)
-        yield name
-        if name.verdict is Verdict.WRONG:
-            return
-        tcp = network.tcp_finding(host, port)
-        yield tcp
-        if tcp.verdict is Verdict.WRONG:
-            return
-        with GatewayClient(self._target, credentials=self._credentials) as client:
-            try:
-                status = client.status()
-            except (errors.NotAllowed, errors.NotTrusted) as error:
-                self.reached = True
-                yield wrong(
-                    "access", error.what, "The gateway serves authenticated clients only", error.remedy
-                )
-                return
-            except errors.GatewayError as error:
-                yield wrong(
-                    "grpc", error.what, "Something listens there, but it is not a gateway", error.remedy
-                )
-                return
-            self.reached = True
-            yield good("grpc", f"the gateway '{status.gateway_name}' answers")
-            yield from self._about_the_gateway(client)
-        yield from _about_the_robot(status)
-
-    def _about_the_gateway(self, client: GatewayClient) -> Iterator[Finding]:
-        begin_s, asked_at_s = time.monotonic(), self._wall_clock()
+    host, port = network.split(target)
+    name = network.name_finding(host)
+    yield name
+    if name.verdict is Verdict.WRONG:
+        return
+    tcp = network.tcp_finding(host, port)
+    yield tcp
+    if tcp.verdict is Verdict.WRONG:
+        return
+    with GatewayClient(target, credentials=credentials) as client:
         try:
-            info = client.info()
-        except errors.Unsupported:
-            yield robot.old_gateway_finding()
+            status = client.status()
+        except (errors.NotAllowed, errors.NotTrusted) as error:
+            yield wrong("access", error.what, "The gateway serves authenticated clients only", error.remedy)
             return
-        half_s = (time.monotonic() - begin_s) / 2
-        yield robot.version_finding(info.gateway_version, project_version())
-        yield robot.clock_finding(info.wall_clock_unix_ms / 1000, asked_at_s + half_s, half_s)
-        yield robot.calls_finding(info)
+        except errors.GatewayError as error:
+            yield wrong("grpc", error.what, "Something listens there, but it is not a gateway", error.remedy)
+            return
+        yield good("grpc", f"the gateway '{status.gateway_name}' answers")
+        yield from _about_the_gateway(client, wall_clock)
+    yield from _about_the_robot(status)
+
+
+def reached(findings: Iterable[Finding]) -> bool:
+    """Returns whether the gateway answered in an examination with these findings."""
+    return not any(each.verdict is Verdict.WRONG and each.check in _ON_THE_WAY for each in findings)
+
+
+def _about_the_gateway(client: GatewayClient, wall_clock: Callable[[], float]) -> Iterator[Finding]:
+    begin_s, asked_at_s = time.monotonic(), wall_clock()
+    try:
+        info = client.info()
+    except errors.Unsupported:
+        yield robot.old_gateway_finding()
+        return
+    half_s = (time.monotonic() - begin_s) / 2
+    yield robot.version_finding(info.gateway_version, project_version())
+    yield robot.clock_finding(info.wall_clock_unix_ms / 1000, asked_at_s + half_s, half_s)
+    yield robot.calls_finding(info)
 
 
 def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:

@@ -6,8 +6,7 @@ health, faults and preview have places of their own in the window.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from enum import Flag, auto
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from console.client import results
 from console.client.results import Freshness, PreviewProfile, PreviewState, SourceState, TeleopState
@@ -20,15 +19,6 @@ from console.presentation.severity_style import (
     SeverityStyle,
 )
 
-
-class Density(Flag):
-    """How much room there is."""
-
-    FULL = auto()
-    COMPACT = auto()
-
-
-BOTH: Final = Density.FULL | Density.COMPACT
 _MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
 _UNREADABLE: Final = (
     SourceState.QOS_MISMATCH,
@@ -48,6 +38,8 @@ class Row:
     style: SeverityStyle
     text: str
     age: str = ""
+    remedy: str = ""
+    """What to do about a fault, where the text does not say it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,21 +49,16 @@ class View:
     Args:
         status: The newest one.
         detections: The newest ones; None where the view has none.
-        density: One of the two.
+        compact: Whether texts must be short.
         silent_ms: Time since the status was received; ages count on by it.
         outdated: Whether that is so long that fresh values count as stale.
     """
 
     status: results.SystemStatus
-    density: Density = Density.FULL
+    compact: bool = False
     detections: results.Detections | None = None
     silent_ms: int = 0
     outdated: bool = False
-
-    @property
-    def compact(self) -> bool:
-        """Whether texts must be short."""
-        return self.density is Density.COMPACT
 
     def age(self, age_ms: int | None) -> str:
         """Returns an age as of now; empty in the compact density where there is none."""
@@ -100,12 +87,7 @@ class View:
 
 def table_rows(view: View) -> list[Row]:
     """Returns the rows of the table, the most important first."""
-    return [row for entry in TABLE if view.density in entry.density for row in entry.rows(view)]
-
-
-def status_rows(status: results.SystemStatus) -> list[Row]:
-    """Returns all rows with their full texts."""
-    return table_rows(View(status))
+    return [row for rows in TABLE for row in rows(view)]
 
 
 def preview_rows(preview: results.PreviewStatus) -> Iterator[Row]:
@@ -302,28 +284,28 @@ def _unbroken(text: str) -> str:
     return ", ".join(part.replace(" ", "\u00a0") for part in text.split(", "))
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One entry of the table.
+Rows: TypeAlias = Callable[[View], Iterator[Row]]
+"""Yields the rows of a part; none where it has nothing to show."""
 
-    Args:
-        rows: Makes its rows; none where it has nothing to show.
-        density: The densities that show it.
-    """
 
-    rows: Callable[[View], Iterator[Row]]
-    density: Density = BOTH
+def _full(rows: Rows) -> Rows:
+    """Returns the rows of a part that has a place of its own beside the compact table."""
+    return lambda view: iter(()) if view.compact else rows(view)
+
+
+def _compact(rows: Rows) -> Rows:
+    """Returns the rows of a part that only the compact table has."""
+    return lambda view: rows(view) if view.compact else iter(())
 
 
 def _measured(
     label: str,
     sample: Callable[[results.SystemStatus], Any],
     text: Callable[[Any, bool], str],
-    density: Density = BOTH,
     *,
     optional: bool = False,
-) -> Entry:
-    """Returns the entry of one measured part; an optional one has no row on a robot that never reports it."""
+) -> Rows:
+    """Returns the rows of one measured part; an optional one has none on a robot that never reports it."""
 
     def rows(view: View) -> Iterator[Row]:
         part = sample(view.status)
@@ -331,16 +313,16 @@ def _measured(
         if row.text or not optional:
             yield row
 
-    return Entry(rows, density)
+    return rows
 
 
-TABLE: Final = (
-    Entry(_health, Density.FULL),
-    Entry(_faults, Density.FULL),
+TABLE: Final[tuple[Rows, ...]] = (
+    _full(_health),
+    _full(_faults),
     _measured("motion", lambda status: status.odometry, _motion),
     _measured("vision", lambda status: status.vision, _vision),
-    Entry(_objects),
-    Entry(lambda view: preview_rows(view.status.preview), Density.FULL),
+    _objects,
+    _full(lambda view: preview_rows(view.status.preview)),
     _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
     _measured("command", lambda status: status.effective_command, _command, optional=True),
     _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),
@@ -349,10 +331,10 @@ TABLE: Final = (
         "computer battery", lambda status: status.platform.power.onboard_battery, _battery, optional=True
     ),
     _measured("network", lambda status: status.platform.network, _network, optional=True),
-    _measured("video", lambda status: status.preview.measured, _video, Density.COMPACT, optional=True),
-    Entry(_teleop),
-    Entry(_access),
-    Entry(_gateway),
-    Entry(_sources),
+    _compact(_measured("video", lambda status: status.preview.measured, _video, optional=True)),
+    _teleop,
+    _access,
+    _gateway,
+    _sources,
 )
 """All rows, in the order of an operator's interest."""

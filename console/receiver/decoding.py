@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from common.errors import UserError
-from common.gst import Gst, GstVideo
+from common.gst import Gst, GstVideo, stop_element
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
@@ -71,11 +71,10 @@ class DecodingBranch:
     def __init__(self, codec: str, queue: FrameQueue, options: ReceiverOptions) -> None:
         self._codec = codec
         self._queue = queue
-        self._pixels = options.pixels
         self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
         self._layout: Any = None
-        caps = f"video/x-raw,format={self._pixels.value}"
+        caps = f"video/x-raw,format={options.pixels.value}"
         self._sink = element("appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps=caps)
         self._handler = self._sink.connect("new-sample", self._on_sample)
         self._elements = [
@@ -100,8 +99,7 @@ class DecodingBranch:
         """Stops and removes the branch. Not on a GStreamer thread."""
         self._sink.disconnect(self._handler)
         for one in self._elements:
-            one.set_locked_state(True)
-            one.set_state(Gst.State.NULL)
+            stop_element(one)
             pipeline.remove(one)
 
     def owns(self, element: Any) -> bool:
@@ -131,7 +129,6 @@ class DecodingBranch:
             corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
             stride=info.stride[0],
             read=partial(_pixels, buffer),
-            pixel_format=self._pixels,
             decoder=self._decoder,
         )
 

@@ -29,7 +29,6 @@ class Frame:
         corrupt: whether the decoder concealed parts of it, because packets were lost.
         stride: from one row of the first plane (I420: luma) to the next, in bytes.
         read: copies all its pixels, the first plane first.
-        pixel_format: layout of the pixels.
         decoder: GStreamer's element that decoded it.
     """
 
@@ -41,5 +40,4 @@ class Frame:
     corrupt: bool
     stride: int
     read: Callable[[], bytes] = field(repr=False)
-    pixel_format: PixelFormat = PixelFormat.I420
     decoder: str = ""

@@ -16,6 +16,7 @@ from console.window.labels import (
     set_text,
     set_tool_tip,
 )
+from console.window.layout import fill
 from console.window.lines import TintedLine
 from console.window.theme import DimLabel, Marker
 
@@ -33,14 +34,7 @@ class Header(QWidget):
         self.health, self.link = MarkedWord(), MarkedWord(PlainLabel())
         set_bold(self.name, True)
         scale_font(self.name, 1.4)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(10)
-        layout.addWidget(self.name)
-        layout.addWidget(self.target)
-        layout.addSpacing(12)
-        layout.addWidget(self.health, 1)
-        layout.addWidget(self.link)
+        fill(QHBoxLayout(self), self.name, self.target, 12, (self.health, 1), self.link, spacing=10)
 
     def show_state(self, state: MonitorState, link: LinkText, now_s: float) -> None:
         """Shows the latest state."""
@@ -69,11 +63,7 @@ class MarkedWord(QWidget):
         super().__init__()
         self.marker, self.word, self.detail = Marker(), PlainLabel(), detail or ElidedLabel()
         set_bold(self.word, True)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.marker)
-        layout.addWidget(self.word)
-        layout.addWidget(self.detail, 1)
+        fill(QHBoxLayout(self), self.marker, self.word, (self.detail, 1))
 
     def show_word(self, style: SeverityStyle, word: str, detail: str) -> None:
         """Changes all three."""
@@ -94,10 +84,7 @@ class ConnectionBanner(TintedLine):
         self.text, self.next_try = WrappedLabel(), DimLabel()
         self.button = QPushButton("&Retry now")
         self.button.clicked.connect(self.retry)
-        column = QVBoxLayout()
-        column.addWidget(self.text)
-        column.addWidget(self.next_try)
-        self.grid.addLayout(column, 0, 1)
+        self.grid.addLayout(fill(QVBoxLayout(), self.text, self.next_try), 0, 1)
         self.grid.addWidget(self.button, 0, 2)
         self.grid.setColumnStretch(1, 1)
         self.setVisible(False)

@@ -1,14 +1,13 @@
-"""Lines of a window (component, fault, note), and a list of them. Updated in place, never made anew."""
+"""Lines of a window (row of the status, note), and a list of them. Updated in place, never made anew."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
 
-from console.monitor.status_rows import FaultLine
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
@@ -22,12 +21,10 @@ from console.window.labels import (
     set_tool_tip,
     width_of,
 )
+from console.window.layout import fill
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
 
-_LONGEST_LABEL = "Computer battery"
-_LONGEST_MARK = "no data"
 _LONGEST_AGE = "59 min 00 s"
-_LONGEST_SEVERITY = "warning"
 
 
 class TintedLine(QFrame):
@@ -74,17 +71,15 @@ class LineList(QWidget, Generic[LineT]):
     """Lines below each other. Surplus lines are hidden, and used again later.
 
     Args:
-        line: class of the lines.
+        line: makes a line.
     """
 
-    def __init__(self, line: type[LineT]) -> None:
+    def __init__(self, line: Callable[[], LineT]) -> None:
         super().__init__()
         self._line = line
         self._lines: list[LineT] = []
         self._shown = 0
-        self._layout = QVBoxLayout(self)
-        self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.setSpacing(2)
+        self._layout = fill(QVBoxLayout(self), spacing=2)
 
     @property
     def shown(self) -> Sequence[LineT]:
@@ -103,60 +98,45 @@ class LineList(QWidget, Generic[LineT]):
         self._shown = len(items)
 
 
-class ComponentLine(TintedLine):
-    """A part of the robot: marker, name, mark, values, age."""
+class StatusLine(TintedLine):
+    """A row of the status: marker, label, mark, text, age; below the text what to do.
 
-    def __init__(self) -> None:
+    Args:
+        longest_label: sets the width of the labels; empty for rows without any.
+        longest_mark: sets the width of the marks.
+        bold: whether mark and text are always bold; otherwise it is the mark of a severe row alone.
+    """
+
+    def __init__(self, longest_label: str, longest_mark: str, *, bold: bool = False) -> None:
         super().__init__()
-        self.name, self.mark = PlainLabel(), PlainLabel()
-        self.values, self.age = WrappedLabel(), DimLabel()
-        self.name.setFixedWidth(width_of(_LONGEST_LABEL))
-        self.mark.setFixedWidth(width_of(_LONGEST_MARK, bold=True))
-        self.age.setFixedWidth(width_of(_LONGEST_AGE))
+        self._bold = bold
+        self.label, self.mark, self.text = PlainLabel(), PlainLabel(), WrappedLabel()
+        self.age, self.remedy = DimLabel(), WrappedLabel()
+        self.label.setFixedWidth(width_of(longest_label))
+        self.mark.setFixedWidth(width_of(longest_mark, bold=True))
+        set_bold(self.text, bold)
+        self.age.setMinimumWidth(width_of(_LONGEST_AGE))
         self.age.setAlignment(RIGHT)
-        for column, label in enumerate((self.name, self.mark), start=1):
-            self.grid.addWidget(label, 0, column, TOP)
-        self.grid.addWidget(self.values, 0, 3)
+        self.grid.addWidget(self.label, 0, 1, TOP)
+        self.label.setHidden(not longest_label)
+        self.grid.addWidget(self.mark, 0, 2, TOP)
+        self.grid.addWidget(self.text, 0, 3)
         self.grid.addWidget(self.age, 0, 4, TOP)
+        self.grid.addWidget(self.remedy, 1, 3, 1, 2)
         self.grid.setColumnStretch(3, 1)
 
     def show_item(self, item: Row) -> None:
-        """Shows one component."""
+        """Shows one row."""
         self.show_style(item.style)
-        set_text(self.name, item.label)
+        set_text(self.label, item.label)
         set_text(self.mark, item.mark)
-        set_bold(self.mark, item.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
-        set_text(self.values, item.text)
+        set_bold(self.mark, self._bold or item.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
+        set_text(self.text, item.text)
         set_text(self.age, item.age)
-        self.setAccessibleName(f"{item.label}: {item.mark}. {item.text}. {item.age}")
-
-
-class FaultWidget(TintedLine):
-    """A fault: marker, severity, message, duration; below it the remedy."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.mark, self.message = PlainLabel(), WrappedLabel()
-        self.remedy, self.since = WrappedLabel(), DimLabel()
-        self.mark.setFixedWidth(width_of(_LONGEST_SEVERITY, bold=True))
-        self.since.setAlignment(RIGHT)
-        set_bold(self.mark, True)
-        set_bold(self.message, True)
-        self.grid.addWidget(self.mark, 0, 1, TOP)
-        self.grid.addWidget(self.message, 0, 2)
-        self.grid.addWidget(self.since, 0, 3, TOP)
-        self.grid.addWidget(self.remedy, 1, 2, 1, 2)
-        self.grid.setColumnStretch(2, 1)
-
-    def show_item(self, item: FaultLine) -> None:
-        """Shows one fault."""
-        self.show_style(item.style)
-        set_text(self.mark, item.mark)
-        set_text(self.message, item.message)
         set_text(self.remedy, item.remedy)
         self.remedy.setVisible(bool(item.remedy))
-        set_text(self.since, item.since)
-        self.setAccessibleName(f"{item.mark}: {item.message}. {item.remedy}")
+        what = f"{item.label}: {item.mark}" if item.label else item.mark
+        self.setAccessibleName(f"{what}. {item.text}. {item.remedy or item.age}")
 
 
 class NoteLine(TintedLine):

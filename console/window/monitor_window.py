@@ -14,14 +14,15 @@ from console.monitor.monitor_state import MonitorState
 from console.monitor.preview_controls import Controls, controls
 from console.monitor.worker import Worker
 from console.presentation.preview_switch import PROFILES
+from console.window import window_settings
 from console.window.handover import ThreadHandover
 from console.window.header import ConnectionBanner, Header
 from console.window.keys import bind_keys
+from console.window.layout import fill
 from console.window.plot import Plots
 from console.window.preview_panel import PreviewPanel
 from console.window.side_panel import SidePanel
 from console.window.video_view import VideoView
-from console.window.window_settings import WindowSettings
 
 _TICK_MS = 500
 _FIRST_SIZE = QSize(1280, 800)
@@ -38,15 +39,11 @@ class MonitorWindow(QWidget):
         worker: talks to the gateway; none of its calls here blocks.
         changes: signals changes of the worker's state.
         video: shows the video.
-        settings: place and size.
     """
 
-    def __init__(
-        self, worker: Worker, changes: ThreadHandover, video: VideoView, settings: WindowSettings
-    ) -> None:
+    def __init__(self, worker: Worker, changes: ThreadHandover, video: VideoView) -> None:
         super().__init__()
         self._worker = worker
-        self._settings = settings
         self._history = History()
         self._selected: PreviewProfile | None = None
         self.video = video
@@ -58,7 +55,7 @@ class MonitorWindow(QWidget):
         self.setWindowTitle(f"Robot {worker.target}")
         # No larger than a small laptop's screen leaves room for.
         self.resize(_FIRST_SIZE.boundedTo(self.screen().availableSize() - _DECORATION))
-        settings.restore(self, self.splitter)
+        window_settings.restore(self, self.splitter)
         self.refresh()
 
     def refresh(self) -> None:
@@ -73,16 +70,12 @@ class MonitorWindow(QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Saves place and size."""
         self._timer.stop()
-        self._settings.save(self, self.splitter)
+        window_settings.save(self, self.splitter)
         super().closeEvent(event)
 
     def _lay_out(self) -> None:
         left = QWidget()
-        column = QVBoxLayout(left)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.video, 1)
-        column.addWidget(self.preview)
-        column.addWidget(self.plots)
+        fill(QVBoxLayout(left), (self.video, 1), self.preview, self.plots)
         self.splitter.addWidget(left)
         self.splitter.addWidget(self.side)
         self.splitter.setChildrenCollapsible(False)

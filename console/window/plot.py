@@ -7,6 +7,7 @@ from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
+from console.window.layout import fill
 from console.window.theme import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
 
 NO_DATA = "no data"
@@ -117,11 +118,7 @@ class Plots(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.all: Sequence[Plot] = [Plot(metric) for metric in METRICS]
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(6)
-        for plot in self.all:
-            layout.addWidget(plot)
+        fill(QHBoxLayout(self), *self.all, spacing=6)
 
     def show_history(self, history: History) -> None:
         """Shows the recorded values."""

@@ -9,6 +9,7 @@ from console.presentation.preview_switch import PROFILES, Note
 from console.presentation.severity_style import SeverityStyle
 from console.window.header import MarkedWord
 from console.window.labels import PlainLabel, set_text
+from console.window.layout import fill
 from console.window.lines import LineList, NoteLine
 
 _TITLES = {
@@ -73,19 +74,9 @@ class PreviewPanel(QWidget):
         return button
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setSpacing(6)
-        row.addWidget(PlainLabel("Preview"))
-        row.addWidget(self.state, 1)
-        row.addWidget(self.switch)
-        row.addSpacing(8)
-        for button in self.profiles.values():
-            row.addWidget(button)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
-        layout.addLayout(row)
-        layout.addWidget(self.notes)
+        title, profiles = PlainLabel("Preview"), self.profiles.values()
+        row = fill(QHBoxLayout(), title, (self.state, 1), self.switch, 8, *profiles, spacing=6)
+        fill(QVBoxLayout(self), row, self.notes, spacing=4)
         self.switch.setMinimumWidth(self.switch.sizeHint().width())
 
 

@@ -13,7 +13,6 @@ from console.window.handover import ThreadHandover
 from console.window.monitor_window import MonitorWindow
 from console.window.video_view import VideoView
 from console.window.view_window import ViewWindow
-from console.window.window_settings import WindowSettings
 
 _CLOSE_TIMEOUT_S = 0.8
 """For each of the two background threads: a program ends within 2 s."""
@@ -59,9 +58,7 @@ def monitor(target: str, load: LoadCredentials | None = None) -> Iterator[Monito
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
     robot = RobotVideo(target, load, on_change=changes.post)
-    window = MonitorWindow(
-        robot.worker, changes, VideoView(robot.session, robot.detections), WindowSettings()
-    )
+    window = MonitorWindow(robot.worker, changes, VideoView(robot.session, robot.detections))
     with _open(window, robot):
         yield window
 

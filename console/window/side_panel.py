@@ -4,16 +4,18 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from console.monitor.monitor_state import MonitorState
-from console.monitor.status_rows import FaultLine, component_rows, fault_lines
+from console.monitor.status_rows import component_rows, fault_rows
 from console.presentation.formatting import age
 from console.presentation.severity_style import SeverityStyle
+from console.presentation.status_table import Row
 from console.window.event_list import EventList
 from console.window.labels import set_bold, set_text
-from console.window.lines import ComponentLine, FaultWidget, LineList
+from console.window.layout import fill
+from console.window.lines import LineList, StatusLine
 
 _MIN_WIDTH_CHARS = 34
-_NO_FAULT = FaultLine("none", SeverityStyle.GOOD, "The robot reports no fault", "", "")
-_NO_STATUS = FaultLine("", SeverityStyle.QUIET, "No status received yet", "", "")
+_NO_FAULT = Row("", "none", SeverityStyle.GOOD, "The robot reports no fault")
+_NO_STATUS = Row("", "", SeverityStyle.QUIET, "No status received yet")
 
 
 class SidePanel(QWidget):
@@ -22,18 +24,15 @@ class SidePanel(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.faults_title, self.status_title = _heading("Faults"), _heading("Status")
-        self.faults, self.components = LineList(FaultWidget), LineList(ComponentLine)
+        self.faults = LineList(lambda: StatusLine("", "warning", bold=True))
+        self.components = LineList(lambda: StatusLine("Computer battery", "no data"))
         self.events = EventList()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._scrolled(), 4)
-        layout.addWidget(_heading("Events"))
-        layout.addWidget(self.events, 1)
+        fill(QVBoxLayout(self), (self._scrolled(), 4), _heading("Events"), (self.events, 1))
 
     def show_state(self, state: MonitorState, now_s: float) -> None:
         """Shows the latest state."""
         none = _NO_STATUS if state.snapshot is None else _NO_FAULT
-        self.faults.show_items(fault_lines(state, now_s) or [none])
+        self.faults.show_items(fault_rows(state, now_s) or [none])
         self.components.show_items(component_rows(state, now_s))
         received = ""
         if state.snapshot and state.outdated(now_s):
@@ -44,11 +43,8 @@ class SidePanel(QWidget):
 
     def _scrolled(self) -> QScrollArea:
         inner = QWidget()
-        column = QVBoxLayout(inner)
-        column.setContentsMargins(0, 0, 4, 0)
-        for part in (self.faults_title, self.faults, self.status_title, self.components):
-            column.addWidget(part)
-        column.addStretch(1)
+        parts = (self.faults_title, self.faults, self.status_title, self.components)
+        fill(QVBoxLayout(inner), *parts, margins=(0, 0, 4, 0)).addStretch(1)
         scroll = QScrollArea()
         scroll.setWidget(inner)
         scroll.setWidgetResizable(True)

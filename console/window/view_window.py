@@ -11,6 +11,7 @@ from console.viewer.formatting import figures_line, live_note, recording_line
 from console.viewer.robot_video import RobotVideo
 from console.window.keys import bind_keys
 from console.window.labels import ElidedLabel, PlainLabel, set_text
+from console.window.layout import fill
 from console.window.theme import DimLabel
 from console.window.video_view import VideoView
 
@@ -53,19 +54,11 @@ class ViewWindow(QWidget):
 
     def _lay_out(self) -> None:
         self._below = QWidget()
-        line = QHBoxLayout(self._below)
-        line.setContentsMargins(8, 3, 8, 3)
-        line.setSpacing(16)
-        line.addWidget(self.figures)
-        line.addWidget(self.notes, 1)
         keys = DimLabel(_KEYS)
         keys.setAlignment(Qt.AlignmentFlag.AlignRight)
-        line.addWidget(keys)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.video, 1)
-        column.addWidget(self._below)
+        line = QHBoxLayout(self._below)
+        fill(line, self.figures, (self.notes, 1), keys, spacing=16, margins=(8, 3, 8, 3))
+        fill(QVBoxLayout(self), (self.video, 1), self._below, spacing=0)
 
     def _refresh(self) -> None:
         session, state = self.robot.session, self.robot.worker.latest()

@@ -10,7 +10,9 @@
   between slow ones: clock_references.py).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from common.errors import UserError
@@ -35,26 +37,18 @@ _SRT_POLL_MS: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Adjustable:
-    """Elements whose properties change with the profile, also while playing.
-
-    Without the listener: a driver that never returns keeps references to what it was passed, and a listener
-    that is still referenced keeps its port.
-    """
-
-    rate_caps: Any
-    size_caps: Any
-    encoder: Any
-
-
-@dataclass(frozen=True, slots=True)
 class Parts:
     """A pipeline, and the elements and pads that are used while it runs."""
 
     pipeline: Any
     source: Any
     rate: Any
-    adjustable: Adjustable
+    apply_target: Callable[[Plan], None]
+    """Sets what changes with the profile, also while playing.
+
+    It does not refer to the listener: a driver that never returns keeps references to what it was passed, and
+    a listener that is still referenced keeps its port.
+    """
     encoder: Any
     parser_pad: Any
     muxer_pad: Any
@@ -81,16 +75,16 @@ def build(plan: Plan) -> Parts:
         raise UserError(f"{plan.source.label} does not end in raw video", plan.source.remedy)
     find = body.get_by_name
     encoder, sink = find("encoder"), find("sink")
-    adjustable = Adjustable(find("rate_caps"), find("size"), encoder)
+    apply_target = partial(_apply_target, find("rate_caps"), find("size"), encoder)
     highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
     properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
-    apply_target(adjustable, plan)
+    apply_target(plan)
     _listen(sink, plan)
     return Parts(
         pipeline=pipeline,
         source=source,
         rate=find("rate"),
-        adjustable=adjustable,
+        apply_target=apply_target,
         encoder=encoder,
         parser_pad=find("parser").get_static_pad("src"),
         muxer_pad=find("muxer").get_static_pad("src"),
@@ -98,20 +92,19 @@ def build(plan: Plan) -> Parts:
     )
 
 
-def apply_target(elements: Adjustable, plan: Plan) -> None:
+def _apply_target(rate: Any, size: Any, encoder: Any, plan: Plan) -> None:
     """Sets frame rate, frame size, bit rate and GOP length of the plan's profile; also while playing.
 
     Bit rate and GOP length first: new caps reinitialise the encoder, with the properties it has then.
     """
     target = plan.target
-    properties.set_rates(elements.encoder, plan.encoder, target.bitrate_kbps, plan.gop_frames)
-    size = properties.size_caps(plan.encoder, target)
-    rate = f"[ 0/1, {target.fps}/1 ]"
+    properties.set_rates(encoder, plan.encoder, target.bitrate_kbps, plan.gop_frames)
+    framerate = f"[ 0/1, {target.fps}/1 ]"
     if plan.source.any_rate:
-        rate = f"{target.fps}/1,width={target.width_px},height={target.height_px}"
-    rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate={rate}")
+        framerate = f"{target.fps}/1,width={target.width_px},height={target.height_px}"
+    rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate={framerate}")
     # Setting equal caps again would reinitialise the encoder for nothing.
-    for capsfilter, caps in ((elements.size_caps, size), (elements.rate_caps, rate_caps)):
+    for capsfilter, caps in ((size, properties.size_caps(plan.encoder, target)), (rate, rate_caps)):
         if not capsfilter.get_property("caps").is_equal(caps):
             capsfilter.set_property("caps", caps)
 

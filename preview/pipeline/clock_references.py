@@ -71,32 +71,14 @@ def read(packets: bytes) -> Reference | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class Rhythm:
-    """References between two frames.
+def rhythm(fps: float) -> tuple[int, float]:
+    """Returns how many references follow a frame, and the seconds from it to the first and on to the next.
 
-    Args:
-        count: how many.
-        interval_s: from the frame to the first, and on to the next.
+    Spread evenly, so that each reference may be a little late.
     """
-
-    count: int
-    interval_s: float
-
-    @property
-    def last_ticks(self) -> int:
-        """Ticks from a frame to its last reference; frames closer together leave no room for it."""
-        return round(self.count * self.interval_s * _CLOCK_HZ)
-
-    @classmethod
-    def at(cls, fps: float) -> "Rhythm":
-        """Returns the rhythm for a frame rate; spread evenly, so that each reference may be a little late."""
-        period_s = 1 / fps
-        count = max(0, math.ceil((period_s - MAX_GAP_S) / _INTERVAL_S))
-        return cls(count, min(_INTERVAL_S, period_s / (count + 1)))
-
-
-_NONE: Final = Rhythm(0, 0.0)
+    period_s = 1 / fps
+    count = max(0, math.ceil((period_s - MAX_GAP_S) / _INTERVAL_S))
+    return count, min(_INTERVAL_S, period_s / (count + 1))
 
 
 class ClockReferences:
@@ -116,13 +98,13 @@ class ClockReferences:
         self._sent = 0
         self._in_rhythm = True
         """Whether frames come at the interval that the frame rate says."""
-        self._rhythm = Rhythm.at(fps)
+        self._count, self._interval_s = rhythm(fps)
         self._thread: threading.Thread | None = None
 
     def set_rate(self, fps: float) -> None:
         """Sets another frame rate. May block while a frame is being sent."""
         with self._changed:
-            self._rhythm = Rhythm.at(fps)
+            self._count, self._interval_s = rhythm(fps)
             self._frame, self._in_rhythm = None, False
             self._changed.notify()
 
@@ -133,15 +115,16 @@ class ClockReferences:
             packets: the frame.
             send_frame: sends it.
         """
-        if not self._rhythm.count:
+        if not self._count:
             send_frame()
             return
         with self._changed:
             before, self._frame = self._frame, read(packets)
             self._frame_at, self._sent = time.monotonic(), 0
             if before and self._frame and not self._in_rhythm:
+                # Frames closer together leave no room for the last reference.
                 apart_ticks = (self._frame.ticks - before.ticks) % _WRAP
-                self._in_rhythm = apart_ticks > self._rhythm.last_ticks
+                self._in_rhythm = apart_ticks > round(self._count * self._interval_s * _CLOCK_HZ)
             send_frame()
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name="clock-references", daemon=True)
@@ -151,13 +134,13 @@ class ClockReferences:
     def stop(self) -> None:
         """Stops sending and releases the listener, which has stopped. The thread ends by itself."""
         with self._changed:
-            self._rhythm = _NONE
+            self._count = 0
             del self._send
             self._changed.notify()
 
     def _run(self) -> None:
         with self._changed:
-            while self._rhythm.count:
+            while self._count:
                 self._changed.wait(self._send_due())
             self._thread = None
 
@@ -165,8 +148,8 @@ class ClockReferences:
         """Sends the references that are due; returns the seconds to the next one, None: wait for a frame."""
         if self._frame is None or not self._in_rhythm:
             return None
-        while self._sent < self._rhythm.count:
-            due_s = self._rhythm.interval_s * (self._sent + 1)
+        while self._sent < self._count:
+            due_s = self._interval_s * (self._sent + 1)
             left_s = self._frame_at + due_s - time.monotonic()
             if left_s > 0:
                 return left_s

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from common.gst import Gst, stop
+from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
@@ -103,10 +103,10 @@ class Runner:
         target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
-        elements, framing = self._parts.adjustable, self._framing
+        apply_target, framing = self._parts.apply_target, self._framing
 
         def apply() -> None:
-            builder.apply_target(elements, plan)
+            apply_target(plan)
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
@@ -137,7 +137,7 @@ class Runner:
             (self._parts.source, self.plan.source.label),
         ):
             try:
-                await in_thread(partial(_stop_element, part), deadline_s)
+                await in_thread(partial(stop_element, part), deadline_s)
             except TimeoutError as error:
                 raise HungError(f"{name} hung when it was stopped") from error
         del part
@@ -265,12 +265,6 @@ class Runner:
                 self._fail(faults.of(Blame.ENCODER, f"hung when {when}", self.plan))
             finally:
                 calling.cancel()
-
-
-def _stop_element(element: Any) -> None:
-    # Locked, so that a state change of the pipeline does not restart it.
-    element.set_locked_state(True)
-    element.set_state(Gst.State.NULL)
 
 
 async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:

@@ -139,7 +139,7 @@ def _part(result: type, name: str, kind: Any, source: Any) -> _Read:
     if items or optional:
         kind = get_args(kind)[0]
     flag = _FLAGS.get(result, {}).get(name)
-    measured, convert = kind is float, _converter(name, kind, source.message_type)
+    measured, convert = kind is float, _converter(name, kind, source)
     empty_is_unknown = kind is str and not issubclass(result, results.Sample)
 
     def read_optional(message: Any, known: bool) -> Any:
@@ -161,13 +161,13 @@ def _part(result: type, name: str, kind: Any, source: Any) -> _Read:
     return lambda message, _: convert(getattr(message, there))
 
 
-def _converter(name: str, kind: Any, message: Descriptor | None) -> Callable[..., Any]:
+def _converter(name: str, kind: Any, source: Any) -> Callable[..., Any]:
     """Returns the conversion of one value to a type of the results."""
-    if message:
-        return _reader(kind, message)
+    if source.message_type:
+        return _reader(kind, source.message_type)
     if name == "configuration_json":
         return printable_lines
     if issubclass(kind, Enum):
-        return partial(enums.member, kind)
+        return partial(enums.member, kind, source.enum_type)
     conversions: dict[type, Callable[[Any], Any]] = {str: printable, float: number}
     return conversions.get(kind, lambda value: value)

@@ -226,7 +226,7 @@ def test_what_the_robot_says_is_never_markup(desk_work: Desk, state: states.Prev
     status.preview.state = state
     desk_work.gateway.status.CopyFrom(status)
     window = desk_work.window
-    until(lambda: MARKUP in window.side.faults.shown[0].message.text(), "the fault")
+    until(lambda: MARKUP in window.side.faults.shown[0].text.text(), "the fault")
     until(desk_work.notes, "the robot's notes")
     assert MARKUP in window.header.name.text()
     assert MARKUP in shown_by_qt(window.header.target.toolTip())

@@ -16,7 +16,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
-from console.window.lines import ComponentLine, FaultWidget
+from console.window.lines import StatusLine
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from tests.support.promise import keeps
@@ -36,10 +36,10 @@ class Watch:
     robot: WholeRobot
     window: MonitorWindow
 
-    def line(self, name: str) -> ComponentLine:
+    def line(self, name: str) -> StatusLine:
         """The line of a component."""
         for line in self.window.side.components.shown:
-            if line.name.text() == name:
+            if line.label.text() == name:
                 return line
         raise LookupError(name)
 
@@ -47,13 +47,13 @@ class Watch:
         until(lambda: name in self.names() and self.line(name).mark.text() == mark, f"{name} is {mark}")
 
     def names(self) -> list[str]:
-        return [line.name.text() for line in self.window.side.components.shown]
+        return [line.label.text() for line in self.window.side.components.shown]
 
-    def faults(self) -> list[FaultWidget]:
+    def faults(self) -> list[StatusLine]:
         return list(self.window.side.faults.shown)
 
-    def fault_says(self, words: str) -> FaultWidget:
-        return until(lambda: next((f for f in self.faults() if words in f.message.text()), None), words)
+    def fault_says(self, words: str) -> StatusLine:
+        return until(lambda: next((f for f in self.faults() if words in f.text.text()), None), words)
 
     def health_is(self, word: str) -> None:
         until(lambda: self.window.header.health.word.text() == word, f"health is {word}")

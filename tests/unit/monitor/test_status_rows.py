@@ -7,7 +7,7 @@ import pytest
 from console.client import Unreachable
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import MonitorState
-from console.monitor.status_rows import FaultLine, component_rows, fault_lines
+from console.monitor.status_rows import component_rows, fault_rows
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from omniseer.gateway.v1 import fault_pb2, overlay_pb2
@@ -32,21 +32,21 @@ def with_faults(made: overlay_pb2.OverlaySnapshot) -> None:
 
 
 def test_active_faults_with_remedies_then_the_cleared_ones() -> None:
-    assert fault_lines(heard(snapshot(with_faults)), NOW_S) == [
-        FaultLine("error", SeverityStyle.BAD, "odometry: stopped coming", "Look at the drive", "for 3.0 s"),
-        FaultLine("cleared", SeverityStyle.QUIET, "battery: low", "", "5.0 s ago"),
+    assert fault_rows(heard(snapshot(with_faults)), NOW_S) == [
+        Row("", "error", SeverityStyle.BAD, "odometry: stopped coming", "for 3.0 s", "Look at the drive"),
+        Row("", "cleared", SeverityStyle.QUIET, "battery: low", "5.0 s ago"),
     ]
 
 
 def test_time_goes_on_while_the_robot_is_silent() -> None:
-    assert [line.since for line in fault_lines(heard(snapshot(with_faults)), NOW_S + 10)] == [
+    assert [row.age for row in fault_rows(heard(snapshot(with_faults)), NOW_S + 10)] == [
         "for 13.0 s",
         "15.0 s ago",
     ]
 
 
 def test_a_healthy_robot_has_no_fault() -> None:
-    assert fault_lines(heard(), NOW_S) == []
+    assert fault_rows(heard(), NOW_S) == []
 
 
 def test_a_healthy_robot() -> None:
@@ -60,7 +60,7 @@ def test_a_healthy_robot() -> None:
 def test_there_is_no_row_before_the_first_answer() -> None:
     empty = MonitorState(Link(state=LinkState.CONNECTING, since_s=0))
     assert component_rows(empty, NOW_S) == []
-    assert fault_lines(empty, NOW_S) == []
+    assert fault_rows(empty, NOW_S) == []
 
 
 def test_stale_is_a_word_and_a_style() -> None:

@@ -10,7 +10,7 @@ from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT, GET_SYSTEM_STAT
 from console.client.results import SystemStatus
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_line import status_line
-from console.presentation.status_table import status_rows
+from console.presentation.status_table import View, table_rows
 from omniseer.gateway.v1 import overlay_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
@@ -57,7 +57,7 @@ def test_stale_and_missing_are_words() -> None:
     message = healthy_status()
     message.vision.stale, message.vision.age_ms = True, 3400
     message.health.odom_available = False
-    rows = {row.label: row for row in status_rows(decoded(message))}
+    rows = {row.label: row for row in table_rows(View(decoded(message)))}
     assert (rows["vision"].mark, rows["vision"].age) == ("STALE", "3.4 s")
     assert (rows["motion"].mark, rows["motion"].text) == ("no data", "")
     line = status_line(decoded(message))
@@ -66,7 +66,7 @@ def test_stale_and_missing_are_words() -> None:
 
 
 def test_what_the_robot_never_reports_has_no_line() -> None:
-    labels = [row.label for row in status_rows(decoded(healthy_status()))]
+    labels = [row.label for row in table_rows(View(decoded(healthy_status())))]
     assert labels == ["health", "motion", "vision", "preview", "battery"]
 
 
@@ -90,7 +90,7 @@ def test_a_faulted_preview_says_why_and_a_fallback_says_what_was_preferred() -> 
     message.preview.state, message.preview.last_error = states.PREVIEW_FAULTED, "camera unplugged"
     message.preview.encoder.name, message.preview.encoder.wanted = "x264", "mpp-h265"
     message.preview.encoder.fallback_reason = "/dev/mpp_service is missing"
-    rows = status_rows(decoded(message))
+    rows = table_rows(View(decoded(message)))
     assert any(row.style is SeverityStyle.BAD and row.text == "camera unplugged" for row in rows)
     assert any(row.text == "preferred mpp-h265, /dev/mpp_service is missing" for row in rows)
     assert "preview faulted (camera unplugged)" in status_line(decoded(message))
@@ -109,7 +109,7 @@ def test_faults_stand_right_below_health_and_say_what_to_do() -> None:
     message.faults.add(
         id="odometry.stale", message="odometry stopped coming", age_ms=9000, cleared_age_ms=500
     )
-    _, disk, odometry = status_rows(decoded(message))[:3]
+    _, disk, odometry = table_rows(View(decoded(message)))[:3]
     assert (disk.mark, disk.style, disk.age) == ("error", SeverityStyle.BAD, "1 min 05 s")
     assert disk.text == "the disk is nearly full -> make room"
     assert status_line(decoded(message)).endswith("  1 fault (platform.disk)")
@@ -122,7 +122,7 @@ def test_a_source_has_a_line_only_when_nothing_else_reports_it() -> None:
     message.sources.add(name="battery", state=SOURCE_STATE_WAITING, detail="no battery")
     message.sources.add(name="vision", state=SOURCE_STATE_STALE, detail="vision stopped coming")
     message.faults.add(id="vision.stale", message="vision stopped coming", active=True)
-    rows = [row for row in status_rows(decoded(message)) if row.label == "source"]
+    rows = [row for row in table_rows(View(decoded(message))) if row.label == "source"]
     assert [(row.mark, row.text) for row in rows] == [("waiting", "no battery")]
 
 

@@ -7,6 +7,7 @@ import grpc
 import pytest
 
 from common.errors import (
+    DefectError,
     DomainError,
     ExitCode,
     FieldViolation,
@@ -14,7 +15,7 @@ from common.errors import (
     NotAllowedError,
     TooMuchError,
 )
-from common.grpc_errors import STATUS_CODES, metadata_of, metadata_of_defect
+from common.grpc_errors import STATUS_CODES, metadata_of
 from common.reasons import Reason
 from console.client import errors
 from console.client.error_table import ERRORS, REASONS, error_from
@@ -149,8 +150,7 @@ def test_the_fields_of_a_bad_request_are_named() -> None:
 
 
 def test_a_defect_has_a_reason_too() -> None:
-    failure = Failure(grpc.StatusCode.INTERNAL, "internal error", metadata_of_defect("internal error"))
-    assert error_from(failure, "robot:50051", 2.0).reason == Reason.INTERNAL
+    assert refused(DefectError("internal error")).reason == Reason.INTERNAL
 
 
 @pytest.mark.parametrize(

@@ -20,14 +20,13 @@ from console.client import results
 from console.client.mapping import enums
 from console.client.mapping.methods import (
     METHODS,
-    SET_PREVIEW_MODE,
     STREAMS,
     SUBSCRIBE_EVENTS,
-    WATCH_SYSTEM_STATUS,
     DesiredPreview,
-    EventsRequest,
     Method,
-    WatchRequest,
+    events_request,
+    preview_request,
+    watch_request,
 )
 from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
 from omniseer.gateway.v1 import (
@@ -58,21 +57,24 @@ FILES: Final = (
     system_status_pb2,
 )
 SERVICE: Final = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-ALL_METHODS: Final[tuple[Method[Any, Any], ...]] = (*METHODS, *STREAMS)
+ALL_METHODS: Final[tuple[Method[Any], ...]] = (*METHODS, *STREAMS)
 DECODERS: Final = {method.name: method.decode for method in ALL_METHODS}
 
 ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
-    "ControlResult": partial(enums.member, results.ControlResult),
-    "EventGapReason": partial(enums.member, results.GapReason),
-    "PreviewState": partial(enums.member, results.PreviewState),
-    "SourceState": partial(enums.member, results.SourceState),
-    "FaultSeverity": partial(enums.member, results.FaultSeverity),
-    "RobotHealthState": partial(enums.member, results.HealthState),
-    "TeleopState": partial(enums.member, results.TeleopState),
-    "PreviewProfile": partial(enums.member, results.PreviewProfile),
-    "VideoCodec": partial(enums.member, results.VideoCodec),
-    "StreamTransport": partial(enums.member, results.StreamTransport),
-    "StreamContainer": partial(enums.member, results.StreamContainer),
+    wire.DESCRIPTOR.name: partial(enums.member, members, wire.DESCRIPTOR)
+    for members, wire in (
+        (results.ControlResult, event_pb2.ControlResult),
+        (results.GapReason, event_pb2.EventGapReason),
+        (results.PreviewState, states_pb2.PreviewState),
+        (results.SourceState, source_pb2.SourceState),
+        (results.FaultSeverity, fault_pb2.FaultSeverity),
+        (results.HealthState, states_pb2.RobotHealthState),
+        (results.TeleopState, states_pb2.TeleopState),
+        (results.PreviewProfile, preview_pb2.PreviewProfile),
+        (results.VideoCodec, preview_pb2.VideoCodec),
+        (results.StreamTransport, preview_pb2.StreamTransport),
+        (results.StreamContainer, preview_pb2.StreamContainer),
+    )
 }
 
 LEFT_OUT: Final[Mapping[str, str]] = dict.fromkeys(
@@ -479,7 +481,7 @@ def test_the_tables_name_only_fields_of_answers() -> None:
 
 def test_every_field_of_a_preview_request_is_set() -> None:
     request = robot_gateway_pb2.SetPreviewModeRequest.FromString(
-        SET_PREVIEW_MODE.encode(DesiredPreview(True, PreviewProfile.HIGH_QUALITY))
+        preview_request(DesiredPreview(True, PreviewProfile.HIGH_QUALITY))
     )
     assert request.enabled
     assert request.profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
@@ -488,7 +490,7 @@ def test_every_field_of_a_preview_request_is_set() -> None:
 
 def test_every_field_of_a_subscription_is_set() -> None:
     request = robot_gateway_pb2.SubscribeEventsRequest.FromString(
-        SUBSCRIBE_EVENTS.encode(EventsRequest(EventPosition("run", 7), FaultSeverity.ERROR))
+        events_request(EventPosition("run", 7), FaultSeverity.ERROR)
     )
     assert (request.after.run_id, request.after.sequence) == ("run", 7)
     assert request.min_severity == fault_pb2.FAULT_SEVERITY_ERROR
@@ -497,7 +499,7 @@ def test_every_field_of_a_subscription_is_set() -> None:
 
 def test_every_field_of_a_watch_is_set() -> None:
     request = robot_gateway_pb2.WatchSystemStatusRequest.FromString(
-        WATCH_SYSTEM_STATUS.encode(WatchRequest(0.25, include_detections=True))
+        watch_request(0.25, include_detections=True)
     )
     assert request.min_interval_ms == 250
     assert request.include_detections
@@ -566,7 +568,8 @@ def test_a_number_from_a_newer_gateway_reads_unknown(name: str) -> None:
 
 
 def test_every_profile_can_be_asked_for() -> None:
-    numbers = {profile: enums.number(profile) for profile in PreviewProfile}
-    assert {number: enums.member(PreviewProfile, number) for number in numbers.values()} == {
+    wire = preview_pb2.PreviewProfile.DESCRIPTOR
+    numbers = {profile: enums.number(profile, wire) for profile in PreviewProfile}
+    assert {number: enums.member(PreviewProfile, wire, number) for number in numbers.values()} == {
         number: profile for profile, number in numbers.items()
     }

@@ -20,10 +20,11 @@ from console.client.mapping.methods import (
     SUBSCRIBE_EVENTS,
     WATCH_SYSTEM_STATUS,
     Method,
-    WatchRequest,
+    events_request,
+    watch_request,
 )
 from console.client.options import Backoff, ClientOptions
-from console.client.results import CaughtUp, EventPosition, WatchedStatus
+from console.client.results import CaughtUp, EventPosition, FaultSeverity, WatchedStatus
 from console.client.streams import Outage, Streams
 
 OPTIONS = ClientOptions(
@@ -36,7 +37,7 @@ GONE = Unreachable("gone")
 
 @dataclass(frozen=True)
 class Open:
-    method: Method[Any, Any]
+    method: Method[Any]
     request: Any
     newest_only: bool
 
@@ -48,7 +49,7 @@ class Read:
 
 @dataclass(frozen=True)
 class Call:
-    method: Method[Any, Any]
+    method: Method[Any]
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class ScriptedTransport:
     steps: list[Any] = field(default_factory=list)
     open_calls: int = 0
 
-    def open(self, method: Method[Any, Any], request: Any, *, newest_only: bool) -> "ScriptedTransport":
+    def open(self, method: Method[Any], request: Any, *, newest_only: bool) -> "ScriptedTransport":
         assert self.open_calls == 0, "the call before has ended"
         self.open_calls += 1
         self.steps.append(Open(method, request, newest_only))
@@ -87,7 +88,7 @@ class ScriptedTransport:
         self.steps.append(Read(within_s))
         return self._outcome()
 
-    async def call(self, method: Method[Any, Any], _request: Any, _timeout_s: float) -> Any:
+    async def call(self, method: Method[Any], _request: Any, _timeout_s: float) -> Any:
         self.steps.append(Call(method))
         return self._outcome()
 
@@ -127,22 +128,23 @@ def kinds(steps: list[Any]) -> list[str]:
 
 async def test_what_is_read_is_yielded() -> None:
     driver = Driver(STATUS, STATUS)
-    steps = await driver.run(driver.streams.status(WatchRequest(0.5)))
+    steps = await driver.run(driver.streams.status(0.5))
     assert kinds(steps) == ["Open", "Read", "Yielded", "Read", "Yielded", "Read"]
-    assert steps[0] == Open(WATCH_SYSTEM_STATUS, WatchRequest(0.5), newest_only=True)
+    request = watch_request(0.5, include_detections=False)
+    assert steps[0] == Open(WATCH_SYSTEM_STATUS, request, newest_only=True)
     assert steps[2] == Yielded(STATUS)
 
 
 async def test_silence_is_an_outage_later_than_the_gateways_keepalive() -> None:
     driver = Driver(STATUS)
-    steps = await driver.run(driver.streams.status(WatchRequest(3.0)))
+    steps = await driver.run(driver.streams.status(3.0))
     assert steps[1].within_s == OPTIONS.answer_within_s, "the first comes at once"
     assert steps[-1].within_s == 3.0 + OPTIONS.answer_within_s
 
 
 async def test_an_outage_is_reported_and_retried_with_growing_pauses() -> None:
     driver = Driver(STATUS, *[GONE] * 5, STATUS, GONE)
-    steps = await driver.run(driver.streams.status(WatchRequest(0.1)))
+    steps = await driver.run(driver.streams.status(0.1))
     outages = [step.item.attempt for step in steps if isinstance(step, Yielded) and step.item is not STATUS]
     assert outages == [1, 2, 3, 4, 5, 1]
     pauses = [step.seconds for step in steps if isinstance(step, Sleep)]
@@ -153,14 +155,14 @@ async def test_an_outage_is_reported_and_retried_with_growing_pauses() -> None:
 async def test_a_robot_that_never_answered_is_given_up() -> None:
     driver = Driver(*[GONE] * 20)
     with pytest.raises(Unreachable):
-        await driver.run(driver.streams.status(WatchRequest(0.1)))
+        await driver.run(driver.streams.status(0.1))
     assert driver.transport.now_s <= 1.0
 
 
 @pytest.mark.parametrize("error", [DeadlineExceeded("silent"), Overloaded("too much")])
 async def test_silence_and_a_full_gateway_are_outages(error: GatewayError) -> None:
     driver = Driver(STATUS, error)
-    assert Yielded(Outage(error, 1)) in await driver.run(driver.streams.status(WatchRequest(0.1)))
+    assert Yielded(Outage(error, 1)) in await driver.run(driver.streams.status(0.1))
 
 
 async def test_an_error_that_no_retry_mends_ends_the_stream() -> None:
@@ -174,13 +176,15 @@ async def test_events_resume_where_they_stopped() -> None:
     steps = await driver.run(driver.streams.events(EventFeed()))
     opened = [step for step in steps if isinstance(step, Open)]
     assert [each.method for each in opened] == [SUBSCRIBE_EVENTS] * 2
-    assert [each.request.after for each in opened] == [None, EventPosition("run", 7)]
+    assert [each.request for each in opened] == [
+        events_request(after, FaultSeverity.UNKNOWN) for after in (None, EventPosition("run", 7))
+    ]
     assert not opened[0].newest_only
 
 
 async def test_a_gateway_without_the_stream_is_polled() -> None:
     driver = Driver(Unsupported("older"), None, GONE, None)
-    asked = (await driver.run(driver.streams.status(WatchRequest(0.5))))[2:]
+    asked = (await driver.run(driver.streams.status(0.5)))[2:]
     per_poll = ["Call", "Yielded", "Sleep"]
     assert kinds(asked) == [*per_poll, *per_poll, *per_poll, "Call"]
     assert asked[0].method is GET_SYSTEM_STATUS
@@ -190,12 +194,12 @@ async def test_a_gateway_without_the_stream_is_polled() -> None:
 
 async def test_an_interval_longer_than_any_gateway_streams_is_polled() -> None:
     driver = Driver()
-    assert isinstance((await driver.run(driver.streams.status(WatchRequest(61.0))))[0], Call)
+    assert isinstance((await driver.run(driver.streams.status(61.0)))[0], Call)
 
 
 async def test_closing_the_stream_ends_its_call() -> None:
     driver = Driver(STATUS, STATUS)
-    stream = driver.streams.status(WatchRequest(0.5))
+    stream = driver.streams.status(0.5)
     assert await anext(stream) is STATUS
     assert driver.transport.open_calls == 1
     await stream.aclose()

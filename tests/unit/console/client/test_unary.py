@@ -8,7 +8,14 @@ import pytest
 
 from console.client import Backoff, ClientOptions, PreviewChange, PreviewProfile, PreviewState, SystemStatus
 from console.client.errors import DeadlineExceeded, GatewayError, Refused, Unreachable
-from console.client.mapping.methods import GET_SYSTEM_STATUS, SET_PREVIEW_MODE, DesiredPreview, Method
+from console.client.mapping.methods import (
+    GET_SYSTEM_STATUS,
+    NO_FIELDS,
+    SET_PREVIEW_MODE,
+    DesiredPreview,
+    Method,
+    preview_request,
+)
 from console.client.unary import UnaryCalls
 
 STATUS = GET_SYSTEM_STATUS.decode(b"")
@@ -21,7 +28,7 @@ T = TypeVar("T")
 class Send:
     """One attempt."""
 
-    method: Method[Any, Any]
+    method: Method[Any]
     request: Any
     timeout_s: float
 
@@ -35,7 +42,7 @@ class Stage:
         self.sends: list[Send] = []
         self.pauses_s: list[float] = []
 
-    async def call(self, method: Method[Any, Any], request: Any, timeout_s: float) -> Any:
+    async def call(self, method: Method[Any], request: Any, timeout_s: float) -> Any:
         self.sends.append(Send(method, request, timeout_s))
         self.now_s += self.each_takes_s
         outcome = self.outcomes.pop(0) if self.outcomes else GONE
@@ -112,7 +119,7 @@ async def test_what_must_not_happen_twice_is_not_asked_twice() -> None:
     once = replace(GET_SYSTEM_STATUS, idempotent=False)
     stage = Stage()
     with pytest.raises(Unreachable):
-        await stage.play(stage.calls.call(once, None, 2.0))
+        await stage.play(stage.calls.call(once, NO_FIELDS, 2.0))
     assert len(stage.sends) == 1
 
 
@@ -128,7 +135,7 @@ async def test_enabling_watches_until_frames_leave() -> None:
     assert isinstance(change, PreviewChange)
     assert change.preview.state is PreviewState.RUNNING
     assert [send.method for send in stage.sends] == [SET_PREVIEW_MODE, GET_SYSTEM_STATUS, GET_SYSTEM_STATUS]
-    assert stage.sends[0].request == request
+    assert stage.sends[0].request == preview_request(request)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 from common.findings import Finding, Verdict
 from common.version import project_version
 from console.doctor import network, robot
-from console.doctor.examination import Examination
+from console.doctor.examination import examine, reached
 from console.doctor.srt_probe import answers_as_srt, induction, is_answer
 from omniseer.gateway.v1 import states_pb2 as states
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
@@ -34,9 +34,8 @@ def examined(double: GatewayDouble, *, ahead_s: float = 0.0) -> dict[str, Findin
     now_s = time.time()
     double.info.wall_clock_unix_ms = int((now_s + ahead_s) * 1000)
     with serving(double) as port:
-        examination = Examination(f"127.0.0.1:{port}", wall_clock=lambda: now_s)
-        findings = list(examination.findings())
-        assert examination.reached
+        findings = list(examine(f"127.0.0.1:{port}", wall_clock=lambda: now_s))
+    assert reached(findings)
     return {finding.check: finding for finding in findings}
 
 
@@ -136,26 +135,24 @@ def test_a_running_preview_that_answers() -> None:
 def test_nothing_listens() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # bound, not listening: refused
-        examination = Examination(f"127.0.0.1:{taken.getsockname()[1]}")
-        name, tcp = examination.findings()
-    assert not examination.reached
+        name, tcp = examine(f"127.0.0.1:{taken.getsockname()[1]}")
+    assert not reached([name, tcp])
     assert (name.verdict, tcp.verdict) == (Verdict.GOOD, Verdict.WRONG)
     assert "robot-gateway doctor" in tcp.remedy
 
 
 def test_a_name_that_leads_nowhere_ends_it() -> None:
-    (name,) = Examination("no-such-robot.invalid:50051").findings()
+    (name,) = examine("no-such-robot.invalid:50051")
     assert name.verdict is Verdict.WRONG
     assert "getent" in name.remedy
 
 
 def test_something_else_listens_there() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        examination = Examination(f"127.0.0.1:{server.getsockname()[1]}")
-        findings = list(examination.findings())
+        findings = list(examine(f"127.0.0.1:{server.getsockname()[1]}"))
     assert [finding.check for finding in findings] == ["name", "tcp", "grpc"]
     assert findings[-1].verdict is Verdict.WRONG
-    assert not examination.reached
+    assert not reached(findings)
 
 
 def test_an_address_with_brackets_is_split() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
 from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Density, Row, View, table_rows
+from console.presentation.status_table import Row, View, table_rows
 from omniseer.gateway.v1 import overlay_pb2, source_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import healthy_status
@@ -19,7 +19,7 @@ def message() -> overlay_pb2.OverlaySnapshot:
 
 def view(message: overlay_pb2.OverlaySnapshot) -> View:
     snapshot = GET_OVERLAY_SNAPSHOT.decode(message.SerializeToString())
-    return View(snapshot.status, Density.COMPACT, snapshot.detections)
+    return View(snapshot.status, compact=True, detections=snapshot.detections)
 
 
 def by_label(view: View) -> dict[str, Row]:

@@ -326,7 +326,7 @@ Global___VideoFormat: _TypeAlias = VideoFormat  # noqa: Y015
 
 @_typing.final
 class StreamMeasurement(_message.Message):
-    """Figures taken from the running stream, twice a second."""
+    """Figures taken from the running stream, every 0.6 s."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
