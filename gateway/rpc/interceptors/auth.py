@@ -171,14 +171,17 @@ class Auth(Interceptor[CallContext]):
 
     def _of_token(self, call: CallContext, token: str) -> Principal:
         prefix, owner = call.peer.address_prefix, self._authenticator.id_of_token(token)
-        self._lockout.admit(prefix, owner)
         try:
             principal = self._authenticator.authenticate_token(token)
         except NotAuthenticatedError as error:
             # An expired or revoked token is no guess: its secret was right.
-            if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(prefix, owner):
-                meant = f"credential {owner}" if owner else "no credential of this robot"
-                _log.warning("access: %s shows wrong tokens (%s) and is locked out", call.peer.host, meant)
+            if error.reason is Reason.CREDENTIAL_UNKNOWN:
+                self._lockout.check(prefix, owner)
+                if self._lockout.failed(prefix, owner):
+                    meant = f"credential {owner}" if owner else "no credential of this robot"
+                    _log.warning(
+                        "access: %s shows wrong tokens (%s) and is locked out", call.peer.host, meant
+                    )
             raise
         self._lockout.succeeded(prefix, owner)
         return principal

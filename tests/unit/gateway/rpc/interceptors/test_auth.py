@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from common.errors import NotAuthenticatedError
+from common.errors import NotAuthenticatedError, TooMuchError
 from common.reasons import Reason
 from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
-from gateway.access.lockout import Lockout
+from gateway.access.lockout import FREE_FAILURES, Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
@@ -150,3 +150,15 @@ async def test_an_unknown_credential_causes_one_look_and_is_refused(ground: Grou
     with pytest.raises(NotAuthenticatedError):
         await ground.ping("eve")
     assert ground.looks == 1
+
+
+async def test_a_right_token_is_admitted_whatever_its_address_has_guessed(ground: Ground) -> None:
+    ground.tokens["guess of anna"] = new_token("a" * 12)
+    for _ in range(FREE_FAILURES + 1):
+        with pytest.raises(NotAuthenticatedError, match="not one of this robot's"):
+            await ground.ping("guess of anna")
+    for _ in range(2):
+        assert await ground.ping("anna") == b"anna"
+        with pytest.raises(TooMuchError) as seen:
+            await ground.ping("guess of anna")
+        assert seen.value.reason is Reason.LOCKED_OUT, "the right token does not help the guesser"
