@@ -1,6 +1,7 @@
 """Who may call: credentials, certificates and the audit log, put together from the settings."""
 
 import asyncio
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -18,6 +19,8 @@ from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.tls import ServerTls
 from gateway.status.access import AccessView
 from gateway.status.event import ControlAction, ControlResult
+
+_log = logging.getLogger(__name__)
 
 _KIB: Final = 1024
 _AUDIT_FILE: Final = "audit.jsonl"
@@ -90,19 +93,22 @@ class AccessControl:
             tasks.create_task(self.auth.run(), name="revocation")
 
     def _use(self, loaded: LoadedAccess) -> None:
-        self._authenticator.use(loaded.store)
+        self._authenticator.use(loaded.store, loaded.problem)
         if self.auth:
             self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        count = len(loaded.store.credentials)
+        answer = f"{len(loaded.store.credentials)} credentials and the newest certificates are in force"
+        if loaded.problem:
+            answer = f"no credential is accepted: {loaded.problem}"
+            _log.error("access: %s", answer)
         self._done_log.record(
             ControlAction(
                 who="",
                 address="this robot",
                 method="credentials",
                 request="changed files",
-                result=ControlResult.ACCEPTED,
-                answer=f"{count} credentials and the newest certificates are in force",
+                result=ControlResult.FAILED if loaded.problem else ControlResult.ACCEPTED,
+                answer=answer,
             )
         )

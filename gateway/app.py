@@ -99,8 +99,9 @@ async def _observe(gateway: Gateway) -> None:
     link, health = gateway.preview_link, gateway.health
     listener: Listener | None = None
     while True:
-        seen = gateway.state.observe(gateway.access.view())
-        health.set_serving(SERVICE, serving=not seen.ros_stalled)
+        access = gateway.access.view()
+        seen = gateway.state.observe(access)
+        health.set_serving(SERVICE, serving=not (seen.ros_stalled or access.closed))
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()

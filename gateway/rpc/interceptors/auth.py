@@ -96,7 +96,7 @@ class Auth(Interceptor[CallContext]):
         if self._admitted.get(principal.credential_ids) is principal:
             return
         if not self._authenticator.still_valid(principal):
-            raise _access_lost()
+            raise self._authenticator.access_lost()
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
@@ -132,7 +132,7 @@ class Auth(Interceptor[CallContext]):
 
     async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
-        error = _access_lost()
+        error = self._authenticator.access_lost()
         who = call.principal.name if call.principal else ""
         _log.info("access: %s of %s ended, its credential is no longer valid", call.method.name, who)
         code = STATUS_CODES[NotAuthenticatedError]
@@ -205,13 +205,6 @@ def fingerprint_of(rpc: RpcContext) -> str | None:
 @lru_cache(maxsize=_REMEMBERED_CERTIFICATES)
 def _fingerprint(pem: bytes) -> str:
     return hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem.decode("ascii"))).hexdigest()
-
-
-def _access_lost() -> NotAuthenticatedError:
-    return NotAuthenticatedError(
-        "the credential of this call is no longer valid; what it requested may have been done",
-        Reason.CREDENTIAL_REVOKED,
-    )
 
 
 def _authorize(principal: Principal, method: Method) -> None:

@@ -10,6 +10,8 @@ from typing import Any
 
 import grpc
 import pytest
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from common.reasons import Reason
 from console.client.refusal import refusal_in
@@ -18,6 +20,7 @@ from gateway.access.repeats import BURST
 from gateway.access.role import Role
 from gateway.access.token import new_token
 from gateway.rpc.mapping.enums import SEVERITIES
+from gateway.rpc.server import SERVICE
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetSystemStatusRequest,
     PingRequest,
@@ -259,6 +262,34 @@ async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> 
         assert await ping(calls, login) == ""
         robot.directory.store_file.write_text(text)
         await until(lambda: faults(calls, login), {})
+
+
+async def test_a_list_that_stays_unreadable_admits_none_until_it_is_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.access.reloader.CLOSED_AFTER_S", 1.0)
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        health: Any = HealthStub(robot.channel())  # its type has no methods
+
+        async def serving() -> bool:
+            answer = await health.Check(HealthCheckRequest(service=SERVICE), timeout=5)
+            return bool(answer.status == HealthCheckResponse.SERVING)
+
+        stream = calls.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
+        await stream.read()
+        hidden = robot.directory.store_file.rename(tmp_path / "elsewhere")
+        assert await ping(calls, login) == ""
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await asyncio.wait_for(to_its_end(stream), 10)
+        assert refusal_in(caught.value.trailing_metadata()).reason == Reason.CREDENTIALS_UNREADABLE
+        assert await ping(calls, login) == Reason.CREDENTIALS_UNREADABLE
+        await until(serving, False)
+        hidden.rename(robot.directory.store_file)
+        await until(lambda: ping(calls, login), "")
+        await until(serving, True)
 
 
 async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:

@@ -162,3 +162,16 @@ async def test_a_right_token_is_admitted_whatever_its_address_has_guessed(ground
         with pytest.raises(TooMuchError) as seen:
             await ground.ping("guess of anna")
         assert seen.value.reason is Reason.LOCKED_OUT, "the right token does not help the guesser"
+
+
+async def test_while_the_list_is_unreadable_no_credential_is_accepted(ground: Ground) -> None:
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        yield b"first"
+        ground.authenticator.use(Store(), "the list can't be read")
+        ground.auth.end_revoked()
+        yield b"second"
+
+    with pytest.raises(NotAuthenticatedError, match="can't be read") as seen:
+        await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
+    assert seen.value.reason is Reason.CREDENTIALS_UNREADABLE
+    assert ground.renewals == 1
