@@ -14,6 +14,8 @@ from gateway.access.lockout import Lockout
 from gateway.access.reloader import CredentialReloader, LoadedAccess
 from gateway.config import SecuritySettings
 from gateway.rpc.calls.ports import EventSink, StreamKey
+from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.tls import ServerTls
@@ -33,6 +35,8 @@ class AccessControl:
         settings: who may call, and how.
         events: where refused control actions are shown.
         stream_key: renewed when a caller loses access.
+        admission: gives connections their places.
+        refusals: delays the refusals of others.
 
     Attributes:
         audit: the interceptor that records control actions.
@@ -42,7 +46,14 @@ class AccessControl:
         UserError: credentials or certificates can't be read.
     """
 
-    def __init__(self, settings: SecuritySettings, events: EventSink, stream_key: StreamKey) -> None:
+    def __init__(
+        self,
+        settings: SecuritySettings,
+        events: EventSink,
+        stream_key: StreamKey,
+        admission: Admission,
+        refusals: RefusalDelay,
+    ) -> None:
         directory = settings.credentials
         file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
         refused_file = file.with_name(f"{file.stem}-refused{file.suffix}") if file else None
@@ -60,7 +71,13 @@ class AccessControl:
         self._authenticator = Authenticator(self._reloader.loaded.store)
         certificates = tls_files is not None and tls_files.client_ca is not None
         self.auth = Auth(
-            self._authenticator, Lockout(), self._reloader, stream_key, certificates=certificates
+            self._authenticator,
+            Lockout(),
+            self._reloader,
+            stream_key,
+            admission=admission,
+            refusals=refusals,
+            certificates=certificates,
         )
         if self._reloader.loaded.tls:
             self._tls = ServerTls(self._reloader.loaded.tls)

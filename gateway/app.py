@@ -61,6 +61,7 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 gateway.services,
                 gateway.interceptors,
                 gateway.health,
+                max_connections=gateway.max_connections,
                 credentials=gateway.access.server_credentials,
                 extra=extra,
             ) as port,
@@ -71,6 +72,7 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 tasks.create_task(gateway.status_stream.run(), name="status-stream"),
                 tasks.create_task(gateway.access.run(), name="access"),
                 tasks.create_task(_observe(gateway), name="observer"),
+                tasks.create_task(gateway.connection_guard.run(port), name="connection-guard"),
             ]
             try:
                 yield port

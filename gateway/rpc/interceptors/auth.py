@@ -9,7 +9,7 @@ from typing import Any, Final, NoReturn
 
 import grpc
 
-from common.errors import NotAllowedError, NotAuthenticatedError
+from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.grpc_errors import STATUS_CODES, metadata_of
 from common.interceptors import Interceptor, RpcContext
 from common.reasons import Reason
@@ -19,6 +19,8 @@ from gateway.access.lockout import Lockout
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import Method, Open
 from gateway.rpc.calls.ports import CredentialFiles, StreamKey
+from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.refusal_delay import RefusalDelay
 
 _log = logging.getLogger(__name__)
 
@@ -42,6 +44,8 @@ class Auth(Interceptor[CallContext]):
         lockout: delays those who show wrong ones.
         files: read again when an unknown credential is shown.
         stream_key: renewed when a caller that was admitted loses access.
+        admission: gives connections their places.
+        refusals: delays the refusals of the others.
         certificates: whether connections show client certificates.
     """
 
@@ -52,12 +56,16 @@ class Auth(Interceptor[CallContext]):
         files: CredentialFiles,
         stream_key: StreamKey,
         *,
+        admission: Admission,
+        refusals: RefusalDelay,
         certificates: bool,
     ) -> None:
         self._authenticator = authenticator
         self._lockout = lockout
         self._files = files
         self._stream_key = stream_key
+        self._admission = admission
+        self._refusals = refusals
         self._certificates = certificates
         self._admitted: dict[tuple[str, ...], Principal] = {}
         """By their credentials, of which there are as many as the robot has."""
@@ -74,9 +82,14 @@ class Auth(Interceptor[CallContext]):
         Raises:
             NotAuthenticatedError: no valid credential was shown.
             NotAllowedError: the method needs another role.
-            TooMuchError: too many wrong credentials came from there.
+            TooMuchError: too many wrong credentials came from there, or all places are taken.
         """
-        call.principal = principal = await self._authenticate(call)
+        try:
+            call.principal = principal = await self._authenticate(call)
+            self._admission.admit(call.peer)
+        except (NotAuthenticatedError, TooMuchError) as error:
+            self._dismiss(call)
+            await self._refusals.refuse(error)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:
@@ -124,11 +137,18 @@ class Auth(Interceptor[CallContext]):
         if lost:
             self._stream_key.renew_passphrase()
         for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
-            abort = asyncio.create_task(
-                self._end(call, self._streams.pop(call)), name="revocation of a stream"
-            )
+            # First the stream, then the place: others of the same connection may be valid.
+            task = self._streams.pop(call)
+            self._dismiss(call)
+            abort = asyncio.create_task(self._end(call, task), name="revocation of a stream")
             self._aborts.add(abort)
             abort.add_done_callback(self._aborts.discard)
+
+    def _dismiss(self, call: CallContext) -> None:
+        """Takes the connection's place away, unless a stream of a valid caller is open on it."""
+        address = call.peer.address
+        if not any(each.peer.address == address for each in self._streams):
+            self._admission.dismiss(call.peer)
 
     async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
