@@ -1,15 +1,19 @@
 """Entry points of programs: an asyncio loop that SIGINT and SIGTERM stop, and errors as one line."""
 
 import asyncio
+import resource
 import signal
 import sys
 from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
 import uvloop
 
 from common import heartbeat
 from common.errors import UserError
+
+_DESCRIPTORS: Final = 65_536
+"""More than any program of the project can use."""
 
 
 def run_to_exit(work: Callable[[], None]) -> None:
@@ -31,7 +35,16 @@ def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
 
     `main` is expected to return soon after `stop` is set. Sends heartbeats to a supervisor that wants them.
     """
+    _raise_descriptor_limit()
     uvloop.run(_with_signals(main))
+
+
+def _raise_descriptor_limit() -> None:
+    """Raises the soft limit (1024 by tradition) towards the hard one: each connection takes a descriptor."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, _DESCRIPTORS)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
 
 async def _with_signals(main: Callable[[asyncio.Event], Awaitable[None]]) -> None:

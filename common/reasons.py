@@ -31,6 +31,8 @@ class Reason(StrEnum):
     """The credential has expired."""
     CREDENTIAL_NOT_YET_VALID = "CREDENTIAL_NOT_YET_VALID"
     """The credential is not valid yet, by the robot's clock."""
+    CREDENTIALS_UNREADABLE = "CREDENTIALS_UNREADABLE"
+    """The gateway can't read its list of credentials, so that it accepts none."""
     ROLE_TOO_LOW = "ROLE_TOO_LOW"
     """The caller is authenticated, but the method needs a higher role."""
     LOCKED_OUT = "LOCKED_OUT"

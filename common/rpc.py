@@ -3,6 +3,7 @@
 common.bind binds what `new_server` returns to a TCP port or a Unix socket.
 """
 
+import resource
 from typing import Final
 
 import grpc
@@ -32,20 +33,35 @@ _SERVER_OPTIONS: Final = (
     ("grpc.keepalive_permit_without_calls", 1),
     # Clients may ping more often themselves (ours every 2 s) without GOAWAY "too_many_pings".
     ("grpc.http2.min_ping_interval_without_data_ms", 1_000),
+    # A connection without calls is closed; gRPC clients connect again for their next one.
+    ("grpc.max_connection_idle_ms", 300_000),
 )
+_MAX_CONNECTIONS: Final = 1024
 _MAX_CONCURRENT_CALLS: Final = 4096
 """Of all connections; more are refused with RESOURCE_EXHAUSTED. Beyond its own limit a connection's streams
 are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 
 
-def new_server(chain: Chain | None = None) -> grpc.aio.Server:
+def possible_connections(wanted: int) -> int:
+    """Returns how many connections to accept at once: at most half of the descriptors that there may be.
+
+    Each takes some 45 KiB with TLS besides, whatever it does.
+    """
+    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return wanted if descriptors == resource.RLIM_INFINITY else min(wanted, descriptors // 2)
+
+
+def new_server(chain: Chain | None = None, *, max_connections: int = _MAX_CONNECTIONS) -> grpc.aio.Server:
     """Returns a server that is neither bound nor started.
 
     Args:
         chain: what every call passes; by default an ErrorInterceptor alone.
+        max_connections: accepted at once at each of its addresses; any more are closed before TLS.
+            No more than `possible_connections`.
     """
+    at_most = ("grpc.max_allowed_incoming_connections", possible_connections(max_connections))
     return grpc.aio.server(
         interceptors=(chain or Chain([ErrorInterceptor()]),),
-        options=_SERVER_OPTIONS,
+        options=(*_SERVER_OPTIONS, at_most),
         maximum_concurrent_rpcs=_MAX_CONCURRENT_CALLS,
     )

@@ -1,6 +1,7 @@
 """Who may call: credentials, certificates and the audit log, put together from the settings."""
 
 import asyncio
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -13,11 +14,15 @@ from gateway.access.lockout import Lockout
 from gateway.access.reloader import CredentialReloader, LoadedAccess
 from gateway.config import SecuritySettings
 from gateway.rpc.calls.ports import EventSink, StreamKey
+from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.tls import ServerTls
 from gateway.status.access import AccessView
 from gateway.status.event import ControlAction, ControlResult
+
+_log = logging.getLogger(__name__)
 
 _KIB: Final = 1024
 _AUDIT_FILE: Final = "audit.jsonl"
@@ -30,6 +35,8 @@ class AccessControl:
         settings: who may call, and how.
         events: where refused control actions are shown.
         stream_key: renewed when a caller loses access.
+        admission: gives connections their places.
+        refusals: delays the refusals of others.
 
     Attributes:
         audit: the interceptor that records control actions.
@@ -39,7 +46,14 @@ class AccessControl:
         UserError: credentials or certificates can't be read.
     """
 
-    def __init__(self, settings: SecuritySettings, events: EventSink, stream_key: StreamKey) -> None:
+    def __init__(
+        self,
+        settings: SecuritySettings,
+        events: EventSink,
+        stream_key: StreamKey,
+        admission: Admission,
+        refusals: RefusalDelay,
+    ) -> None:
         directory = settings.credentials
         file = settings.audit.file or (directory / _AUDIT_FILE if directory else None)
         refused_file = file.with_name(f"{file.stem}-refused{file.suffix}") if file else None
@@ -57,7 +71,13 @@ class AccessControl:
         self._authenticator = Authenticator(self._reloader.loaded.store)
         certificates = tls_files is not None and tls_files.client_ca is not None
         self.auth = Auth(
-            self._authenticator, Lockout(), self._reloader, stream_key, certificates=certificates
+            self._authenticator,
+            Lockout(),
+            self._reloader,
+            stream_key,
+            admission=admission,
+            refusals=refusals,
+            certificates=certificates,
         )
         if self._reloader.loaded.tls:
             self._tls = ServerTls(self._reloader.loaded.tls)
@@ -90,19 +110,22 @@ class AccessControl:
             tasks.create_task(self.auth.run(), name="revocation")
 
     def _use(self, loaded: LoadedAccess) -> None:
-        self._authenticator.use(loaded.store)
+        self._authenticator.use(loaded.store, loaded.problem)
         if self.auth:
             self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        count = len(loaded.store.credentials)
+        answer = f"{len(loaded.store.credentials)} credentials and the newest certificates are in force"
+        if loaded.problem:
+            answer = f"no credential is accepted: {loaded.problem}"
+            _log.error("access: %s", answer)
         self._done_log.record(
             ControlAction(
                 who="",
                 address="this robot",
                 method="credentials",
                 request="changed files",
-                result=ControlResult.ACCEPTED,
-                answer=f"{count} credentials and the newest certificates are in force",
+                result=ControlResult.FAILED if loaded.problem else ControlResult.ACCEPTED,
+                answer=answer,
             )
         )

@@ -61,6 +61,7 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 gateway.services,
                 gateway.interceptors,
                 gateway.health,
+                max_connections=gateway.max_connections,
                 credentials=gateway.access.server_credentials,
                 extra=extra,
             ) as port,
@@ -71,6 +72,7 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 tasks.create_task(gateway.status_stream.run(), name="status-stream"),
                 tasks.create_task(gateway.access.run(), name="access"),
                 tasks.create_task(_observe(gateway), name="observer"),
+                tasks.create_task(gateway.connection_guard.run(port), name="connection-guard"),
             ]
             try:
                 yield port
@@ -99,8 +101,9 @@ async def _observe(gateway: Gateway) -> None:
     link, health = gateway.preview_link, gateway.health
     listener: Listener | None = None
     while True:
-        seen = gateway.state.observe(gateway.access.view())
-        health.set_serving(SERVICE, serving=not seen.ros_stalled)
+        access = gateway.access.view()
+        seen = gateway.state.observe(access)
+        health.set_serving(SERVICE, serving=not (seen.ros_stalled or access.closed))
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()

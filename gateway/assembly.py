@@ -15,6 +15,7 @@ from functools import partial
 from typing import Final, Protocol
 
 from common.health import Health
+from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
 from gateway.links.link import Connector, ServiceLink
@@ -28,8 +29,11 @@ from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
 from gateway.rpc.calls.methods import CONTRACT
 from gateway.rpc.calls.recipient import Recipients
+from gateway.rpc.connections.admission import MAX_PENDING, Admission
+from gateway.rpc.connections.guard import ConnectionGuard
+from gateway.rpc.connections.refusal_delay import RefusalDelay
 from gateway.rpc.interceptors.presence import Presence
-from gateway.rpc.interceptors.rate_limit import Admission, RateLimit
+from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.responses.event_stream import EventStream
@@ -46,6 +50,8 @@ from gateway.status.board import Board
 
 _log = logging.getLogger(__name__)
 
+_BESIDE_PLACES: Final = 3 * MAX_PENDING
+"""Accepted connections: pending ones, and surplus ones for the moment until they are closed."""
 _PASSPHRASE_BYTES: Final = 24
 """32 characters of base64: 192 random bits, beyond guessing whatever the length of SRT's AES key."""
 
@@ -66,6 +72,7 @@ class Gateway:
 
     settings: GatewaySettings
     outside: Outside
+    max_connections: int
     state: State
     preview_link: PreviewLink
     access: AccessControl
@@ -73,6 +80,7 @@ class Gateway:
     services: Services
     interceptors: Interceptors
     health: Health
+    connection_guard: ConnectionGuard
     loop_delay: LoopDelay
     metrics: GatewayCollector
 
@@ -91,7 +99,11 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     control = PreviewControl(link, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
-    access = AccessControl(settings.security, state, control)
+    max_connections = possible_connections(settings.limits.connections + _BESIDE_PLACES)
+    admission = Admission(settings.limits, max_connections=max_connections)
+    refusals = RefusalDelay()
+    connection_guard = ConnectionGuard(admission)
+    access = AccessControl(settings.security, state, control, admission, refusals)
     recipients = Recipients(settings.preview.advertised_host)
     status_stream = StatusStream(state, time.monotonic)
     event_stream = EventStream(state.events, state.event_added)
@@ -103,7 +115,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     )
     interceptors = Interceptors(
         stats=stats,
-        rate_limit=RateLimit(Admission(settings.limits)),
+        rate_limit=RateLimit(admission, refusals, admits=access.auth is None),
         audit=access.audit,
         auth=access.auth,
         validation=Validation(settings.limits.request_bytes),
@@ -113,6 +125,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     return Gateway(
         settings=settings,
         outside=outside,
+        max_connections=max_connections,
         state=state,
         preview_link=link,
         access=access,
@@ -120,11 +133,13 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         services=services,
         interceptors=interceptors,
         health=Health(SERVICE),
+        connection_guard=connection_guard,
         loop_delay=loop_delay,
         metrics=GatewayCollector(
             state=state,
             stats=stats,
             loop_delay=loop_delay,
+            connection_guard=connection_guard,
             status_stream=status_stream,
             event_stream=event_stream,
             preview_link=link,

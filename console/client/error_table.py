@@ -43,6 +43,7 @@ REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
     Reason.CREDENTIAL_REVOKED: errors.NotAllowed,
     Reason.CREDENTIAL_EXPIRED: errors.NotAllowed,
     Reason.CREDENTIAL_NOT_YET_VALID: errors.NotAllowed,
+    Reason.CREDENTIALS_UNREADABLE: errors.NotAllowed,
     Reason.ROLE_TOO_LOW: errors.NotAllowed,
     Reason.LOCKED_OUT: errors.NotAllowed,
     Reason.INTERNAL: errors.GatewayFailed,
@@ -54,6 +55,9 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
     Reason.CREDENTIAL_EXPIRED: (
         "Ask this robot's administrator for a new login, then type: robotctl login NAME HOST:PORT FILE"
+    ),
+    Reason.CREDENTIALS_UNREADABLE: (
+        "Ask this robot's administrator to repair its list of credentials; no new login is needed"
     ),
     Reason.ROLE_TOO_LOW: (
         "Ask this robot's administrator for a login with that role, then type: "

@@ -30,8 +30,9 @@ class Authenticator:
         self._clock = clock
         self.use(store)
 
-    def use(self, store: Store) -> None:
-        """Replaces the list of credentials."""
+    def use(self, store: Store, problem: str = "") -> None:
+        """Replaces the list of credentials; a problem keeps all of them from being accepted."""
+        self._problem = problem
         self._by_id = store.credentials
         self._by_fingerprint = {
             each.proof: each for each in store.credentials.values() if each.kind is Kind.CERTIFICATE
@@ -75,8 +76,19 @@ class Authenticator:
             )
         return self._principal(credential)
 
+    def access_lost(self) -> NotAuthenticatedError:
+        """Returns the error for a caller that is no longer `still_valid`."""
+        if self._problem:
+            return self._unreadable()
+        return NotAuthenticatedError(
+            "the credential of this call is no longer valid; what it requested may have been done",
+            Reason.CREDENTIAL_REVOKED,
+        )
+
     def still_valid(self, principal: Principal) -> bool:
         """Returns whether all credentials of the principal are valid now and still grant its role."""
+        if self._problem:
+            return False
         now_s = self._clock()
         credentials = [self._by_id.get(each) for each in principal.credential_ids]
         return all(
@@ -84,7 +96,15 @@ class Authenticator:
             for each in credentials
         )
 
+    def _unreadable(self) -> NotAuthenticatedError:
+        return NotAuthenticatedError(
+            f"this robot can't tell which credentials are revoked: {self._problem}",
+            Reason.CREDENTIALS_UNREADABLE,
+        )
+
     def _principal(self, credential: Credential) -> Principal:
+        if self._problem:
+            raise self._unreadable()
         state = credential.validity(self._clock())
         if state is not Validity.VALID:
             reason, problem = _INVALID[state]

@@ -2,8 +2,8 @@
 
 The unit that is locked is a pair of address and credential. A guesser of Anna's token locks the use of that
 token from their own address; Ben behind the same address (a tunnel, a Wi-Fi router) is not affected, nor is
-Anna at any other address. Guesses that name no credential of this robot share one entry per address, which
-affects no holder of a credential.
+Anna at any address: her own token is right, and what is right is never locked. Guesses that name no
+credential of this robot share one entry per address.
 """
 
 import math
@@ -47,8 +47,8 @@ class Lockout:
         self._entries: dict[tuple[str, str], _Entry] = {}
         """Ordered by last failure, the latest at the end."""
 
-    def admit(self, address_prefix: str, credential_id: str) -> None:
-        """Checks that an attempt may be made.
+    def check(self, address_prefix: str, credential_id: str) -> None:
+        """Checks whether the pair is locked, after a wrong token.
 
         Args:
             address_prefix: of the caller, see gateway/access/address_prefix.py.
@@ -57,8 +57,7 @@ class Lockout:
         Raises:
             TooMuchError: the pair is locked.
         """
-        # Every call passes here, and nearly always there are no entries.
-        entry = self._entries.get((address_prefix, credential_id)) if self._entries else None
+        entry = self._entries.get((address_prefix, credential_id))
         if entry is None:
             return
         left_s = entry.locked_until_s - self._clock()
@@ -87,6 +86,8 @@ class Lockout:
         return locked
 
     def succeeded(self, address_prefix: str, credential_id: str) -> None:
-        """Resets the pair after a successful attempt."""
-        if self._entries:
-            self._entries.pop((address_prefix, credential_id), None)
+        """Resets the pair after a right token, unless it is locked: a guesser may have the same address."""
+        # Every call passes here, and nearly always there are no entries.
+        entry = self._entries.get((address_prefix, credential_id)) if self._entries else None
+        if entry is not None and entry.locked_until_s <= self._clock():
+            del self._entries[address_prefix, credential_id]

@@ -1,13 +1,14 @@
 """Reloads credentials and certificates when their files change, without a restart or a signal.
 
-Files that can't be read change nothing: the last good version stays in effect, and operators see a fault.
+What can't be read changes nothing at first: the last good version stays in effect, and operators see a fault.
+A list of credentials that stays unreadable may hide a revocation, so that no credential is accepted any more.
 """
 
 import asyncio
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, NoReturn
@@ -23,6 +24,8 @@ POLL_INTERVAL_S: Final = 0.5
 """Bounds how long a revoked credential remains usable."""
 _UNKNOWN_INTERVAL_S: Final = 0.1
 """Minimum interval of polls caused by unknown credentials, of which there may be a flood."""
+CLOSED_AFTER_S: Final = 60.0
+"""How long the list of credentials may be unreadable before none is accepted."""
 _FAILURES_REPORTED: Final = 3
 """Consecutive failures before a fault: two files that belong together do not change at the same instant."""
 _CERTIFICATES: Final = {
@@ -63,11 +66,13 @@ class LoadedAccess:
         store: the credentials.
         tls: None without TLS.
         ends_s: end of validity of certificates by their key in `_CERTIFICATES`, seconds since 1970.
+        problem: why no credential is accepted; empty if they are.
     """
 
     store: Store
     tls: TlsMaterial | None
     ends_s: Mapping[str, int]
+    problem: str = ""
 
 
 def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedAccess:
@@ -76,7 +81,10 @@ def load_access(directory: CredentialDirectory, tls: TlsFiles | None) -> LoadedA
     Raises:
         UserError: one can't be read or is invalid.
     """
-    store = directory.read_store()
+    return _with_certificates(directory.read_store(), tls)
+
+
+def _with_certificates(store: Store, tls: TlsFiles | None) -> LoadedAccess:
     if tls is None:
         return LoadedAccess(store, None, {})
     server = KeyPairFiles(tls.certificate, tls.key, "server certificate").read()
@@ -119,6 +127,7 @@ class CredentialReloader:
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)
         self._error, self._failures = "", 0
+        self._unreadable_since_s: float | None = None
         self._polling = asyncio.Lock()
         self._polled_s = -math.inf
         self._next_poll: asyncio.Task[None] | None = None
@@ -146,6 +155,7 @@ class CredentialReloader:
             tuple(_certificate_expiry(which, ends_s, now_s) for which, ends_s in self.loaded.ends_s.items()),
             self._error,
             audit_error,
+            closed=bool(self.loaded.problem),
         )
 
     async def _poll_when_due(self) -> None:
@@ -165,13 +175,35 @@ class CredentialReloader:
         if seen == self._seen and not self._failures:
             return
         try:
-            loaded = await asyncio.to_thread(load_access, self._directory, self._tls)
+            store = await asyncio.to_thread(self._directory.read_store)
         except UserError as error:
-            self._failures += 1
-            if self._failures >= _FAILURES_REPORTED:
-                self._error = error.what
+            self._note(error)
+            self._close_if_overdue(error)
+            return
+        self._unreadable_since_s = None
+        try:
+            loaded = await asyncio.to_thread(_with_certificates, store, self._tls)
+        except UserError as error:
+            self._note(error)
+            # A certificate that can't be read must not keep a revocation from taking effect.
+            self._put_in_effect(replace(self.loaded, store=store, problem=""))
             return
         self._seen, self._error, self._failures = seen, "", 0
+        self._put_in_effect(loaded)
+
+    def _note(self, error: UserError) -> None:
+        self._failures += 1
+        if self._failures >= _FAILURES_REPORTED:
+            self._error = error.what
+
+    def _close_if_overdue(self, error: UserError) -> None:
+        now_s = time.monotonic()
+        if self._unreadable_since_s is None:
+            self._unreadable_since_s = now_s
+        if now_s - self._unreadable_since_s >= CLOSED_AFTER_S:
+            self._put_in_effect(replace(self.loaded, problem=error.what))
+
+    def _put_in_effect(self, loaded: LoadedAccess) -> None:
         if loaded != self.loaded:
             self.loaded = loaded
             self._on_change(loaded)

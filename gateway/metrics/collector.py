@@ -15,6 +15,7 @@ from prometheus_client.registry import Collector
 from gateway.links.preview.control import PreviewLink
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.ports import SnapshotSource
+from gateway.rpc.connections.guard import ConnectionGuard
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.responses.event_stream import EventStream
 from gateway.rpc.responses.status_stream import StatusStream
@@ -35,12 +36,14 @@ class GatewayCollector(Collector):
         loop_delay: how late the event loop was.
         status_stream: counts responses that slow readers skipped.
         event_stream: counts gaps of subscribers.
+        connection_guard: counts connections.
         preview_link: counts failures to connect.
     """
 
     state: SnapshotSource
     stats: Stats
     loop_delay: LoopDelay
+    connection_guard: ConnectionGuard
     status_stream: StatusStream
     event_stream: EventStream
     preview_link: PreviewLink
@@ -101,6 +104,11 @@ class GatewayCollector(Collector):
         skipped = "Statuses that slow readers did not get, because they got newer ones."
         yield _counter("statuses_skipped", skipped, self.status_stream.skipped)
         yield _counter("event_gaps", "Times a subscriber missed events.", self.event_stream.gaps)
+        guard = self.connection_guard
+        yield _gauge("connections", "Connections to the operators' port.", guard.open)
+        yield _counter(
+            "connections_closed", "Connections closed because no call of theirs was admitted.", guard.closed
+        )
 
 
 def _gauge(name: str, what: str, value: float) -> Metric:

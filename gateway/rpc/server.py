@@ -93,6 +93,7 @@ async def serving(
     interceptors: Interceptors,
     health: Health,
     *,
+    max_connections: int,
     credentials: grpc.ServerCredentials | None = None,
     extra: Sequence[grpc.GenericRpcHandler] = (),
 ) -> AsyncIterator[int]:
@@ -103,6 +104,7 @@ async def serving(
         services: answer the contract's methods.
         interceptors: what every call passes.
         health: answers the health service.
+        max_connections: accepted at once.
         credentials: for TLS; None for plaintext.
         extra: further services.
 
@@ -113,7 +115,7 @@ async def serving(
         UserError: an address can't be bound.
     """
     chain = interceptors.chain()
-    server = new_server(chain)
+    server = new_server(chain, max_connections=max_connections)
     server.add_generic_rpc_handlers((chain.service(CONTRACT, services.methods()), *extra))
     health.register(server)
     enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)

@@ -29,12 +29,14 @@ class AccessView:
     Attributes:
         certificates: those that TLS depends on.
         credentials_error: why the newest credentials are not in force; empty if they are.
+        closed: whether no credential is accepted because of that error, which has lasted too long.
         audit_error: why the audit log can't be written; empty if it can.
     """
 
     certificates: tuple[CertificateExpiry, ...] = ()
     credentials_error: str = ""
     audit_error: str = ""
+    closed: bool = False
 
 
 UNGUARDED = AccessView()

@@ -99,7 +99,7 @@ class Guarded:
 
 @contextmanager
 def guarded_program(
-    directory: Path, home: Path, kind: Kind = Kind.TOKEN, **settings: Any
+    directory: Path, home: Path, kind: Kind = Kind.TOKEN, descriptors: int | None = None, **settings: Any
 ) -> Iterator[Guarded]:
     """Up when the block begins, gone when it ends.
 
@@ -107,6 +107,7 @@ def guarded_program(
         directory: the robot's files.
         home: the laptop's configuration directory.
         kind: how its callers prove who they are.
+        descriptors: how many it may have at the most.
         settings: keys of the gateway's configuration.
     """
     credentials, port = CredentialDirectory(directory / "credentials"), free_tcp_port()
@@ -127,6 +128,8 @@ def guarded_program(
     }
     config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
     command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", str(config)]
+    if descriptors is not None:
+        command = ["prlimit", f"--nofile={descriptors}:{descriptors}", *command]
     log_file = directory / "gateway.log"
     with log_file.open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)

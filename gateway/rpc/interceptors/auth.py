@@ -9,7 +9,7 @@ from typing import Any, Final, NoReturn
 
 import grpc
 
-from common.errors import NotAllowedError, NotAuthenticatedError
+from common.errors import NotAllowedError, NotAuthenticatedError, TooMuchError
 from common.grpc_errors import STATUS_CODES, metadata_of
 from common.interceptors import Interceptor, RpcContext
 from common.reasons import Reason
@@ -19,6 +19,8 @@ from gateway.access.lockout import Lockout
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import Method, Open
 from gateway.rpc.calls.ports import CredentialFiles, StreamKey
+from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.refusal_delay import RefusalDelay
 
 _log = logging.getLogger(__name__)
 
@@ -42,6 +44,8 @@ class Auth(Interceptor[CallContext]):
         lockout: delays those who show wrong ones.
         files: read again when an unknown credential is shown.
         stream_key: renewed when a caller that was admitted loses access.
+        admission: gives connections their places.
+        refusals: delays the refusals of the others.
         certificates: whether connections show client certificates.
     """
 
@@ -52,12 +56,16 @@ class Auth(Interceptor[CallContext]):
         files: CredentialFiles,
         stream_key: StreamKey,
         *,
+        admission: Admission,
+        refusals: RefusalDelay,
         certificates: bool,
     ) -> None:
         self._authenticator = authenticator
         self._lockout = lockout
         self._files = files
         self._stream_key = stream_key
+        self._admission = admission
+        self._refusals = refusals
         self._certificates = certificates
         self._admitted: dict[tuple[str, ...], Principal] = {}
         """By their credentials, of which there are as many as the robot has."""
@@ -74,9 +82,14 @@ class Auth(Interceptor[CallContext]):
         Raises:
             NotAuthenticatedError: no valid credential was shown.
             NotAllowedError: the method needs another role.
-            TooMuchError: too many wrong credentials came from there.
+            TooMuchError: too many wrong credentials came from there, or all places are taken.
         """
-        call.principal = principal = await self._authenticate(call)
+        try:
+            call.principal = principal = await self._authenticate(call)
+            self._admission.admit(call.peer)
+        except (NotAuthenticatedError, TooMuchError) as error:
+            self._dismiss(call)
+            await self._refusals.refuse(error)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:
@@ -96,7 +109,7 @@ class Auth(Interceptor[CallContext]):
         if self._admitted.get(principal.credential_ids) is principal:
             return
         if not self._authenticator.still_valid(principal):
-            raise _access_lost()
+            raise self._authenticator.access_lost()
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
         """Forgets a stream that has ended."""
@@ -124,15 +137,22 @@ class Auth(Interceptor[CallContext]):
         if lost:
             self._stream_key.renew_passphrase()
         for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
-            abort = asyncio.create_task(
-                self._end(call, self._streams.pop(call)), name="revocation of a stream"
-            )
+            # First the stream, then the place: others of the same connection may be valid.
+            task = self._streams.pop(call)
+            self._dismiss(call)
+            abort = asyncio.create_task(self._end(call, task), name="revocation of a stream")
             self._aborts.add(abort)
             abort.add_done_callback(self._aborts.discard)
 
+    def _dismiss(self, call: CallContext) -> None:
+        """Takes the connection's place away, unless a stream of a valid caller is open on it."""
+        address = call.peer.address
+        if not any(each.peer.address == address for each in self._streams):
+            self._admission.dismiss(call.peer)
+
     async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
-        error = _access_lost()
+        error = self._authenticator.access_lost()
         who = call.principal.name if call.principal else ""
         _log.info("access: %s of %s ended, its credential is no longer valid", call.method.name, who)
         code = STATUS_CODES[NotAuthenticatedError]
@@ -171,14 +191,17 @@ class Auth(Interceptor[CallContext]):
 
     def _of_token(self, call: CallContext, token: str) -> Principal:
         prefix, owner = call.peer.address_prefix, self._authenticator.id_of_token(token)
-        self._lockout.admit(prefix, owner)
         try:
             principal = self._authenticator.authenticate_token(token)
         except NotAuthenticatedError as error:
             # An expired or revoked token is no guess: its secret was right.
-            if error.reason is Reason.CREDENTIAL_UNKNOWN and self._lockout.failed(prefix, owner):
-                meant = f"credential {owner}" if owner else "no credential of this robot"
-                _log.warning("access: %s shows wrong tokens (%s) and is locked out", call.peer.host, meant)
+            if error.reason is Reason.CREDENTIAL_UNKNOWN:
+                self._lockout.check(prefix, owner)
+                if self._lockout.failed(prefix, owner):
+                    meant = f"credential {owner}" if owner else "no credential of this robot"
+                    _log.warning(
+                        "access: %s shows wrong tokens (%s) and is locked out", call.peer.host, meant
+                    )
             raise
         self._lockout.succeeded(prefix, owner)
         return principal
@@ -202,13 +225,6 @@ def fingerprint_of(rpc: RpcContext) -> str | None:
 @lru_cache(maxsize=_REMEMBERED_CERTIFICATES)
 def _fingerprint(pem: bytes) -> str:
     return hashlib.sha256(ssl.PEM_cert_to_DER_cert(pem.decode("ascii"))).hexdigest()
-
-
-def _access_lost() -> NotAuthenticatedError:
-    return NotAuthenticatedError(
-        "the credential of this call is no longer valid; what it requested may have been done",
-        Reason.CREDENTIAL_REVOKED,
-    )
 
 
 def _authorize(principal: Principal, method: Method) -> None:

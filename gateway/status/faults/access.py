@@ -34,7 +34,8 @@ def access_faults(access: AccessView, warn_days: float) -> Iterator[Condition]:
             Severity.ERROR,
             _COMPONENT,
             f"changed credentials are not in force: {access.credentials_error}",
-            "Repair the file on the robot; until then the credentials that were read last apply",
+            "Repair the file on the robot; until then the credentials that were read last apply, but "
+            "an unreadable list of credentials only for a minute: then every caller is refused",
         )
     if access.audit_error:
         yield Condition(

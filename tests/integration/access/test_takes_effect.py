@@ -10,6 +10,8 @@ from typing import Any
 
 import grpc
 import pytest
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from common.reasons import Reason
 from console.client.refusal import refusal_in
@@ -18,6 +20,7 @@ from gateway.access.repeats import BURST
 from gateway.access.role import Role
 from gateway.access.token import new_token
 from gateway.rpc.mapping.enums import SEVERITIES
+from gateway.rpc.server import SERVICE
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetSystemStatusRequest,
     PingRequest,
@@ -261,6 +264,34 @@ async def test_a_damaged_list_changes_nothing_and_is_a_fault(tmp_path: Path) -> 
         await until(lambda: faults(calls, login), {})
 
 
+async def test_a_list_that_stays_unreadable_admits_none_until_it_is_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.access.reloader.CLOSED_AFTER_S", 1.0)
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        health: Any = HealthStub(robot.channel())  # its type has no methods
+
+        async def serving() -> bool:
+            answer = await health.Check(HealthCheckRequest(service=SERVICE), timeout=5)
+            return bool(answer.status == HealthCheckResponse.SERVING)
+
+        stream = calls.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
+        await stream.read()
+        hidden = robot.directory.store_file.rename(tmp_path / "elsewhere")
+        assert await ping(calls, login) == ""
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await asyncio.wait_for(to_its_end(stream), 10)
+        assert refusal_in(caught.value.trailing_metadata()).reason == Reason.CREDENTIALS_UNREADABLE
+        assert await ping(calls, login) == Reason.CREDENTIALS_UNREADABLE
+        await until(serving, False)
+        hidden.rename(robot.directory.store_file)
+        await until(lambda: ping(calls, login), "")
+        await until(serving, True)
+
+
 async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
@@ -358,18 +389,17 @@ async def test_who_guesses_waits_and_others_at_the_same_address_do_not(tmp_path:
     wrong = Login(annas.token[:-1] + ("A" if annas.token[-1] != "A" else "B"))
     async with guarded_gateway(robot):
         calls = stub(robot)
-        said = [await ping(calls, wrong) for _ in range(7)]
-        assert said == [Reason.CREDENTIAL_UNKNOWN] * 6 + [Reason.LOCKED_OUT]
-        # Locked is the token that is guessed, from here: even the right one waits. Ben does not.
-        assert await ping(calls, annas) == Reason.LOCKED_OUT
-        assert await ping(calls, bens) == ""
+        assert [await ping(calls, wrong) for _ in range(6)] == [Reason.CREDENTIAL_UNKNOWN] * 6
+        # Locked are guesses at that token, from here. The right one is none, and does not help the guesser.
+        for right in (annas, bens):
+            assert await ping(calls, right) == ""
         with pytest.raises(grpc.aio.AioRpcError) as caught:
-            await calls.Ping(PingRequest(), metadata=annas.metadata(), timeout=5)
+            await calls.Ping(PingRequest(), metadata=wrong.metadata(), timeout=5)
         assert caught.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
-        wait_s = refusal_in(caught.value.trailing_metadata()).retry_after_s
-        assert wait_s is not None
-        assert 0 < wait_s <= 1
-        await until(lambda: ping(calls, annas), "")
+        refusal = refusal_in(caught.value.trailing_metadata())
+        assert refusal.reason == Reason.LOCKED_OUT
+        assert refusal.retry_after_s is not None
+        assert 0 < refusal.retry_after_s <= 1
 
 
 async def shown_certificate(port: int) -> str:

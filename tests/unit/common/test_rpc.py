@@ -1,13 +1,21 @@
+import asyncio
+import resource
+import socket
 from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import grpc
 import pytest
 
 import gateway.app  # noqa: F401  # so that every domain error that exists is known here
+from common import rpc
+from common.bind import bind_tcp, bind_unix
 from common.errors import DomainError, InvalidRequestError
 from common.grpc_errors import STATUS_CODES
 from common.rpc import new_server
+from tests.support.eventually import eventually
 
 
 def below(error: type[DomainError]) -> Iterator[type[DomainError]]:
@@ -92,3 +100,65 @@ async def test_an_unknown_method_is_unimplemented() -> None:
             assert seen.value.code() is grpc.StatusCode.UNIMPLEMENTED
     finally:
         await server.stop(None)
+
+
+def is_open(connection: socket.socket) -> bool:
+    """Whether the server has sent something, as it does at first, and not closed."""
+    connection.settimeout(5)
+    try:
+        return connection.recv(1) != b""
+    except ConnectionError:
+        return False
+
+
+async def test_connections_beyond_the_limit_are_closed_and_each_address_has_its_own(tmp_path: Path) -> None:
+    server = new_server(max_connections=2)
+    port = bind_tcp(server, "127.0.0.1", 0)
+    bind_unix(server, tmp_path / "socket")
+    await server.start()
+    try:
+        with ExitStack() as stack:
+
+            def connected() -> socket.socket:
+                return stack.enter_context(socket.create_connection(("127.0.0.1", port)))
+
+            first, second, third = connected(), connected(), connected()
+            opened = [await asyncio.to_thread(is_open, each) for each in (first, second, third)]
+            assert opened == [True, True, False]
+            with socket.socket(socket.AF_UNIX) as local:
+                local.connect(str(tmp_path / "socket"))
+                assert await asyncio.to_thread(is_open, local)
+            first.close()
+
+            async def admitted() -> bool:
+                return await asyncio.to_thread(is_open, connected())
+
+            await eventually(admitted, bool, "there is room again")
+    finally:
+        await server.stop(None)
+
+
+async def test_a_quiet_connection_is_closed_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    options = dict(rpc._SERVER_OPTIONS)  # five minutes are too long for a test
+    assert options["grpc.max_connection_idle_ms"] == 300_000
+    options["grpc.max_connection_idle_ms"] = 300
+    monkeypatch.setattr(rpc, "_SERVER_OPTIONS", tuple(options.items()))
+    server = new_server()
+    port = server.add_insecure_port("127.0.0.1:0")
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{port}") as channel:
+            await channel.channel_ready()
+            await asyncio.wait_for(channel.wait_for_state_change(grpc.ChannelConnectivity.READY), 5)
+    finally:
+        await server.stop(None)
+
+
+def test_connections_leave_descriptors_for_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _which: (400, 400))
+    assert rpc.possible_connections(1000) == 200
+    assert rpc.possible_connections(100) == 100
+    monkeypatch.setattr(resource, "getrlimit", lambda _which: (resource.RLIM_INFINITY, 0))
+    assert rpc.possible_connections(1000) == 1000

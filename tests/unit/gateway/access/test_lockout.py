@@ -18,7 +18,7 @@ class Clock:
 def waits_s(lockout: Lockout, host: str = "10.0.0.5", credential: str = "a") -> float:
     """How long the next attempt has to wait; 0 for one that is admitted."""
     try:
-        lockout.admit(host, credential)
+        lockout.check(host, credential)
     except TooMuchError as error:
         return error.retry_after_s or 0.0
     return 0.0
@@ -32,7 +32,7 @@ def test_waits_grow_and_end() -> None:
         lockout.failed("10.0.0.5", "a")
         seen.append(waits_s(lockout))
         clock.now_s += seen[-1]
-        lockout.admit("10.0.0.5", "a")
+        lockout.check("10.0.0.5", "a")
     assert seen == [0.0] * FREE_FAILURES + [1, 2, 4, 8, 16, 32, LONGEST_WAIT_S, *[LONGEST_WAIT_S] * 3]
 
 
@@ -41,7 +41,7 @@ def test_only_the_pair_of_address_and_credential_waits() -> None:
     for _ in range(FREE_FAILURES + 1):
         lockout.failed("10.0.0.5", "a")
     with pytest.raises(TooMuchError) as caught:
-        lockout.admit("10.0.0.5", "a")
+        lockout.check("10.0.0.5", "a")
     assert caught.value.reason is Reason.LOCKED_OUT
     assert not waits_s(lockout, credential="b")
     assert not waits_s(lockout, credential="")
@@ -78,6 +78,19 @@ def test_the_quiet_time_begins_with_the_last_failure() -> None:
     assert not lockout.failed("10.0.0.5", "a"), "not with the end of the wait"
 
 
+def test_success_does_not_end_a_wait() -> None:
+    """It may be that of another at the same address."""
+    clock = Clock()
+    lockout = Lockout(clock)
+    for _ in range(FREE_FAILURES + 1):
+        lockout.failed("10.0.0.5", "a")
+    lockout.succeeded("10.0.0.5", "a")
+    assert waits_s(lockout) == 1
+    clock.now_s += 1
+    lockout.succeeded("10.0.0.5", "a")
+    assert not lockout.failed("10.0.0.5", "a")
+
+
 def test_the_wait_is_rounded_up_for_people() -> None:
     clock = Clock()
     lockout = Lockout(clock)
@@ -85,7 +98,7 @@ def test_the_wait_is_rounded_up_for_people() -> None:
         lockout.failed("10.0.0.5", "a")
     clock.now_s += 0.75
     with pytest.raises(TooMuchError, match=r"^7 wrong credentials .* Try again in 2 s$") as caught:
-        lockout.admit("10.0.0.5", "a")
+        lockout.check("10.0.0.5", "a")
     assert caught.value.retry_after_s == 1.25
 
 

@@ -1,6 +1,7 @@
 """Reloading: changes take effect, and files that can't be read leave the last good version in effect."""
 
 import asyncio
+import time
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,43 @@ async def test_a_damaged_file_changes_nothing_and_is_reported_after_three_polls(
     await reloader.reload_for_unknown()
     assert reloader.view().credentials_error == ""
     assert (reloader.loaded, changes) == (before, [])
+
+
+async def test_a_list_that_stays_unreadable_is_out_of_effect_until_it_is_readable(
+    directory: CredentialDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes: list[LoadedAccess] = []
+    monkeypatch.setattr("gateway.access.reloader.CLOSED_AFTER_S", 0.25)
+    reloader = CredentialReloader(directory, tls_of(directory), changes.append)
+    before = reloader.loaded
+    hidden = directory.store_file.rename(directory.path / "elsewhere")
+    began_s = time.monotonic()
+    await reloader.reload_for_unknown()
+    assert (changes, reloader.view().closed) == ([], False)
+    while not changes:
+        await reloader.reload_for_unknown()
+    assert time.monotonic() - began_s >= 0.25
+    await reloader.reload_for_unknown()
+    assert reloader.view().closed
+    (closed,) = changes
+    assert "can't be read" in closed.problem
+    hidden.rename(directory.store_file)
+    await reloader.reload_for_unknown()
+    assert (changes, reloader.view().closed) == ([closed, before], False)
+
+
+async def test_a_revocation_does_not_wait_for_a_certificate(directory: CredentialDirectory) -> None:
+    changes: list[LoadedAccess] = []
+    admin = CredentialAdmin(directory, "lab")
+    credential, _ = admin.add(CredentialRequest("anna", Role.VIEWER))
+    reloader = CredentialReloader(directory, tls_of(directory), changes.append)
+    directory.server.certificate.write_text("damaged")
+    admin.revoke("anna")
+    for _ in range(3):
+        await reloader.reload_for_unknown()
+    (change,) = changes
+    assert change.store.credentials[credential.credential_id].revoked_s is not None
+    assert "certificate" in reloader.view().credentials_error
 
 
 def test_the_end_of_each_certificate_is_loaded(directory: CredentialDirectory) -> None:

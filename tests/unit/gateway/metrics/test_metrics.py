@@ -73,6 +73,8 @@ class World:
     skipped = 7
     gaps = 1
     failures = 3
+    open = 12
+    closed = 34
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -88,6 +90,7 @@ def families(calls: Stats, now: Snapshot | None = None) -> list[Metric]:
         world,
         stats=calls,
         loop_delay=LoopDelay(),
+        connection_guard=world,
         status_stream=world,
         event_stream=world,
         preview_link=world,
@@ -146,6 +149,8 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_streams", "method=WatchSystemStatus"] == 3
     assert shown["robot_gateway_statuses_skipped_total", ""] == 7
     assert shown["robot_gateway_event_gaps_total", ""] == 1
+    assert shown["robot_gateway_connections", ""] == 12
+    assert shown["robot_gateway_connections_closed_total", ""] == 34
 
 
 def test_the_robot_and_its_sources() -> None:

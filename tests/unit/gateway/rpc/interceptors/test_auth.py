@@ -1,22 +1,29 @@
 """Callers that lose access are noticed once, and only those that had been admitted."""
 
+import asyncio
+from collections.abc import Awaitable
+from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import pytest
 
-from common.errors import NotAuthenticatedError
+from common.errors import NotAuthenticatedError, TooMuchError
 from common.reasons import Reason
 from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
-from gateway.access.lockout import Lockout
+from gateway.access.lockout import FREE_FAILURES, Lockout
 from gateway.access.role import Role
 from gateway.access.store import Store
 from gateway.access.token import Token, hash_of, new_token
+from gateway.config import LimitSettings
 from gateway.rpc.calls.call import CallContext
+from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
 from gateway.rpc.interceptors.auth import Auth
 from tests.support.calls import serve
+from tests.support.virtual_time import in_virtual_time
 
 
 class Ground:
@@ -29,7 +36,16 @@ class Ground:
         self.reload()
         self.renewals = 0
         self.looks = 0
-        self.auth = Auth(self.authenticator, Lockout(), self, self, certificates=False)
+        self.admission = Admission(LimitSettings())
+        self.auth = Auth(
+            self.authenticator,
+            Lockout(),
+            self,
+            self,
+            admission=self.admission,
+            refusals=RefusalDelay(),
+            certificates=False,
+        )
 
     async def reload_for_unknown(self) -> None:
         self.looks += 1
@@ -78,6 +94,7 @@ async def test_nothing_happens_while_all_credentials_are_valid(ground: Ground) -
     assert ground.renewals == 0
 
 
+@in_virtual_time
 async def test_an_admitted_caller_that_loses_access_is_noticed_once(ground: Ground) -> None:
     for name in ("anna", "ben", "ben"):
         await ground.ping(name)
@@ -91,6 +108,7 @@ async def test_an_admitted_caller_that_loses_access_is_noticed_once(ground: Grou
     assert ground.renewals == 1
 
 
+@in_virtual_time
 async def test_a_caller_that_was_never_admitted_knows_no_secret(ground: Ground) -> None:
     await ground.ping("anna")
     ground.revoke("carla")
@@ -145,8 +163,55 @@ async def test_a_credential_added_since_the_last_look_is_accepted_at_once(ground
     assert ground.looks == 1, "known ones cause no look"
 
 
+@in_virtual_time
 async def test_an_unknown_credential_causes_one_look_and_is_refused(ground: Ground) -> None:
     ground.tokens["eve"] = new_token("e" * 12)
     with pytest.raises(NotAuthenticatedError):
         await ground.ping("eve")
     assert ground.looks == 1
+
+
+async def duration_s(calling: Awaitable[Any]) -> float:
+    """How long a call takes; whether it is refused does not matter."""
+    loop = asyncio.get_running_loop()
+    began_s = loop.time()
+    with suppress(NotAuthenticatedError, TooMuchError):
+        await calling
+    return loop.time() - began_s
+
+
+@in_virtual_time
+async def test_refusals_wait_for_each_other_and_valid_callers_for_none(ground: Ground) -> None:
+    ground.tokens["eve"] = new_token("e" * 12)
+    refused = [asyncio.create_task(duration_s(ground.ping("eve"))) for _ in range(100)]
+    await asyncio.sleep(REFUSAL_DELAY_S / 2)
+    assert await duration_s(ground.ping("anna")) == 0
+    took_s = sorted(await asyncio.gather(*refused))
+    assert took_s[0] >= REFUSAL_DELAY_S
+    assert took_s[-1] == pytest.approx(REFUSAL_DELAY_S + 99 * REFUSAL_SPACING_S)
+
+
+@in_virtual_time
+async def test_a_right_token_is_admitted_whatever_its_address_has_guessed(ground: Ground) -> None:
+    ground.tokens["guess of anna"] = new_token("a" * 12)
+    for _ in range(FREE_FAILURES + 1):
+        with pytest.raises(NotAuthenticatedError, match="not one of this robot's"):
+            await ground.ping("guess of anna")
+    for _ in range(2):
+        assert await ground.ping("anna") == b"anna"
+        with pytest.raises(TooMuchError) as seen:
+            await ground.ping("guess of anna")
+        assert seen.value.reason is Reason.LOCKED_OUT, "the right token does not help the guesser"
+
+
+async def test_while_the_list_is_unreadable_no_credential_is_accepted(ground: Ground) -> None:
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        yield b"first"
+        ground.authenticator.use(Store(), "the list can't be read")
+        ground.auth.end_revoked()
+        yield b"second"
+
+    with pytest.raises(NotAuthenticatedError, match="can't be read") as seen:
+        await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
+    assert seen.value.reason is Reason.CREDENTIALS_UNREADABLE
+    assert ground.renewals == 1

@@ -10,15 +10,11 @@ from hypothesis import strategies as st
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.config import LimitSettings
-from gateway.rpc.calls.call import peer_of
-from gateway.rpc.interceptors.rate_limit import (
-    FORGIVEN_AFTER_S,
-    QUIET_AFTER_S,
-    REFUSAL_DELAY_S,
-    REFUSAL_SPACING_S,
-    Admission,
-    RateLimit,
-)
+from gateway.rpc.calls.call import Peer
+from gateway.rpc.calls.call import peer_of as peer_of_connection
+from gateway.rpc.connections.admission import FORGIVEN_AFTER_S, QUIET_AFTER_S, Admission
+from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
+from gateway.rpc.interceptors.rate_limit import RateLimit
 from tests.support.calls import call_of
 
 SMALL = LimitSettings(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
@@ -41,14 +37,25 @@ def admission(clock: Clock) -> Admission:
     return Admission(SMALL, clock)
 
 
+def peer_of(name: str) -> Peer:
+    """A connection by gRPC's name, or that of a computer by one letter."""
+    return peer_of_connection(name if ":" in name else f"ipv4:10.1.1.{ord(name)}:1")
+
+
 def count(admission: Admission) -> int:
-    """How many connections it keeps."""
-    return len(vars(admission)["_connections"])
+    """How many places are taken."""
+    return int(vars(admission)["_places"].total())
+
+
+def call(admission: Admission, peer: str) -> None:
+    """A call that is admitted."""
+    admission.take_token(peer_of(peer))
+    admission.admit(peer_of(peer))
 
 
 def refusal(admission: Admission, peer: str) -> TooMuchError:
     with pytest.raises(TooMuchError) as seen:
-        admission.take_token(peer_of(peer))
+        call(admission, peer)
     return seen.value
 
 
@@ -83,7 +90,7 @@ def test_what_one_has_spent_the_other_still_has(admission: Admission) -> None:
 
 
 def test_streams_are_counted_while_they_are_open(admission: Admission) -> None:
-    admission.take_token(peer_of("a"))
+    call(admission, "a")
     admission.open_stream(peer_of("a"))
     admission.open_stream(peer_of("a"))
     with pytest.raises(TooMuchError) as seen:
@@ -95,36 +102,36 @@ def test_streams_are_counted_while_they_are_open(admission: Admission) -> None:
 
 def test_a_new_connection_takes_the_place_of_the_quietest(admission: Admission, clock: Clock) -> None:
     for peer in ("a", "b", "c"):
-        admission.take_token(peer_of(peer))
+        call(admission, peer)
     error = refusal(admission, "d")
     assert error.reason is Reason.TOO_MANY_CONNECTIONS
     assert error.retry_after_s
     clock.now_s += QUIET_AFTER_S
-    admission.take_token(peer_of("a"))
-    admission.take_token(peer_of("d"))
+    call(admission, "a")
+    call(admission, "d")
     assert count(admission) == 3
-    admission.take_token(peer_of("c"))
+    call(admission, "c")
     assert refusal(admission, "b").reason is Reason.TOO_MANY_CONNECTIONS, "b was the quietest"
 
 
 def test_one_address_may_take_its_part_of_the_connections_and_no_more(clock: Clock) -> None:
     admission = Admission(LimitSettings(connections=4, connections_per_address=2), clock)
     for peer in ("ipv4:10.0.0.5:1", "ipv4:10.0.0.5:2"):
-        admission.take_token(peer_of(peer))
+        call(admission, peer)
     error = refusal(admission, "ipv4:10.0.0.5:3")
     assert error.reason is Reason.TOO_MANY_CONNECTIONS
     assert "of one address" in str(error)
     for peer in ("ipv4:10.0.0.6:1", "ipv6:[2001:db8::5]:1"):
-        admission.take_token(peer_of(peer))
+        call(admission, peer)
     assert "all are taken" in str(refusal(admission, "ipv4:10.0.0.7:1"))
     clock.now_s += QUIET_AFTER_S
     for peer in ("ipv4:10.0.0.5:2", "ipv4:10.0.0.6:1"):
-        admission.take_token(peer_of(peer))
-    admission.take_token(peer_of("ipv4:10.0.0.5:3"))
+        call(admission, peer)
+    call(admission, "ipv4:10.0.0.5:3")
     assert "of one address" in str(refusal(admission, "ipv4:10.0.0.5:1")), (
         "its quietest gave way, not another's"
     )
-    admission.take_token(peer_of("ipv4:10.0.0.7:1"))
+    call(admission, "ipv4:10.0.0.7:1")
     assert count(admission) == 4
 
 
@@ -137,7 +144,7 @@ def test_no_address_ever_has_more_than_its_part(asked: list[tuple[int, int, floa
         clock.now_s += pause_s
         peer = f"ipv4:10.0.0.{host}:{port}"
         try:
-            admission.take_token(peer_of(peer))
+            call(admission, peer)
         except TooMuchError:
             busy = [each for each, at_s in served.items() if clock.now_s - at_s < QUIET_AFTER_S]
             same = [each for each in busy if each.rpartition(":")[0] == peer.rpartition(":")[0]]
@@ -149,17 +156,26 @@ def test_no_address_ever_has_more_than_its_part(asked: list[tuple[int, int, floa
 
 def test_who_has_a_stream_open_is_never_put_out(admission: Admission, clock: Clock) -> None:
     for peer in ("a", "b", "c"):
-        admission.take_token(peer_of(peer))
+        call(admission, peer)
         admission.open_stream(peer_of(peer))
     clock.now_s += 3600
     assert refusal(admission, "d").reason is Reason.TOO_MANY_CONNECTIONS
 
 
-def test_delayed_refusals_are_spaced(admission: Admission, clock: Clock) -> None:
-    delays = [admission.refusal_delay_s() for _ in range(3)]
+def limiting(admission: Admission) -> RateLimit:
+    return RateLimit(admission, RefusalDelay(), admits=True)
+
+
+def test_delayed_refusals_are_spaced() -> None:
+    refusals = RefusalDelay()
+    delays = [refusals.next_delay_s(100.0) for _ in range(3)]
     assert delays == pytest.approx([REFUSAL_DELAY_S + each * REFUSAL_SPACING_S for each in range(3)])
-    clock.now_s += 60
-    assert admission.refusal_delay_s() == pytest.approx(REFUSAL_DELAY_S)
+    assert refusals.next_delay_s(160.0) == pytest.approx(REFUSAL_DELAY_S)
+
+
+def test_callers_that_leave_at_once_do_not_delay_others_for_ever() -> None:
+    refusals = RefusalDelay()
+    assert max(refusals.next_delay_s(100.0) for _ in range(100_000)) < 20
 
 
 @given(st.lists(st.tuples(st.sampled_from("abcdef"), st.floats(0, 0.3)), max_size=200))
@@ -171,7 +187,7 @@ def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tupl
     for peer, pause_s in asked:
         clock.now_s += pause_s
         try:
-            admission.take_token(peer_of(peer))
+            call(admission, peer)
         except TooMuchError as error:
             refused.append(error)
         else:
@@ -184,7 +200,7 @@ def test_nobody_gets_more_than_the_share_whatever_the_others_do(asked: list[tupl
 
 
 def test_each_message_of_a_request_stream_takes_a_token(admission: Admission, clock: Clock) -> None:
-    limit = RateLimit(admission)
+    limit = limiting(admission)
     stream = call_of("Drive", request_streaming=True)
     assert limit.on_call(stream) is None
     for _ in range(SMALL.burst - 1):
@@ -197,18 +213,18 @@ def test_each_message_of_a_request_stream_takes_a_token(admission: Admission, cl
 
 
 def test_a_request_is_no_message_of_a_stream(admission: Admission) -> None:
-    limit, call = RateLimit(admission), call_of(streaming=True)
-    limit.on_call(call)
+    limit, stream = limiting(admission), call_of(streaming=True)
+    limit.on_call(stream)
     for _ in range(3 * SMALL.burst):
-        limit.on_request(call, b"message")
+        limit.on_request(stream, b"message")
 
 
 async def test_a_delayed_refusal_leaves_no_garbage_behind() -> None:
     """A circle of references would keep call and error until the next collection, in a flood of them."""
-    limit = RateLimit(Admission(LimitSettings(requests_per_s=0.1, burst=1)))
-    call = call_of()
-    assert limit.on_call(call) is None
-    waiting = limit.on_call(call)
+    limit = limiting(Admission(LimitSettings(requests_per_s=0.1, burst=1)))
+    ping = call_of()
+    assert limit.on_call(ping) is None
+    waiting = limit.on_call(ping)
     assert waiting is not None
     gc.disable()
     try:

@@ -1,0 +1,205 @@
+"""The account of all connections: who may have how many, how many calls each may make, and which must go.
+
+A connection is pending until a call of it is admitted; then it has a place. Only places are limited by the
+settings: strangers can't take those of operators. Pending connections are few and short-lived instead.
+"""
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from common.errors import TooMuchError
+from common.reasons import Reason
+from common.token_bucket import TokenBucket
+from gateway.access.address_prefix import address_prefix
+from gateway.config import LimitSettings
+from gateway.rpc.calls.call import Peer
+
+QUIET_AFTER_S: Final = 1.0
+"""A connection without streams and without calls for this long gives way when room is needed."""
+FORGIVEN_AFTER_S: Final = 5.0
+"""Without a refusal; until then a connection's bucket hardly fills."""
+PENDING_S: Final = 10.0
+"""How long a connection may be pending: a TLS handshake and a call over a bad link."""
+MAX_PENDING: Final = 256
+"""Pending connections, or a quarter of those that are accepted, and half of them from one address."""
+PENDING_STREAMS: Final = 4
+"""Of one pending connection, of which the health service is all that it can use."""
+_REDUCED_BURST_S: Final = 0.01
+"""The reduced bucket holds what is refilled in this time."""
+_RETRY_AFTER_S: Final = 1.0
+"""Suggested to a caller for whom there is no connection left."""
+
+
+@dataclass(slots=True)
+class _Connection:
+    address_prefix: str
+    bucket: TokenBucket
+    pending_since_s: float
+    admitted: bool = False
+    streams: int = 0
+    refused_s: float = -math.inf
+
+
+class Admission:
+    """The account of all TCP connections; a Unix socket's are not limited. Pure; used on one event loop.
+
+    Args:
+        limits: what a connection may have, and how many there may be.
+        clock: seconds, monotonic.
+        max_connections: accepted at once, pending ones included.
+    """
+
+    def __init__(
+        self,
+        limits: LimitSettings,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        max_connections: int = 4 * MAX_PENDING,
+    ) -> None:
+        self._limits = limits
+        self._max_pending = min(MAX_PENDING, max_connections // 4)
+        self._clock = clock
+        self._connections: dict[str, _Connection] = {}
+        """By `Peer.address`, the one that called last at the end."""
+        self._places: Counter[str] = Counter()
+        """Taken, by address prefix."""
+
+    def take_token(self, peer: Peer) -> None:
+        """Takes one token out of the connection's bucket.
+
+        Raises:
+            TooMuchError: the bucket is empty.
+        """
+        if peer.ip is None:
+            return
+        limits, now_s = self._limits, self._clock()
+        connection = self._connections.pop(peer.address, None)
+        if connection is None:
+            connection = self._new(peer.address_prefix, now_s)
+        self._connections[peer.address] = connection
+        bucket, capacity = connection.bucket, self._capacity(connection, now_s)
+        if bucket.take(now_s, capacity=capacity, refill_per_s=limits.requests_per_s):
+            return
+        connection.refused_s = now_s
+        raise TooMuchError(
+            f"this connection makes more than {limits.requests_per_s:g} requests a second; call less often",
+            Reason.TOO_MANY_REQUESTS,
+            (1 - bucket.tokens) / limits.requests_per_s,
+        )
+
+    def open_stream(self, peer: Peer) -> None:
+        """Counts one more stream of the connection, after `take_token`.
+
+        Raises:
+            TooMuchError: it has as many as allowed.
+        """
+        connection = self._connections.get(peer.address)
+        if connection is None:
+            return
+        most = self._limits.streams_per_connection
+        if connection.streams >= (most if connection.admitted else min(most, PENDING_STREAMS)):
+            raise TooMuchError(
+                f"this connection has {connection.streams} streams open, and no more are allowed; "
+                "close one, or share it",
+                Reason.TOO_MANY_STREAMS,
+            )
+        connection.streams += 1
+
+    def close_stream(self, peer: Peer) -> None:
+        """Counts one stream less, unless the connection has gone already."""
+        connection = self._connections.get(peer.address)
+        if connection is not None:
+            connection.streams -= 1
+
+    def admit(self, peer: Peer) -> None:
+        """Gives the connection a place, after a valid credential was shown or where none is needed.
+
+        Raises:
+            TooMuchError: all places are taken.
+        """
+        connection = self._connections.get(peer.address)
+        if connection is None or connection.admitted:
+            return
+        limits, prefix = self._limits, peer.address_prefix
+        if self._places[prefix] >= limits.connections_per_address and not self._evict(prefix):
+            raise TooMuchError(
+                f"this gateway serves {limits.connections_per_address} connections of one address at once, "
+                "and yours are taken; close one, or raise limits.connections_per_address",
+                Reason.TOO_MANY_CONNECTIONS,
+                _RETRY_AFTER_S,
+            )
+        if self._places.total() >= limits.connections and not self._evict():
+            raise TooMuchError(
+                f"this gateway serves {limits.connections} connections at once, and all are taken; "
+                "close one, or raise limits.connections",
+                Reason.TOO_MANY_CONNECTIONS,
+                _RETRY_AFTER_S,
+            )
+        connection.admitted = True
+        self._places[prefix] += 1
+
+    def dismiss(self, peer: Peer) -> None:
+        """Takes the connection's place away, after a credential was invalid."""
+        connection = self._connections.get(peer.address)
+        if connection is not None:
+            self._free_place(connection)
+
+    def surplus(self, present: Iterable[str]) -> list[str]:
+        """Returns the connections to close: pending ones, after PENDING_S or where there are too many.
+
+        An address with more of them than others loses them first, and of one address the oldest go: a caller
+        with a credential needs no more than a moment.
+
+        Args:
+            present: addresses of all connections there are, as `Peer.address` has them.
+        """
+        now_s, present = self._clock(), set(present)
+        for address in self._connections.keys() - present:
+            self._free_place(self._connections.pop(address))
+        for address in present - self._connections.keys():
+            prefix = address_prefix(address.rpartition(":")[0].strip("[]"))
+            self._connections[address] = self._new(prefix, now_s)
+        pending = [(each, address) for address, each in self._connections.items() if not each.admitted]
+        pending.sort(key=lambda item: item[0].pending_since_s, reverse=True)
+        newer: Counter[str] = Counter()
+        ranked = []
+        for each, address in pending:
+            ranked.append((newer[each.address_prefix], now_s - each.pending_since_s, address))
+            newer[each.address_prefix] += 1
+        ranked.sort()
+        return [
+            address
+            for kept, (rank, age_s, address) in enumerate(ranked)
+            if rank >= self._max_pending // 2 or kept >= self._max_pending or age_s > PENDING_S
+        ]
+
+    def _new(self, prefix: str, now_s: float) -> _Connection:
+        return _Connection(prefix, TokenBucket(self._limits.burst, now_s), now_s)
+
+    def _capacity(self, connection: _Connection, now_s: float) -> float:
+        """Reduced after a refusal: a full bucket would only be emptied at once again."""
+        limits = self._limits
+        if now_s - connection.refused_s >= FORGIVEN_AFTER_S:
+            return limits.burst
+        return max(1.0, min(limits.burst, limits.requests_per_s * _REDUCED_BURST_S))
+
+    def _evict(self, prefix: str | None = None) -> bool:
+        """Frees the place of the quietest connection, of this prefix or of all; False if none is quiet."""
+        now_s = self._clock()
+        for each in self._connections.values():
+            quiet = each.admitted and not each.streams and now_s - each.bucket.updated_s >= QUIET_AFTER_S
+            if quiet and prefix in (None, each.address_prefix):
+                self._free_place(each)
+                return True
+        return False
+
+    def _free_place(self, connection: _Connection) -> None:
+        if connection.admitted:
+            connection.admitted, connection.pending_since_s = False, self._clock()
+            self._places[connection.address_prefix] -= 1
+            if not self._places[connection.address_prefix]:
+                del self._places[connection.address_prefix]

@@ -1,0 +1,241 @@
+"""Connections that only take room: few of them are kept, and not for long; operators do not notice them."""
+
+import asyncio
+import socket
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
+
+from common.bind import bind_tcp, bracketed
+from common.healthcheck import state_of
+from common.reasons import Reason
+from common.rpc import new_server
+from console.client import NotAllowed
+from gateway.access.role import Role
+from gateway.rpc.calls.call import peer_of
+from gateway.rpc.connections.accepted_sockets import AcceptedSockets
+from gateway.rpc.connections.admission import MAX_PENDING
+from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, WatchSystemStatusRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.guarded_gateway import guarded_gateway, new_robot
+from tests.support.guarded_program import guarded_program
+from tests.support.running_gateway import raw_unary, running_gateway
+from tests.support.waiting import wait_until
+
+SETTLED_WITHIN_S = 3.0
+"""Sooner than gRPC itself gives up a handshake."""
+NOTHING = b""
+HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
+"""The connection preface and empty settings (RFC 9113 3.4): more is not needed to be a connection."""
+HALF_A_CLIENT_HELLO = bytes([22, 3, 1, 2, 0, 1, 0])
+
+
+@contextmanager
+def connections(
+    port: int, count: int, said: bytes = NOTHING, hosts: Sequence[str] = ("127.0.0.1",)
+) -> Iterator[list[socket.socket]]:
+    """TCP connections, `count` from each of `hosts`, that say one thing and then nothing."""
+    with ExitStack() as stack:
+        opened = []
+        for number in range(count * len(hosts)):
+            source = (hosts[number % len(hosts)], 0)
+            each = stack.enter_context(socket.create_connection(("127.0.0.1", port), source_address=source))
+            each.sendall(said)
+            each.setblocking(False)
+            opened.append(each)
+        yield opened
+
+
+def alive(opened: list[socket.socket]) -> list[socket.socket]:
+    """Those that the other side has not closed; what it sent is read away."""
+    found = []
+    for each in opened:
+        try:
+            while each.recv(4096):
+                pass
+        except BlockingIOError:
+            found.append(each)
+        except ConnectionError:
+            pass
+    return found
+
+
+async def until_at_most(opened: list[socket.socket], count: int) -> None:
+    deadline_s = time.monotonic() + SETTLED_WITHIN_S
+    while len(alive(opened)) > count:
+        assert time.monotonic() < deadline_s, f"{len(alive(opened))} are still open"
+        await asyncio.sleep(0.05)
+
+
+@pytest.mark.parametrize("said", [NOTHING, HTTP2], ids=["nothing", "http2"])
+async def test_idle_connections_of_one_address_leave_room(tmp_path: Path, said: bytes) -> None:
+    async with running_gateway(tmp_path / "p.sock") as operator:
+        await operator.status()
+        with connections(operator.port, 500, said) as opened:
+            await until_at_most(opened, MAX_PENDING // 2)
+            assert (await operator.status()).gateway_name
+            with connections(operator.port, 1, said) as (newest,):
+                await asyncio.sleep(0.5)
+                assert alive([newest]), "a newcomer has its chance"
+
+
+async def test_a_connection_without_a_call_is_closed_after_a_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.rpc.connections.admission.PENDING_S", 1.0)
+    async with running_gateway(tmp_path / "p.sock") as operator:
+        await operator.status()
+        watching = operator.stub.WatchSystemStatus(WatchSystemStatusRequest())
+        with connections(operator.port, 3, HTTP2) as opened:
+            await asyncio.sleep(0.5)
+            assert len(alive(opened)) == 3
+            await until_at_most(opened, 0)
+        for _ in range(10):
+            assert await watching.read() is not grpc.aio.EOF, "one with calls stays"
+        watching.cancel()
+
+
+@pytest.mark.parametrize("said", [NOTHING, HALF_A_CLIENT_HELLO], ids=["nothing", "half a hello"])
+async def test_strangers_from_many_addresses_keep_no_operator_out(tmp_path: Path, said: bytes) -> None:
+    """Here with a handshake that none of them finishes."""
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    strangers = [f"127.0.1.{number}" for number in range(1, 31)]
+    async with guarded_gateway(robot):
+        with connections(robot.port, 10, said, strangers) as opened:
+            for _ in range(5):
+                stub = RobotGatewayStub(robot.channel())
+                status: Any = await stub.GetSystemStatus(
+                    GetSystemStatusRequest(), metadata=login.metadata(), timeout=5, wait_for_ready=True
+                )
+                assert status.gateway_name
+            await until_at_most(opened, MAX_PENDING)
+
+
+async def test_watching_strangers_take_no_place_of_an_operator_and_leave_soon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gateway.rpc.connections.admission.PENDING_S", 3.0)
+    robot = new_robot(tmp_path / "robot")
+    _, login = robot.add(Role.VIEWER)
+    unix = tmp_path / "gateway.sock"
+    async with guarded_gateway(
+        robot, grpc={"socket": unix}, limits={"connections": 4, "connections_per_address": 4}
+    ):
+        watches = []
+        for _ in range(4):
+            stub: Any = HealthStub(robot.channel())  # its type has no methods
+            watches.append(stub.Watch(HealthCheckRequest()))
+            assert (await watches[-1].read()).status == HealthCheckResponse.SERVING
+        operators = [RobotGatewayStub(robot.channel()) for _ in range(4)]
+        streams = [
+            each.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
+            for each in operators
+        ]
+        for stream in streams:
+            assert await stream.read() is not grpc.aio.EOF
+        assert await asyncio.to_thread(state_of, f"unix:{unix}", "") == "SERVING"
+        for watch in watches:
+            with pytest.raises(grpc.aio.AioRpcError) as seen:
+                await asyncio.wait_for(watch.read(), 10)
+            assert seen.value.code() is grpc.StatusCode.UNAVAILABLE
+        for stream in streams:
+            assert await stream.read() is not grpc.aio.EOF
+            stream.cancel()
+
+
+def test_connections_do_not_take_the_descriptors_that_a_revocation_needs(tmp_path: Path) -> None:
+    with guarded_program(tmp_path, tmp_path / "home", descriptors=256) as robot:
+        port = int(robot.target.rpartition(":")[2])
+        with robot.client() as client, connections(port, 300) as opened:
+            wait_until(lambda: len(alive(opened)) <= 16, "half of a quarter of half of them are left")
+            stream = client.watch_status()
+            next(stream)
+            with robot.client() as another:
+                assert another.status().gateway_name
+            robot.admin.revoke("the-test")
+            with pytest.raises(NotAllowed) as seen:
+                for _ in stream:
+                    pass
+            assert seen.value.reason == Reason.CREDENTIAL_REVOKED
+
+
+def test_only_connections_of_the_port_are_found_and_closed() -> None:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as ours,
+        socket.create_server(("127.0.0.1", 0)) as other,
+        socket.create_connection(ours.getsockname()) as client,
+        socket.create_connection(other.getsockname()) as bystander,
+    ):
+        accepted, _ = ours.accept()
+        untouched, _ = other.accept()
+        with accepted, untouched:
+            sockets = AcceptedSockets(ours.getsockname()[1])
+            address = f"127.0.0.1:{client.getsockname()[1]}"
+            assert sockets.scan() == [address]
+            assert sockets.close(address)
+            assert not sockets.close(address)
+            assert client.recv(1) == b""
+            bystander.sendall(b"x")
+            assert untouched.recv(1) == b"x"
+
+
+def test_a_descriptor_that_was_used_again_is_left_alone() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        gone = socket.create_connection(("127.0.0.1", port))
+        accepted, _ = server.accept()
+        sockets = AcceptedSockets(port)
+        (address,) = sockets.scan()
+        descriptor = accepted.fileno()
+        accepted.close()
+        gone.close()
+        with socket.create_connection(("127.0.0.1", port)) as next_one:
+            reused, _ = server.accept()
+            with reused:
+                assert descriptor in {next_one.fileno(), reused.fileno()}, "this test needs the number again"
+                assert not sockets.close(address)
+                reused.sendall(b"x")
+                assert next_one.recv(1) == b"x"
+
+
+def local_addresses() -> list[str]:
+    """Of this machine; link-local ones with their interface."""
+    lines = Path("/proc/net/if_inet6").read_text(encoding="ascii").splitlines()
+    found = ["127.0.0.1"]
+    for line in lines:
+        digits, _, _, _, _, interface = line.split()
+        address = socket.inet_ntop(socket.AF_INET6, bytes.fromhex(digits))
+        found.append(f"{address}%{interface}" if address.startswith("fe80:") else address)
+    return found
+
+
+@pytest.mark.parametrize("address", local_addresses())
+async def test_a_connection_has_the_same_address_in_the_account_of_calls(address: str) -> None:
+    """GRPC's spelling of it is what calls are known by."""
+    callers = []
+
+    async def note_caller(_request: bytes, context: Any) -> bytes:
+        callers.append(peer_of(context.peer()).address)
+        return b""
+
+    server = new_server()
+    handler: dict[str, grpc.RpcMethodHandler[bytes, bytes]] = {
+        "Note": grpc.unary_unary_rpc_method_handler(note_caller)
+    }
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Service", handler),))
+    port = bind_tcp(server, "::", 0)
+    await server.start()
+    try:
+        async with grpc.aio.insecure_channel(f"{bracketed(address)}:{port}") as channel:
+            await raw_unary(channel, "/test.Service/Note")(b"", timeout=5)
+            assert AcceptedSockets(port).scan() == callers
+    finally:
+        await server.stop(0)

@@ -1,0 +1,193 @@
+"""Which connections must go: those that take room without an admitted call."""
+
+import pytest
+
+from common.errors import TooMuchError
+from common.reasons import Reason
+from gateway.config import LimitSettings
+from gateway.rpc.calls.call import peer_of
+from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, QUIET_AFTER_S, Admission
+
+PLACES, PER_ADDRESS = 40, 20
+"""Of connections with an admitted call, and the same of those without."""
+LIMITS = LimitSettings(connections=PLACES, connections_per_address=PER_ADDRESS)
+
+
+class Clock:
+    now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def admission(clock: Clock) -> Admission:
+    return Admission(LIMITS, clock, max_connections=4 * PLACES)
+
+
+def from_one(count: int, first_port: int = 1000, host: str = "10.0.0.5") -> list[str]:
+    return [f"{host}:{first_port + number}" for number in range(count)]
+
+
+def from_many(count: int) -> list[str]:
+    return [f"10.1.0.{number}:1000" for number in range(count)]
+
+
+def admit(admission: Admission, address: str) -> None:
+    admission.take_token(peer_of(f"ipv4:{address}"))
+    admission.admit(peer_of(f"ipv4:{address}"))
+
+
+def test_a_pending_connection_has_a_while(admission: Admission, clock: Clock) -> None:
+    assert admission.surplus(["10.0.0.5:1"]) == []
+    clock.now_s += PENDING_S
+    assert admission.surplus(["10.0.0.5:1"]) == []
+    clock.now_s += 0.1
+    assert admission.surplus(["10.0.0.5:1"]) == ["10.0.0.5:1"]
+
+
+def test_calls_that_are_not_admitted_win_no_time(admission: Admission, clock: Clock) -> None:
+    """Those of the health service, for example, which lasts as long as its caller likes."""
+    peer = peer_of("ipv4:10.0.0.5:1")
+    admission.take_token(peer)
+    admission.open_stream(peer)
+    for _ in range(5):
+        admission.take_token(peer)
+        admission.surplus([peer.address])
+        clock.now_s += PENDING_S / 4
+    assert admission.surplus([peer.address]) == [peer.address]
+    admission.surplus([])
+    admission.close_stream(peer)
+
+
+def test_an_admitted_one_stays_however_quiet(admission: Admission, clock: Clock) -> None:
+    admission.surplus(["10.0.0.5:1"])
+    admit(admission, "10.0.0.5:1")
+    clock.now_s += 1000 * PENDING_S
+    assert admission.surplus(["10.0.0.5:1"]) == []
+
+
+def test_an_address_that_is_used_again_begins_anew(admission: Admission, clock: Clock) -> None:
+    admit(admission, "10.0.0.5:1")
+    assert admission.surplus(["10.0.0.5:1"]) == []
+    admission.surplus([])
+    assert admission.surplus(["10.0.0.5:1"]) == []
+    clock.now_s += PENDING_S + 0.1
+    assert admission.surplus(["10.0.0.5:1"]) == ["10.0.0.5:1"]
+
+
+def test_of_one_address_the_oldest_go(admission: Admission, clock: Clock) -> None:
+    old, new = from_one(PER_ADDRESS), from_one(5, first_port=5000)
+    assert admission.surplus(old) == []
+    clock.now_s += 1
+    surplus = admission.surplus([*old, *new])
+    assert len(surplus) == len(new)
+    assert set(surplus) < set(old), "a newcomer has its chance"
+
+
+def test_the_addresses_of_one_network_are_one(admission: Admission) -> None:
+    """A host chooses 64 bits of its IPv6 address itself."""
+    addresses = [f"[2001:db8::{number:x}]:1000" for number in range(1, PER_ADDRESS + 4)]
+    assert len(admission.surplus(addresses)) == 3
+
+
+def test_of_all_addresses_the_oldest_go(admission: Admission, clock: Clock) -> None:
+    old = from_many(PLACES)
+    assert admission.surplus(old) == []
+    clock.now_s += 1
+    surplus = admission.surplus([*old, "192.0.2.1:1", "192.0.2.2:1"])
+    assert len(surplus) == 2
+    assert set(surplus) < set(old)
+
+
+def test_who_comes_from_elsewhere_keeps_its_place_in_a_stampede(admission: Admission, clock: Clock) -> None:
+    """Thirty computers with ten connections each, all of them newer than the one of another."""
+    operator = "192.0.2.1:1"
+    assert admission.surplus([operator]) == []
+    for wave in range(5):
+        clock.now_s += 0.1
+        crowd = [
+            address
+            for host in range(30)
+            for address in from_one(10, first_port=1000 * (1 + wave), host=f"10.2.0.{host}")
+        ]
+        surplus = admission.surplus([operator, *crowd])
+        assert len(surplus) == 1 + len(crowd) - PLACES
+        assert operator not in surplus
+
+
+def test_admitted_ones_take_no_place_of_the_others(admission: Admission) -> None:
+    admitted = from_one(PER_ADDRESS)
+    for address in admitted:
+        admit(admission, address)
+    assert admission.surplus([*admitted, *from_one(PER_ADDRESS, first_port=5000)]) == []
+
+
+def test_pending_ones_take_no_place_of_the_admitted(admission: Admission) -> None:
+    for address in from_many(PLACES):
+        admission.take_token(peer_of(f"ipv4:{address}"))
+        admission.open_stream(peer_of(f"ipv4:{address}"))
+    admit(admission, "192.0.2.1:1")
+
+
+def test_a_place_is_free_again_when_its_connection_has_gone(admission: Admission) -> None:
+    for address in from_one(PER_ADDRESS):
+        admit(admission, address)
+    with pytest.raises(TooMuchError):
+        admit(admission, "10.0.0.5:1")
+    admission.surplus(["10.0.0.5:1", *from_one(PER_ADDRESS)[1:]])
+    admit(admission, "10.0.0.5:1")
+
+
+def test_who_loses_its_credential_loses_its_place(admission: Admission, clock: Clock) -> None:
+    addresses = from_one(PER_ADDRESS)
+    for address in addresses:
+        admit(admission, address)
+    for address in addresses:
+        admission.dismiss(peer_of(f"ipv4:{address}"))
+    admit(admission, "10.0.0.5:1")
+    clock.now_s += PENDING_S + 0.1
+    assert sorted(admission.surplus([*addresses, "10.0.0.5:1"])) == sorted(addresses)
+
+
+def test_one_that_gave_way_has_a_while_to_call_again(admission: Admission, clock: Clock) -> None:
+    first, *others = from_one(PER_ADDRESS + 1)
+    admit(admission, first)
+    clock.now_s += QUIET_AFTER_S
+    for address in others:
+        admit(admission, address)
+    clock.now_s += PENDING_S
+    assert admission.surplus([first, *others]) == []
+    clock.now_s += 0.1
+    assert admission.surplus([first, *others]) == [first]
+
+
+def test_a_pending_connection_has_few_streams(admission: Admission) -> None:
+    peer = peer_of("ipv4:10.0.0.5:1")
+    admission.take_token(peer)
+    for _ in range(PENDING_STREAMS):
+        admission.open_stream(peer)
+    with pytest.raises(TooMuchError) as seen:
+        admission.open_stream(peer)
+    assert seen.value.reason is Reason.TOO_MANY_STREAMS
+    admission.admit(peer)
+    admission.open_stream(peer)
+
+
+def test_a_unix_socket_is_not_limited(clock: Clock) -> None:
+    """All of its callers have one name, and the container's own health check is among them."""
+    admission = Admission(LimitSettings(connections=1, streams_per_connection=1, burst=1), clock)
+    admit(admission, "10.0.0.5:1")
+    peer = peer_of("unix:/run/gateway.sock")
+    for _ in range(10):
+        admission.take_token(peer)
+        admission.open_stream(peer)
+        admission.admit(peer)
+    for _ in range(10):
+        admission.close_stream(peer)
+    assert admission.surplus(["10.0.0.5:1"]) == []
