@@ -1,8 +1,7 @@
-"""The preview against today's usual pipeline: same camera, same codec, in turns.
+"""The preview against the usual pipeline: same camera, same codec, in the same run.
 
-Every round measures the reference, then ours, each alone on the machine; the median round speaks. Only CPU
-is measured of both at once. Frames carry the moment of their capture (stamp.py) from before the encoder to
-behind the decoder.
+Where "what" does not say "at once", each side is alone on the machine, and both in every round. Frames carry
+the moment of their capture (stamp.py) from before the encoder to behind the decoder.
 """
 
 import importlib
@@ -12,7 +11,12 @@ from pathlib import Path
 from bench.rows import Row
 
 _MODULES = {
-    "bench.video.latency": ("video.excess_latency_20", "video.excess_latency_125"),
+    "bench.video.latency": tuple(
+        f"video.excess_{sender}_sender_{receiver}_receiver_{figure}"
+        for sender in ("reference", "ours")
+        for receiver in ("plain", "ours")
+        for figure in ("ms", "p99_ms", "delivered_percent")
+    ),
     "bench.video.joining": ("video.first_frame",),
     "bench.video.enabling": ("video.enable_to_frame_ms",),
     "bench.video.cpu": ("video.cpu",),

@@ -13,9 +13,10 @@ from bench.rows import Row
 from bench.video import product
 from bench.video.bad_link import BadLink, bad_link, possible
 from bench.video.camera import camera
-from bench.video.viewing import Glance
+from bench.video.window import Glance
 from common.errors import UserError
 from console.client import PreviewProfile
+from tests.support.free import free_udp_port
 
 FPS = 60
 ROUNDS = 5
@@ -116,12 +117,17 @@ def _rows(workdir: Path, bad: _Link) -> list[Row]:
 
 
 def _watch_through(workdir: Path, link: BadLink, *, adaptive: bool) -> Outcome:
+    port = free_udp_port()
+    settings = {
+        "adaptive": {"enabled": adaptive},
+        "srt": {"bind": link.robot, "port": port, "latency_ms": LATENCY_MS},
+    }
     with (
         camera(workdir, FPS) as source,
-        product.robot(workdir, source, LATENCY_MS, host=link.robot, adaptive=adaptive) as robot,
+        product.robot(workdir, source, LATENCY_MS, settings=settings) as robot,
         robot.preview(PreviewProfile.HIGH_QUALITY),
     ):
-        where = (link.robot, str(robot.address.port), str(LATENCY_MS))
+        where = (link.robot, str(port), str(LATENCY_MS))
         command = [*link.enter, sys.executable, "-m", "bench.video.far_viewer", *where]
         begun_s = time.monotonic()
         seconds = SETTLE_S + WATCH_S

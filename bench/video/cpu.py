@@ -69,7 +69,7 @@ def _round(source: Camera, robot: product.Robot) -> _Round | None:
     port = free_udp_port()
     with (
         reference.sender(source, port, LATENCY_MS, _same_encoder()) as process,
-        reference.PlainViewer(port, LATENCY_MS) as their_viewer,
+        reference.viewer(port, LATENCY_MS) as their_viewer,
         robot.preview(),
         robot.viewer() as our_viewer,
         ThreadPoolExecutor(4) as measuring,

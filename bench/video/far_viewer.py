@@ -4,7 +4,8 @@ import argparse
 import json
 import time
 
-from bench.video.viewing import Glance, watch
+from bench.video.viewing import watch
+from bench.video.window import Glance
 from common.backoff import Backoff
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError

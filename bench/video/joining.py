@@ -32,8 +32,8 @@ def rows(workdir: Path, _wanted: set[str]) -> list[Row]:
     with camera(workdir) as source, product.robot(workdir, source, LATENCY_MS) as robot:
         port = free_udp_port()
 
-        def reference_viewer() -> reference.PlainViewer:
-            return reference.PlainViewer(port, LATENCY_MS)
+        def reference_viewer() -> AbstractContextManager[Any]:
+            return reference.viewer(port, LATENCY_MS)
 
         for _ in range(ROUNDS):
             sending = reference.sender(source, port, LATENCY_MS)

@@ -7,7 +7,8 @@ from bench.progress import log
 from bench.rows import Row
 from bench.video import product
 from bench.video.camera import camera
-from bench.video.viewing import longest_gap_ms, watch
+from bench.video.viewing import watch
+from bench.video.window import longest_gap_ms
 from console.client import PreviewProfile
 
 ROUNDS = 5
@@ -38,7 +39,8 @@ def _round(robot: product.Robot) -> float:
         watch(viewer, SETTLE_S)
         for profile in _WAY:
             switching = operator.submit(robot.client.enable_preview, profile)
-            gaps.append(longest_gap_ms(watch(viewer, WATCH_S)))
+            seen = watch(viewer, WATCH_S)
+            gaps.append(longest_gap_ms(seen, seen[0].decoded_s, seen[-1].decoded_s))
             switching.result()
     line = ", ".join(f"{gap:.0f} ms to {profile.value}" for gap, profile in zip(gaps, _WAY, strict=True))
     log(f"longest gaps: {line}")
