@@ -18,6 +18,7 @@ _MODULES = {
         for figure in ("ms", "p99_ms", "delivered_percent")
     ),
     "bench.video.joining": ("video.first_frame", "video.first_frame_ms"),
+    "bench.video.joining_together": ("video.first_frame_ten_ms",),
     "bench.video.enabling": ("video.enable_to_frame_ms",),
     "bench.video.cpu": ("video.cpu", "video.cpu_in_turns"),
     "bench.video.switching": ("video.switch_gap_ms",),
