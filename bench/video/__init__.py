@@ -19,7 +19,7 @@ _MODULES = {
     ),
     "bench.video.joining": ("video.first_frame", "video.first_frame_ms"),
     "bench.video.joining_together": ("video.first_frame_ten_ms",),
-    "bench.video.enabling": ("video.enable_to_frame_ms",),
+    "bench.video.enabling": ("video.enable_to_frame_ms", "video.cold_enable_ms"),
     "bench.video.cpu": ("video.cpu", "video.cpu_in_turns"),
     "bench.video.switching": ("video.switch_gap_ms",),
     "bench.video.adaptive": (
