@@ -22,11 +22,10 @@ _MODULES = {
     "bench.video.enabling": ("video.enable_to_frame_ms", "video.cold_enable_ms"),
     "bench.video.cpu": ("video.cpu", "video.cpu_in_turns"),
     "bench.video.switching": ("video.switch_gap_ms",),
-    "bench.video.adaptive": (
-        "video.adaptive_limited",
-        "video.adaptive_limited_freeze_ms",
-        "video.adaptive_lossy",
-        "video.adaptive_lossy_freeze_ms",
+    "bench.video.adaptive": tuple(
+        f"video.adaptive_{link}{figure}"
+        for link in ("limited", "lossy")
+        for figure in ("", "_freeze_ms", "_frame_kbit")
     ),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
