@@ -27,6 +27,10 @@ _MODULES = {
         for link in ("limited", "lossy")
         for figure in ("", "_freeze_ms", "_frame_kbit")
     ),
+    "bench.video.dark": tuple(
+        f"video.dark_ms_{failure}"
+        for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
+    ),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
