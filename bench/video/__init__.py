@@ -31,6 +31,7 @@ _MODULES = {
         f"video.dark_ms_{failure}"
         for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
     ),
+    "bench.video.viewer_cpu": ("video.viewer_cpu",),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
