@@ -32,6 +32,7 @@ _MODULES = {
         for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
     ),
     "bench.video.viewer_cpu": ("video.viewer_cpu",),
+    "bench.video.h265": ("video.excess_h265_ms",),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
