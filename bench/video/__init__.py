@@ -33,6 +33,7 @@ _MODULES = {
     ),
     "bench.video.viewer_cpu": ("video.viewer_cpu",),
     "bench.video.h265": ("video.excess_h265_ms",),
+    "bench.video.peers": ("video.peer_rtp_ms", "video.peer_webrtc_ms"),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
