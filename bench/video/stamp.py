@@ -1,4 +1,4 @@
-"""The moment of capture, drawn into the frame itself, so that it survives every step up to the decoder.
+"""Capture time, drawn into the frame itself, so that it survives every step up to the decoder.
 
 A number of 32 bits in blocks of 16 x 16 pixels, black or white, in the top left corner, then 8 check bits.
 The number counts ticks of 0.1 ms on `time.monotonic()`, which all processes of a machine share. Blocks of
