@@ -1,4 +1,4 @@
-"""How long something that happens has to wait until Qt's event loop attends to it."""
+"""Delay with which Qt's event loop handles an event."""
 
 import time
 
@@ -8,10 +8,10 @@ EVERY_MS = 5
 
 
 class LoopDelay(QObject):
-    """A timer that notes how late it is.
+    """A periodic timer that records how late it fires.
 
-    While the loop is busy the timer falls due again and again, but is heard once. All these moments count,
-    each with its own wait: else a long silence would weigh as much as a short one.
+    While the loop is busy, the timer falls due several times but fires once. Each of these moments counts
+    with its own delay; otherwise one long blockage would weigh no more than a short one.
     """
 
     def __init__(self) -> None:
@@ -22,13 +22,13 @@ class LoopDelay(QObject):
         self._before_s = 0.0
 
     def start(self) -> None:
-        """Begins, and forgets what was before."""
+        """Starts recording; earlier delays are discarded."""
         self._delays_ms.clear()
         self._before_s = time.monotonic()
         self._timer.start()
 
     def stop(self) -> list[float]:
-        """All waits, in ms."""
+        """Stops recording and returns all delays, in ms."""
         self._timer.stop()
         return self._delays_ms
 

@@ -1,4 +1,4 @@
-"""The monitor window with live video: how long the event loop keeps an operator's key or click waiting."""
+"""The monitor window with live video: how long a key or click waits for the event loop."""
 
 import json
 import statistics
@@ -51,7 +51,7 @@ def _row(found: Robot, name: str, what: str, width: int, height: int) -> Row:
 
 
 def _measure(found: Robot, width: int, height: int) -> Any:
-    """Returns the waits of the event loop and the frames painted in one round."""
+    """Returns the delays of the event loop and the number of frames painted in one round."""
     ended = subprocess.run(
         [
             sys.executable,

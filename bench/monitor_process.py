@@ -1,7 +1,7 @@
-"""The monitor window, to be measured: `python -m bench.monitor_process TARGET SECONDS WIDTH HEIGHT`.
+"""The monitor window under measurement: `python -m bench.monitor_process TARGET SECONDS WIDTH HEIGHT`.
 
-Without a screen, as Qt's "offscreen" platform paints it: into memory, with the CPU, as on a laptop without a
-graphics card. Prints one JSON object: the waits of the event loop and the frames painted meanwhile.
+Qt's "offscreen" platform paints into memory with the CPU, as on a laptop without a graphics card. Prints one
+JSON object: the delays of the event loop, and how many frames were painted meanwhile.
 """
 
 import json
@@ -20,7 +20,7 @@ from bench.loop_delay import LoopDelay
 from console.window.programs import monitor
 
 _FRAMES_FIRST = 60
-"""Frames painted before it counts: the window is laid out, the decoder has settled."""
+"""Frames painted before the measurement begins: layout and decoder have settled."""
 _GIVE_UP_AFTER_S = 60
 
 

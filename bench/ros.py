@@ -1,9 +1,9 @@
-"""What reading ROS costs: sampling against rclpy callbacks, fast topics against slow ones; and latency.
+"""CPU of reading ROS topics: sampling against rclpy callbacks, fast topics against slow ones; and latency.
 
 Publisher and readers are processes of their own, and all figures count the whole reading process. The
 references are an ordinary node, whose callbacks convert each message, and the cheapest honest one, whose
 callbacks only keep the newest message, which a timer converts as often as our sampler runs. Fast DDS's own
-threads need some 10 us for each message that arrives, whatever reads it; both parts are logged.
+threads need about 10 us per message in any case; both parts are logged.
 """
 
 import os
@@ -43,11 +43,11 @@ def _cpu_rows() -> list[Row]:
     for _ in range(ROUNDS):
         with _domain():
             with program("bench.ros_talker", str(FAST_HZ)):
-                ours.append(_cost_of("sampler", FAST_HZ))
-                stock.append(_cost_of("callbacks", FAST_HZ))
-                newest.append(_cost_of("newest", FAST_HZ))
+                ours.append(_cpu_of("sampler", FAST_HZ))
+                stock.append(_cpu_of("callbacks", FAST_HZ))
+                newest.append(_cpu_of("newest", FAST_HZ))
             with program("bench.ros_talker", str(SLOW_HZ)):
-                slow.append(_cost_of("sampler", SLOW_HZ))
+                slow.append(_cpu_of("sampler", SLOW_HZ))
     return [
         Row(
             name="ros.intake",
@@ -76,7 +76,7 @@ def _cpu_rows() -> list[Row]:
     ]
 
 
-def _cost_of(way: str, rate_hz: int) -> CpuShare:
+def _cpu_of(way: str, rate_hz: int) -> CpuShare:
     with program("bench.ros_listener", way) as process:
         cpu_share(process.pid, SETTLE_S)
         cpu = cpu_share(process.pid, WINDOW_S)
@@ -89,7 +89,7 @@ def _cost_of(way: str, rate_hz: int) -> CpuShare:
         f"ros: {way} at 4 x {rate_hz} Hz: {cpu.own:.2f} % + {cpu.middleware:.2f} % in Fast DDS, "
         f"{rss:.0f} MiB, {kept} values"
     )
-    # A reader that receives nothing is the cheapest of all.
+    # A reader that receives nothing needs the least CPU.
     if kept < 4 * 19 * WINDOW_S:
         raise RuntimeError(f"{way} kept {kept} values only: the figures would mean nothing")
     return cpu

@@ -1,4 +1,4 @@
-"""What the whole gateway costs beside a robot that publishes fast: a process of its own, all its threads."""
+"""CPU of the whole gateway process beside a robot that publishes fast."""
 
 import tempfile
 import time
@@ -13,7 +13,7 @@ FAST_HZ = 200
 FRAMES_HZ = 30
 BOXES = 100
 SETTLE_S = 3.0
-"""After the start: discovery, and what happens only once."""
+"""After the start: discovery and one-time work."""
 ROUNDS = 5
 WINDOW_S = 6.0
 _FAST = ("--odometry-hz", "--vision-hz", "--battery-hz", "--diagnostics-hz")

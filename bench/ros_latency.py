@@ -1,4 +1,4 @@
-"""How late a value is: odometry is published, and a client asks the real gateway until it shows."""
+"""Latency of a value: odometry is published, and a client polls the gateway until it has the value."""
 
 import os
 import random
@@ -57,7 +57,7 @@ def _publish_until_seen(gateway: Any, publisher: Any, speed: float) -> float:
 
 
 def _wait_for_discovery(gateway: Any, publisher: Any) -> None:
-    """Publishes until the first value shows: both sides have found each other."""
+    """Publishes until the first value arrives: DDS discovery has finished."""
     deadline = time.monotonic() + GIVE_UP_S
     while not gateway.GetSystemStatus(GetSystemStatusRequest()).health.odom_available:
         if time.monotonic() > deadline:
@@ -68,7 +68,7 @@ def _wait_for_discovery(gateway: Any, publisher: Any) -> None:
 
 @contextmanager
 def _gateway() -> Iterator[Any]:
-    """The real program, with its defaults, and a client of it."""
+    """Runs the program with its default settings, and yields a client of it."""
     port = free_tcp_port()
     with tempfile.TemporaryDirectory() as directory:
         settings = {

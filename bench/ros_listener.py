@@ -1,8 +1,8 @@
 """Reads the talker's four topics until its standard input closes: `python -m bench.ros_listener WAY`.
 
-WAY is "sampler" (ours), "callbacks" (an ordinary rclpy node on a SingleThreadedExecutor, whose callbacks do
-what ours does with a message) or "newest" (the same node, whose callbacks only keep the message; a timer does
-the rest, as often as our sampler). At the end it prints how many values it kept.
+WAY is "sampler" (ours), "callbacks" (an ordinary rclpy node on a SingleThreadedExecutor, whose callbacks
+convert each message as ours does) or "newest" (the same node, whose callbacks only keep the message; a timer
+converts it, as often as our sampler). At the end it prints how many values it kept.
 """
 
 import sys
@@ -109,7 +109,7 @@ def spin(executor: Any) -> None:
 
 
 def wait_for_the_end(everything_arrives: Callable[[], bool]) -> None:
-    """Reports ready once all four topics arrive: a window in which discovery goes on would be too cheap."""
+    """Prints "ready" once all four topics arrive, so that no window includes discovery."""
     while not everything_arrives():
         time.sleep(0.05)
     print("ready", flush=True)

@@ -23,7 +23,8 @@ class Row:
         unit: of values and references; empty for a count.
         values: what our product needed, one figure per round.
         references: what the reference needed in the same rounds. Empty where the bar is on the value itself.
-        bar: the promised limit, on the ratio where there is a reference, else on the value.
+        bar: the promised limit, on the ratio where there is a reference, else on the value. None: published
+            for comparison, without a promise.
         better: "lower": at most the bar keeps the promise; "higher": at least the bar does.
         judged: "median" of the rounds, or the "worst" of them where the promise is about every one.
         discarded: rounds that were measured and left out, because they were not comparable.
@@ -38,7 +39,7 @@ class Row:
     what: str
     unit: str
     values: Sequence[float]
-    bar: float
+    bar: float | None
     references: Sequence[float] = ()
     better: Literal["lower", "higher"] = "lower"
     judged: Literal["median", "worst"] = "median"
@@ -80,7 +81,9 @@ class Row:
 
     @property
     def ok(self) -> bool:
-        """Whether the promise is kept."""
+        """Whether the promise is kept; True without one."""
+        if self.bar is None:
+            return True
         figure = self.value if self.ratio is None else self.ratio
         return figure <= self.bar if self.better == "lower" else figure >= self.bar
 

@@ -1,4 +1,4 @@
-"""The gateway's own stack in a process of its own, for the benchmarks of the door (bench.status_server)."""
+"""Runs the whole gateway without ROS in a process of its own (bench.status_server)."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """A server that runs."""
+    """A running server: its process ID and TCP port."""
 
     pid: int
     port: int
@@ -20,8 +20,8 @@ def running_stack(*words: str) -> Iterator[Stack]:
     """Serves until the block ends.
 
     Args:
-        words: "limited" for the bounds that a gateway has by default; "guarded" and a directory of
-            credentials for one that asks who calls, over TLS.
+        words: "limited" for the default rate limits; "guarded" and a directory of credentials for TLS and
+            authentication.
     """
     with subprocess.Popen(
         [sys.executable, "-m", "bench.status_server", *words],

@@ -1,8 +1,8 @@
 """The server that bench.status measures: the whole gateway with everything filled, and an empty method.
 
-Run as a program it prints its port, serves until its standard input ends and uses no ROS. Callers may call
-as often as they like, unless the word "limited" follows. After "guarded" comes the directory of the
-credentials that callers need.
+As a program it prints its port and serves until standard input closes; it does not use ROS. There are no rate
+limits unless the argument "limited" is given. "guarded" and a directory of credentials enable TLS and
+authentication.
 """
 
 import asyncio
@@ -74,7 +74,7 @@ CONSTANT_METHOD = "/bench.Reference/Constant"
 RAISE_METHOD = "/bench.Reference/Raise"
 CONSTANT_EVERY_S = 0.1
 _UNLIMITED: Final = LimitSettings(requests_per_s=1e9, burst=1_000_000_000)
-"""The same code runs; no caller is refused."""
+"""The rate limiter runs and refuses no call."""
 _MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/String", stale_after_ms=1000)
 _FIVE_FAULTS: Final = Diagnostics(
     tuple(
@@ -108,7 +108,7 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
 
 
 class _BenchRobot:
-    """A robot that moves: something changes all the time."""
+    """Outside of the gateway: a robot whose values change all the time."""
 
     @contextmanager
     def feeding(self, board: Board) -> Iterator[None]:
@@ -123,7 +123,7 @@ class _BenchRobot:
 
 
 class _PreviewInMemory:
-    """A preview service without a process: it runs, and reports as often as the sources do."""
+    """A preview service in this process: always RUNNING, reports as often as the sources do."""
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator["_PreviewInMemory"]:
@@ -139,7 +139,7 @@ class _PreviewInMemory:
 
 
 def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
-    """What the gateway's methods are compared with."""
+    """Returns the reference methods: they do nothing but answer."""
 
     async def raise_event(_request: bytes, _context: RpcContext) -> bytes:
         gateway.state.note(_event("an event"))
@@ -164,7 +164,7 @@ async def _empty(_request: bytes, _context: RpcContext) -> bytes:
 
 
 async def _constant(request: bytes, _context: RpcContext) -> AsyncIterator[bytes]:
-    """The request again, ten times a second."""
+    """Streams the request back ten times a second."""
     while True:
         yield request
         await asyncio.sleep(CONSTANT_EVERY_S)

@@ -1,8 +1,8 @@
-"""What the window adds to the latency: capture to the painted frame, against capture to decoded.
+"""Latency that the window adds: capture to the painted frame, less capture to decoded.
 
-The preview's frames carry the moment of their capture (bench/video/stamp.py). The bare receiver reads it
-behind the decoder; the viewer's is read back from the pixels of its window, after they were painted. Both
-watch the same robot in turns.
+The preview's frames carry the moment of their capture (bench/video/stamp.py). With the bare receiver it is
+read behind the decoder, with the viewer from the pixels of its window after they were painted. Both watch
+the same robot in turns.
 """
 
 import os
@@ -48,7 +48,7 @@ def run(_names: list[str]) -> list[Row]:
 
 
 def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]:
-    """What the window adds, round by round: the difference of the medians of both sides."""
+    """Yields the difference of the medians of both sides for each round, in ms."""
     with camera(workdir, FPS) as source, product.robot(workdir, source, LATENCY_MS) as robot, robot.preview():
         for _ in range(rounds):
             with robot.viewer() as receiver:
@@ -60,7 +60,7 @@ def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]
 
 
 def _painted_ms(robot: product.Robot) -> list[float]:
-    """Capture to painted, of each frame that the window showed."""
+    """Returns the time from capture to painted of each frame that the window showed, in ms."""
     found: list[float] = []
     with _window(robot) as view:
 
@@ -71,21 +71,21 @@ def _painted_ms(robot: product.Robot) -> list[float]:
                 found.append((seen_s - captured_s) * 1000)
 
         _let_pass(SETTLE_S)
-        # Behind the painting: what is on the screen then is what was painted.
+        # A timer of 0 ms fires after the painting, when the screen has the new frame.
         view.painted.connect(lambda: QTimer.singleShot(0, look))
         _let_pass(WATCH_S)
     return found
 
 
 def on_screen(widget: QWidget) -> QImage:
-    """What has been painted of a widget, without painting it again."""
+    """Returns the pixels of a widget as they were painted, without painting it again."""
     window = widget.window()
     whole = window.screen().grabWindow(window.winId()).toImage()
     return whole.copy(QRect(widget.mapTo(window, QPoint(0, 0)), widget.size()))
 
 
 def read_stamp(frame: QImage) -> float | None:
-    """The moment that is drawn into a frame shown in its own size, from its upper left corner on."""
+    """Returns the stamp of a frame that is shown in its own size; None when it can't be read."""
     grey = frame.convertToFormat(QImage.Format.Format_Grayscale8)
     first = grey.bytesPerLine() * (stamp.BLOCK_PX // 2)
     row = bytes(grey.constBits()[first : first + min(stamp.WIDTH_PX, grey.width())])
@@ -94,7 +94,7 @@ def read_stamp(frame: QImage) -> float | None:
 
 @contextmanager
 def _window(robot: product.Robot) -> Iterator[VideoView]:
-    # A window nobody sees, also where there is no screen.
+    # Works without a screen, and shows no window where there is one.
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     _app = QApplication.instance() or QApplication(["bench"])
     session = VideoSession()

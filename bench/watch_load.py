@@ -1,11 +1,11 @@
-"""Callers beside the one that is measured, ten times a second each, in a process of their own.
+"""Background callers beside the measured one, ten times a second each, in a process of their own.
 
     python -m bench.watch_load PORT WATCHERS CONSTANTS [stall] [flood]
 
-Each watcher has a connection and asks for the status; a constant is the same with the reference's stream of
-constant bytes. "stall" opens a watch and never reads; "flood" keeps many calls open on one connection. Prints
-"ready" when every stream has begun; then, for each line that comes in, how many answers each of them has had,
-as JSON. Ends with its standard input.
+Each watcher has a connection of its own and watches the status; a constant does the same with the reference's
+stream of constant bytes. "stall" opens a watch and never reads; "flood" keeps many calls open on one
+connection. Prints "ready" when every stream has begun; then, for each line on standard input, the number of
+answers of each stream, as JSON. Ends when standard input closes.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ _FLOOD_CALLS = 200
 
 
 class Load:
-    """What goes on until it is cancelled."""
+    """Streams and calls that continue until `end`."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -36,7 +36,7 @@ class Load:
         self._tasks: list[asyncio.Task[None]] = []
 
     def streams(self, method: str, request: bytes, count: int) -> None:
-        """So many connections with one stream each."""
+        """Opens `count` connections with one stream each."""
         for _ in range(count):
             self.received.append(0)
             self._began.append(asyncio.Event())
@@ -47,17 +47,17 @@ class Load:
         await asyncio.gather(*(each.wait() for each in self._began))
 
     def stall(self) -> None:
-        """One that never reads."""
+        """Opens a watch that never reads."""
         self._begin(self._never_read())
 
     def flood(self) -> None:
-        """One connection with as many calls as it can keep open."""
+        """Keeps _FLOOD_CALLS calls open on one connection."""
         channel = self._channel()
         for _ in range(_FLOOD_CALLS):
             self._begin(self._ask_again_and_again(channel))
 
     def end(self) -> None:
-        """Everything at once."""
+        """Cancels everything."""
         for task in self._tasks:
             task.cancel()
 

@@ -1,8 +1,7 @@
-"""The preview against today's usual pipeline: same camera, same codec, in turns.
+"""The preview against the usual pipeline: same camera, same codec, in the same run.
 
-Every round measures the reference, then ours, each alone on the machine; the median round speaks. Only CPU
-is measured of both at once. Frames carry the moment of their capture (stamp.py) from before the encoder to
-behind the decoder.
+Where "what" does not say "at once", each side is alone on the machine, and both in every round. Frames carry
+the moment of their capture (stamp.py) from before the encoder to behind the decoder.
 """
 
 import importlib
@@ -12,17 +11,29 @@ from pathlib import Path
 from bench.rows import Row
 
 _MODULES = {
-    "bench.video.latency": ("video.excess_latency_20", "video.excess_latency_125"),
-    "bench.video.joining": ("video.first_frame",),
-    "bench.video.enabling": ("video.enable_to_frame_ms",),
-    "bench.video.cpu": ("video.cpu",),
-    "bench.video.switching": ("video.switch_gap_ms",),
-    "bench.video.adaptive": (
-        "video.adaptive_limited",
-        "video.adaptive_limited_freeze_ms",
-        "video.adaptive_lossy",
-        "video.adaptive_lossy_freeze_ms",
+    "bench.video.latency": tuple(
+        f"video.excess_{sender}_sender_{receiver}_receiver_{figure}"
+        for sender in ("reference", "ours")
+        for receiver in ("plain", "ours")
+        for figure in ("ms", "p99_ms", "delivered_percent")
     ),
+    "bench.video.joining": ("video.first_frame", "video.first_frame_ms"),
+    "bench.video.joining_together": ("video.first_frame_ten_ms",),
+    "bench.video.enabling": ("video.enable_to_frame_ms", "video.cold_enable_ms"),
+    "bench.video.cpu": ("video.cpu", "video.cpu_in_turns"),
+    "bench.video.switching": ("video.switch_gap_ms",),
+    "bench.video.adaptive": tuple(
+        f"video.adaptive_{link}{figure}"
+        for link in ("limited", "lossy")
+        for figure in ("", "_freeze_ms", "_frame_kbit")
+    ),
+    "bench.video.dark": tuple(
+        f"video.dark_ms_{failure}"
+        for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
+    ),
+    "bench.video.viewer_cpu": ("video.viewer_cpu",),
+    "bench.video.h265": ("video.excess_h265_ms",),
+    "bench.video.peers": ("video.peer_rtp_ms", "video.peer_webrtc_ms"),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 

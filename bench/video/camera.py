@@ -1,12 +1,13 @@
 """A camera for benchmarks: footage with a stamp, 1280x720 NV12, offered through shared memory.
 
-Both senders read it by the same GStreamer description, so the way from the camera is the same for both. The
+All senders read it by the same GStreamer description, so the way from the camera is the same for all. The
 frames are made ahead by ffmpeg (a moving test pattern with noise as a sensor makes it), so that the camera
-itself needs next to no CPU: it draws the stamp and hands a frame over.
+itself needs next to no CPU: it draws the stamp, writes it to its journal and hands the frame over.
 """
 
 import subprocess
 import sys
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,16 +27,25 @@ class Camera:
 
     Args:
         socket: where its shared memory is announced.
+        journal: file with the capture times of all its frames.
         fps: frames per second.
     """
 
     socket: Path
+    journal: Path
     fps: int
 
     @property
     def source(self) -> str:
-        """What GStreamer reads it with; ends in raw video."""
+        """GStreamer description that reads it and ends in raw video."""
         return f"shmsrc socket-path={self.socket} is-live=true do-timestamp=true ! {caps(self.fps)}"
+
+    def captured(self, from_s: float, until_s: float) -> int:
+        """Returns how many frames it took in a window of `time.monotonic()`."""
+        content = self.journal.read_bytes()
+        times_s = array("d")
+        times_s.frombytes(content[: len(content) // times_s.itemsize * times_s.itemsize])
+        return sum(from_s <= one < until_s for one in times_s)
 
 
 @contextmanager
@@ -48,8 +58,9 @@ def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
     footage = workdir / "footage.nv12"
     if not footage.exists():
         _make(footage)
-    made = Camera(workdir / f"camera-{fps}", fps)
-    command = [sys.executable, "-m", "bench.video.camera_process", str(footage), str(made.socket), str(fps)]
+    made = Camera(workdir / f"camera-{fps}", workdir / f"camera-{fps}.journal", fps)
+    command = [sys.executable, "-m", "bench.video.camera_process"]
+    command += [str(footage), str(made.socket), str(made.journal), str(fps)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         try:
@@ -61,7 +72,7 @@ def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
 
 
 def caps(fps: int) -> str:
-    """Complete: shared memory knows nothing of its content, so nobody downstream could fill a gap."""
+    """Returns complete caps: shared memory has none, and no element downstream could fill a gap."""
     return (
         f"video/x-raw,format=NV12,width={WIDTH_PX},height={HEIGHT_PX},framerate={fps}/1"
         ",pixel-aspect-ratio=1/1,interlace-mode=progressive,colorimetry=bt709"

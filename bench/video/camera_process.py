@@ -1,8 +1,9 @@
-"""The process that plays the camera; see camera.py."""
+"""The process of the camera; see camera.py."""
 
 import argparse
 import mmap
 import signal
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -14,8 +15,8 @@ from bench.video.camera import FRAME_BYTES, WIDTH_PX, caps
 from common.gst import GLib, Gst
 
 
-def serve(footage: Path, socket: Path, fps: int) -> None:
-    """Offers frames until SIGTERM; says "ready" on standard output when a reader may come."""
+def serve(footage: Path, socket: Path, journal: Path, fps: int) -> None:
+    """Offers frames until SIGTERM; prints "ready" as soon as readers may connect."""
     pipeline = Gst.parse_launch(
         "appsrc name=in is-live=true format=time max-bytes=0"
         f" caps={caps(fps)}"
@@ -27,14 +28,18 @@ def serve(footage: Path, socket: Path, fps: int) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     print("ready", flush=True)
-    for frame in _frames(footage, fps, stop):
+    for frame in _frames(footage, journal, fps, stop):
         way_in.emit("push-buffer", Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(frame)))
     pipeline.set_state(Gst.State.NULL)
 
 
-def _frames(footage: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
-    """Stamped frames at their time; forth and back through the footage, so that nothing ever jumps."""
-    with footage.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+def _frames(footage: Path, journal: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
+    """Yields stamped frames at their time; forth and back, so that the content never jumps."""
+    with (
+        footage.open("rb") as file,
+        mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
+        journal.open("wb", buffering=0) as captured,
+    ):
         available = len(content) // FRAME_BYTES
         order = [*range(available), *range(available - 2, 0, -1)]
         begun_s = time.monotonic()
@@ -43,7 +48,7 @@ def _frames(footage: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
             if stop.wait(max(0.0, due_s - time.monotonic())):
                 return
             frame = bytearray(content[index * FRAME_BYTES : (index + 1) * FRAME_BYTES])
-            stamp.draw(frame, WIDTH_PX, time.monotonic())
+            captured.write(struct.pack("d", stamp.draw(frame, WIDTH_PX, time.monotonic())))
             yield bytes(frame)
 
 
@@ -51,6 +56,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("footage", type=Path)
     parser.add_argument("socket", type=Path)
+    parser.add_argument("journal", type=Path)
     parser.add_argument("fps", type=int)
     given = parser.parse_args()
-    serve(given.footage, given.socket, given.fps)
+    serve(given.footage, given.socket, given.journal, given.fps)

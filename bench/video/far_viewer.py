@@ -3,43 +3,40 @@
 import argparse
 import json
 import time
+from contextlib import closing
+from dataclasses import replace
 
-from bench.video.viewing import Glance, watch
-from common.backoff import Backoff
-from console.receiver.address import StreamAddress
-from console.receiver.errors import StreamError
-from tests.support.receiver import NoFrameError, Receiver
+from bench.video.viewing import capture_time
+from bench.video.window import Glance
+from console.client import GatewayClient
+from console.receiver.frame import Frame, PixelFormat
+from console.viewer.session import VideoSession
 
 
 def main() -> None:
+    """Watches with the console's session, which connects again when it must."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("host")
-    parser.add_argument("port", type=int)
-    parser.add_argument("latency_ms", type=int)
+    parser.add_argument("target", help="the robot's gateway")
+    parser.add_argument("port", type=int, help="UDP port of the link to the stream")
     parser.add_argument("seconds", type=float)
     given = parser.parse_args()
-    seen = _watch(StreamAddress(given.host, given.port, given.latency_ms), given.seconds)
-    print(json.dumps([(one.captured_s, one.decoded_s, one.corrupt) for one in seen]))
-
-
-def _watch(address: StreamAddress, seconds: float) -> list[Glance]:
-    """Watches as long as asked and connects again when it must; a link without any frame is a result, too."""
-    until_s, backoff = time.monotonic() + seconds, Backoff(first_s=0.1, longest_s=2.0)
+    with GatewayClient(given.target) as client:
+        status = client.status().preview
+    assert status.endpoint
     seen: list[Glance] = []
-    while time.monotonic() < until_s:
-        try:
-            with Receiver(address, queue_size=8) as receiver:
-                while (left_s := until_s - time.monotonic()) > 0:
-                    try:
-                        seen += watch(receiver, min(1.0, left_s))
-                        backoff.reset()
-                    except NoFrameError:
-                        continue
-        except StreamError as error:
-            if error.final:
-                raise
-            time.sleep(min(backoff.next_s(), max(0.0, until_s - time.monotonic())))
-    return seen
+
+    def note(frame: Frame) -> None:
+        captured_s = capture_time(frame)
+        if captured_s is not None:
+            seen.append(Glance(captured_s, frame.arrival_s, frame.corrupt))
+
+    session = VideoSession(pixels=PixelFormat.I420)
+    session.add_frame_listener(note)
+    with closing(session):
+        session.start()
+        session.follow(replace(status, endpoint=replace(status.endpoint, port=given.port)))
+        time.sleep(given.seconds)
+    print(json.dumps([(one.captured_s, one.decoded_s, one.corrupt) for one in seen]))
 
 
 if __name__ == "__main__":

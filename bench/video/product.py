@@ -1,13 +1,13 @@
-"""What we measure: the preview service behind the gateway, as on a robot, and the reference receiver."""
+"""The product under measurement: the preview service behind the gateway, as on a robot."""
 
 import json
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 from bench.video import foreign
 from bench.video.camera import Camera
@@ -16,8 +16,40 @@ from console.receiver.address import StreamAddress
 from tests.support.free import free_tcp_port, free_udp_port
 from tests.support.receiver import Receiver
 
-_UP_WITHIN_S = 20.0
-_PROGRAMS = Path(sys.executable).parent
+if TYPE_CHECKING:
+    import subprocess
+
+HOST: Final = "127.0.0.1"
+_UP_WITHIN_S: Final = 20.0
+_PROGRAMS: Final = Path(sys.executable).parent
+_WITHOUT_WATCHDOGS: Final = {"start_s": 20, "source_silence_s": 10, "encoder_silence_s": 10}
+"""A machine that is busy otherwise must not end a long run."""
+
+
+class Service:
+    """The preview service's process.
+
+    Args:
+        command: program and arguments.
+        environment: of the process, besides this one's.
+    """
+
+    def __init__(self, command: tuple[str, ...], environment: Mapping[str, str]) -> None:
+        self._command = command
+        self._environment = environment
+        self.process = self._spawn()
+
+    @property
+    def pid(self) -> int:
+        """Process ID."""
+        return self.process.pid
+
+    def start_again(self) -> None:
+        """Restarts the process after its end, as a container engine does."""
+        self.process = self._spawn()
+
+    def _spawn(self) -> "subprocess.Popen[bytes]":
+        return foreign.spawn(*self._command, own=True, more=self._environment)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,21 +58,25 @@ class Robot:
 
     Args:
         client: an operator's connection.
-        service: the preview service's process.
-        address: where its stream is while it is on.
+        service: the preview service.
+        address: of its stream while it is on.
     """
 
     client: GatewayClient
-    service: subprocess.Popen[bytes]
+    service: Service
     address: StreamAddress
 
     def viewer(self) -> Receiver:
-        """Begins to watch."""
+        """Connects the product's receiver."""
         return Receiver(self.address, queue_size=4)
 
     @contextmanager
     def preview(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> Iterator[None]:
-        """Has the preview on until the block ends."""
+        """Enables the preview until the block ends.
+
+        Raises:
+            RuntimeError: it does not run.
+        """
         change = self.client.enable_preview(profile)
         if change.preview.state is not PreviewState.RUNNING:
             raise RuntimeError(f"the preview does not run: {change.message}")
@@ -52,30 +88,37 @@ class Robot:
 
 @contextmanager
 def robot(
-    workdir: Path, source: Camera, latency_ms: int, *, host: str = "127.0.0.1", adaptive: bool = False
+    workdir: Path,
+    source: Camera | None,
+    latency_ms: int,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    environment: Mapping[str, str] | None = None,
+    warm: bool = True,
 ) -> Iterator[Robot]:
     """Runs both programs until the block ends; their logs go to standard error.
 
     Args:
         workdir: for configuration and sockets.
-        source: what they show.
-        latency_ms: of SRT.
-        host: the address that viewers call.
-        adaptive: whether the bit rate follows the link.
+        source: the camera; None for the service's own test pattern.
+        latency_ms: SRT latency.
+        settings: sections of the preview service's configuration that replace those of the benchmarks:
+            x264, and watchdogs that are out of the way.
+        environment: of the preview service, besides this process's.
+        warm: whether the preview is enabled and disabled once first, so that what happens only at the first
+            start after the service's own is not measured.
     """
-    name = f"{latency_ms}-{source.fps}-{'adaptive' if adaptive else 'fixed'}"
-    socket, udp, tcp = workdir / f"{name}.sock", free_udp_port(), free_tcp_port()
+    udp, tcp = free_udp_port(), free_tcp_port()
+    socket = workdir / f"preview-{udp}.sock"
     preview = {
         "socket": str(socket),
         "log_level": "warning",
-        "source": {"kind": "gst", "description": source.source},
-        "srt": {"bind": host, "port": udp, "latency_ms": latency_ms},
+        "source": {"kind": "gst", "description": source.source} if source else {"kind": "test"},
+        "srt": {"bind": HOST, "port": udp, "latency_ms": latency_ms},
         "encoders": {"order": ["x264"]},
-        "adaptive": {"enabled": adaptive},
-        # Watchdogs are not what is measured: a machine that is busy otherwise must not end a long run.
-        "timeouts": {"start_s": 20, "source_silence_s": 10, "encoder_silence_s": 10},
-        "runtime_dir": str(workdir / name),
-    }
+        "timeouts": _WITHOUT_WATCHDOGS,
+        "runtime_dir": str(workdir / f"preview-{udp}"),
+    } | dict(settings or {})
     gateway = {
         "log_level": "warning",
         "grpc": {"port": tcp},
@@ -83,17 +126,20 @@ def robot(
         "preview": {"socket": str(socket), "encrypted": False},
         "sources": [],
     }
-    with (
-        _program("robot-preview", workdir / f"preview-{name}.yaml", preview) as service,
-        _program("robot-gateway", workdir / f"gateway-{name}.yaml", gateway),
-        GatewayClient(f"127.0.0.1:{tcp}") as client,
-    ):
-        _wait_until_ready(client)
-        # Once on and off: what is tried and remembered at the first start is not what we measure.
-        found = Robot(client, service, StreamAddress(host, udp, latency_ms))
-        with found.preview():
-            pass
-        yield found
+    service = Service(_command("robot-preview", workdir / f"preview-{udp}.yaml", preview), environment or {})
+    try:
+        with (
+            foreign.running(*_command("robot-gateway", workdir / f"gateway-{udp}.yaml", gateway), own=True),
+            GatewayClient(f"{HOST}:{tcp}") as client,
+        ):
+            _wait_until_ready(client)
+            found = Robot(client, service, StreamAddress(HOST, udp, latency_ms))
+            if warm:
+                with found.preview():
+                    pass
+            yield found
+    finally:
+        foreign.end(service.process)
 
 
 def _wait_until_ready(client: GatewayClient) -> None:
@@ -110,9 +156,7 @@ def _wait_until_ready(client: GatewayClient) -> None:
         time.sleep(0.05)
 
 
-@contextmanager
-def _program(name: str, file: Path, settings: object) -> Iterator[subprocess.Popen[bytes]]:
-    # JSON is YAML.
-    file.write_text(json.dumps(settings), encoding="utf-8")
-    with foreign.running(str(_PROGRAMS / name), "serve", "--config", str(file), own=True) as process:
-        yield process
+def _command(name: str, file: Path, settings: object) -> tuple[str, ...]:
+    """Writes a program's configuration and returns how it is started."""
+    file.write_text(json.dumps(settings), encoding="utf-8")  # JSON is YAML
+    return str(_PROGRAMS / name), "serve", "--config", str(file)

@@ -1,4 +1,4 @@
-"""The moment of capture, drawn into the frame itself, so that it survives every step up to the decoder.
+"""Capture time, drawn into the frame itself, so that it survives every step up to the decoder.
 
 A number of 32 bits in blocks of 16 x 16 pixels, black or white, in the top left corner, then 8 check bits.
 The number counts ticks of 0.1 ms on `time.monotonic()`, which all processes of a machine share. Blocks of
@@ -19,19 +19,24 @@ _WHITE: Final = bytes([235]) * BLOCK_PX
 _MIDDLE: Final = 126
 
 
-def draw(luma: bytearray, stride: int, at_s: float) -> None:
+def draw(luma: bytearray, stride: int, at_s: float) -> float:
     """Draws a moment into a plane of luma.
 
     Args:
         luma: the plane, at least `BLOCK_PX` rows of it.
         stride: bytes from one row to the next, at least `WIDTH_PX`.
         at_s: the moment, on `time.monotonic()`.
+
+    Returns:
+        The moment as `read` returns it, rounded to ticks.
     """
-    value = round(at_s / TICK_S) % (1 << _VALUE_BITS)
+    ticks = round(at_s / TICK_S)
+    value = ticks % (1 << _VALUE_BITS)
     code = value << _CHECK_BITS | _check(value)
     row = b"".join(_WHITE if code >> bit & 1 else _BLACK for bit in reversed(range(BITS)))
     for start in range(0, BLOCK_PX * stride, stride):
         luma[start : start + WIDTH_PX] = row
+    return ticks * TICK_S
 
 
 def read(row: bytes) -> float | None:

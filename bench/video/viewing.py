@@ -1,52 +1,40 @@
-"""Watching a stream and noting when each frame was taken and when it was decoded."""
+"""Watching a stream and recording when each frame was captured and when it was decoded."""
 
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Protocol
+from typing import Final, Protocol
 
+from bench.rows import MeasurementError
 from bench.video import stamp
+from bench.video.window import Glance, Window
 from console.receiver.frame import Frame
 
-PATIENCE_S = 15.0
+PATIENCE_S: Final = 15.0
+_FEWEST_FRAMES: Final = 2
+_AFTERWARDS_S: Final = 0.5
+"""How long after a window its last frames are waited for."""
 
 
 class Viewer(Protocol):
-    """Who watches."""
+    """A receiver that is connected to a stream."""
 
     def next_frame(self, timeout_s: float) -> Frame:
-        """The next decoded frame."""
+        """Returns the next decoded frame."""
 
 
 Connect = Callable[[], AbstractContextManager[Viewer]]
-"""Begins to watch."""
-
-
-@dataclass(frozen=True, slots=True)
-class Glance:
-    """A frame's way, on `time.monotonic()`."""
-
-    captured_s: float
-    decoded_s: float
-    corrupt: bool = False
-    """Whether the decoder had to guess parts of it."""
-
-    @property
-    def latency_ms(self) -> float:
-        """From capture to the end of decoding."""
-        return (self.decoded_s - self.captured_s) * 1000
+"""Connects a viewer; it disconnects when the block ends."""
 
 
 def capture_time(frame: Frame) -> float | None:
-    """When it was captured, on `time.monotonic()`; None when its stamp can't be read."""
+    """Returns when a frame was captured, on `time.monotonic()`; None when its stamp can't be read."""
     middle = stamp.BLOCK_PX // 2 * frame.stride
     return stamp.read(frame.read()[middle : middle + frame.stride])
 
 
 def watch(viewer: Viewer, seconds: float) -> list[Glance]:
-    """What comes in the next `seconds`; frames whose stamp can't be read are left out."""
+    """Returns the frames of the next `seconds`; those whose stamp can't be read are left out."""
     until_s = time.monotonic() + seconds
     glances = []
     while time.monotonic() < until_s:
@@ -57,13 +45,21 @@ def watch(viewer: Viewer, seconds: float) -> list[Glance]:
     return glances
 
 
-def longest_gap_ms(glances: list[Glance]) -> float:
-    """The longest time between two decoded frames."""
-    return max(later.decoded_s - earlier.decoded_s for earlier, later in pairwise(glances)) * 1000
+def watch_window(viewer: Viewer, seconds: float) -> Window:
+    """Returns what arrives of the frames that are captured in the next `seconds`.
+
+    Raises:
+        MeasurementError: almost nothing does.
+    """
+    from_s = time.monotonic()
+    window = Window.of(watch(viewer, seconds + _AFTERWARDS_S), from_s, from_s + seconds)
+    if len(window.glances) < _FEWEST_FRAMES:
+        raise MeasurementError(f"{len(window.glances)} whole frames in {seconds:g} s: nothing was measured")
+    return window
 
 
 def first_frame_ms(connect: Connect) -> float:
-    """From beginning to connect to the first decoded frame."""
+    """Returns the time from the begin of connecting to the first decoded frame, in ms."""
     begun_s = time.monotonic()
     with connect() as viewer:
         return (viewer.next_frame(PATIENCE_S).arrival_s - begun_s) * 1000

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.lossy_relay import LossyRelay
 from tests.support.running_preview import RunningPreview
+from tests.support.udp_link import Impairment, UdpLink
 from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
@@ -14,19 +14,19 @@ pytestmark = pytest.mark.gst
 def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
     with (
         RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
-        LossyRelay(preview.port) as relay,
-        Watcher(relay.port) as watcher,
+        UdpLink(preview.port) as link,
+        Watcher(link.port) as watcher,
     ):
         preview.enable()
         preview.running()
         watcher.wait_for_frames(30)
-        relay.loss = 0.4
+        link.impairment.loss = 0.4
         state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 600, "a lower rate")
         assert "% loss" in state.stream.bitrate_reason
         assert f"600 -> {state.stream.target_bitrate_kbps} kbit/s" in state.stream.bitrate_reason
         low = preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 150, "the floor").stream
         assert low.target_bitrate_kbps == 150
-        relay.loss = 0.0
+        link.impairment.loss = 0.0
         state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps > 150, "a higher rate")
         assert "the link is quiet" in state.stream.bitrate_reason
         assert state.counters.starts == 1
@@ -36,8 +36,8 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
 def test_unless_it_is_asked_to_the_bit_rate_stays(tmp_path: Path) -> None:
     with (
         RunningPreview(tmp_path) as preview,
-        LossyRelay(preview.port, loss=0.4) as relay,
-        Watcher(relay.port) as watcher,
+        UdpLink(preview.port, Impairment(loss=0.4)) as link,
+        Watcher(link.port) as watcher,
     ):
         preview.enable()
         preview.running()

@@ -12,9 +12,9 @@ import pytest
 
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
-from tests.support.lossy_relay import LossyRelay
 from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
+from tests.support.udp_link import UdpLink
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
@@ -205,12 +205,12 @@ def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_blocks_nothing(t
 def hangs_when_the_bit_rate_follows(directory: Path) -> float:
     doubles = {"mpph265enc": "later stuck:5", "vah265enc": "ok"}
     settings = ORDER | {"adaptive": {"enabled": True}}
-    with RunningPreview(directory, settings, doubles) as preview, LossyRelay(preview.port, 0.0) as relay:
+    with RunningPreview(directory, settings, doubles) as preview, UdpLink(preview.port) as link:
         preview.enable()
         preview.running()
-        with Watcher(relay.port, latency_ms=120) as watcher:
+        with Watcher(link.port, latency_ms=120) as watcher:
             watcher.wait_for_frames(10)
-            relay.loss = 0.4
+            link.impairment.loss = 0.4
             state = fallen_back(preview, watcher)
         passed_over(state, "va-h265", "hung when its bit rate was changed")
     return watcher.longest_pause_s

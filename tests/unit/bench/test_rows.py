@@ -35,6 +35,11 @@ def test_without_a_reference_the_bar_and_the_spread_are_on_the_value() -> None:
     assert measured.ok
 
 
+@pytest.mark.parametrize("references", [(), [1.0] * 5])
+def test_a_row_without_a_bar_promises_nothing(references: list[float]) -> None:
+    assert row(bar=None, references=references).ok
+
+
 @pytest.mark.parametrize(("better", "worst"), [("lower", 50.0), ("higher", 30.0)])
 def test_the_worst_round_is_the_one_farthest_from_the_promise(better: str, worst: float) -> None:
     assert row(references=(), judged="worst", better=better).value == worst
@@ -63,6 +68,7 @@ def test_one_long_round_is_enough_where_the_row_says_so() -> None:
     [
         row(),
         row(values=[0.0], references=(), single=True, discarded=2, judged="worst"),
+        row(bar=None),
     ],
 )
 def test_a_row_of_another_run_is_the_same_row(written: Row) -> None:

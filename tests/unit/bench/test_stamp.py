@@ -1,4 +1,4 @@
-"""The benchmark's ruler, measured."""
+"""The stamp of the benchmarks: what is drawn is read, and nothing else is."""
 
 import random
 import time
@@ -26,6 +26,11 @@ def test_what_is_drawn_is_read(ago_s: float) -> None:
     moment_s = time.monotonic() - ago_s
     read_s = stamp.read(middle_row(drawn(moment_s)))
     assert read_s == pytest.approx(moment_s, abs=stamp.TICK_S)
+
+
+def test_the_moment_is_returned_as_it_is_read() -> None:
+    luma = bytearray(STRIDE * stamp.BLOCK_PX)
+    assert stamp.draw(luma, STRIDE, time.monotonic() - 1.0) == stamp.read(middle_row(luma))
 
 
 def test_it_stays_in_its_corner() -> None:

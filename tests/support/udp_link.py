@@ -1,0 +1,178 @@
+"""A UDP relay on this machine that behaves like a bad link: delay, loss and a bottleneck, each way."""
+
+import random
+import selectors
+import socket
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self
+
+_MAX_WAITING: Final = 4096
+"""Packets that wait in one direction; more are dropped, as by a full queue."""
+_MAX_CALLERS: Final = 64
+_LONGEST_PACKET: Final = 2048
+_CONTROL: Final = 0x80
+"""First bit of an SRT packet: set in control packets (draft-sharabayko-srt 3)."""
+
+
+@dataclass(slots=True)
+class Impairment:
+    """Properties of a link, the same in both directions; may be changed while it is used.
+
+    Args:
+        loss: share of the packets that is lost, 0 to 1.
+        control_loss: the same for SRT's control packets: acknowledgements, loss reports, handshakes.
+        delay_s: propagation delay in one direction.
+        rate_kbps: of the bottleneck; None for no bottleneck.
+        queue_s: longest wait before the bottleneck; a packet that would wait longer is dropped.
+    """
+
+    loss: float = 0.0
+    control_loss: float = 0.0
+    delay_s: float = 0.0
+    rate_kbps: float | None = None
+    queue_s: float = 0.2
+
+
+class Direction:
+    """One direction of a link: what becomes of each packet. Pure.
+
+    Args:
+        impairment: of the link.
+        seed: of the random losses; the same seed loses the same packets.
+    """
+
+    def __init__(self, impairment: Impairment, seed: int) -> None:
+        self._impairment = impairment
+        self._random = random.Random(seed)
+        self._free_at_s = 0.0
+        """When the bottleneck has sent everything that it has accepted."""
+
+    def arrival_s(self, packet: bytes, now_s: float) -> float | None:
+        """Returns when a packet that is sent now arrives; None when it is lost.
+
+        Args:
+            packet: its UDP payload.
+            now_s: seconds on any clock that does not go back.
+        """
+        link = self._impairment
+        loss = link.control_loss if packet[:1] >= bytes([_CONTROL]) else link.loss
+        if self._random.random() < loss:
+            return None
+        begin_s = max(now_s, self._free_at_s)
+        if link.rate_kbps is not None:
+            if begin_s - now_s > link.queue_s:
+                return None
+            begin_s += len(packet) * 8 / (link.rate_kbps * 1000)
+            self._free_at_s = begin_s
+        return begin_s + link.delay_s
+
+
+class UdpLink:
+    """Relays callers to a local UDP port until its block ends.
+
+    Args:
+        to_port: of the listener, at 127.0.0.1.
+        impairment: of the link; kept, so that it may be changed.
+        seed: of the random losses.
+    """
+
+    def __init__(self, to_port: int, impairment: Impairment | None = None, seed: int = 1) -> None:
+        self.impairment = impairment or Impairment()
+        self.bytes_to_callers = 0
+        """Of all packets that have arrived at callers so far."""
+        self._to = ("127.0.0.1", to_port)
+        self._towards_listener = _Line(Direction(self.impairment, seed))
+        self._towards_callers = _Line(Direction(self.impairment, seed + 1))
+        self._front = _socket()
+        self.port: int = self._front.getsockname()[1]
+        self._backs: dict[tuple[str, int], socket.socket] = {}
+        """By caller, so that the listener sees each as a peer of its own."""
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._front, selectors.EVENT_READ)
+        self._stop_here, self._stop_there = socket.socketpair()
+        self._selector.register(self._stop_here, selectors.EVENT_READ)
+        self._thread = threading.Thread(target=self._run, name="UDP link")
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop_there.send(b"x")
+        self._thread.join(10)
+        self._selector.close()
+        for each in (self._front, self._stop_here, self._stop_there, *self._backs.values()):
+            each.close()
+
+    def _run(self) -> None:
+        while True:
+            for key, _ in self._selector.select(self._next_arrival_in_s()):
+                if key.fileobj is self._stop_here:
+                    return
+                if key.fileobj is self._front:
+                    self._from_caller()
+                else:
+                    self._from_listener(key.data)
+            now_s = time.monotonic()
+            for sender, packet, _ in self._towards_listener.arrived(now_s):
+                sender.sendto(packet, self._to)
+            for sender, packet, caller in self._towards_callers.arrived(now_s):
+                self.bytes_to_callers += len(packet)
+                sender.sendto(packet, caller)
+
+    def _next_arrival_in_s(self) -> float | None:
+        lines = (self._towards_listener, self._towards_callers)
+        next_s = min((line.next_s for line in lines if line.next_s is not None), default=None)
+        return None if next_s is None else max(0.0, next_s - time.monotonic())
+
+    def _from_caller(self) -> None:
+        packet, caller = self._front.recvfrom(_LONGEST_PACKET)
+        if caller not in self._backs:
+            if len(self._backs) >= _MAX_CALLERS:
+                return
+            self._backs[caller] = _socket()
+            self._selector.register(self._backs[caller], selectors.EVENT_READ, caller)
+        self._towards_listener.send(self._backs[caller], packet, self._to)
+
+    def _from_listener(self, caller: tuple[str, int]) -> None:
+        packet = self._backs[caller].recv(_LONGEST_PACKET)
+        self._towards_callers.send(self._front, packet, caller)
+
+
+class _Line:
+    """The packets that are on their way in one direction, in order."""
+
+    def __init__(self, direction: Direction) -> None:
+        self._direction = direction
+        self._waiting: deque[tuple[float, socket.socket, bytes, tuple[str, int]]] = deque()
+
+    @property
+    def next_s(self) -> float | None:
+        """When the next packet arrives."""
+        return self._waiting[0][0] if self._waiting else None
+
+    def send(self, sender: socket.socket, packet: bytes, to: tuple[str, int]) -> None:
+        """Takes a packet, unless it is lost."""
+        arrival_s = self._direction.arrival_s(packet, time.monotonic())
+        if arrival_s is not None and len(self._waiting) < _MAX_WAITING:
+            self._waiting.append((arrival_s, sender, packet, to))
+
+    def arrived(self, now_s: float) -> list[tuple[socket.socket, bytes, tuple[str, int]]]:
+        """Removes and returns the packets that have arrived: with the socket and address to send them on."""
+        found = []
+        while self._waiting and self._waiting[0][0] <= now_s:
+            _, sender, packet, to = self._waiting.popleft()
+            found.append((sender, packet, to))
+        return found
+
+
+def _socket() -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.bind(("127.0.0.1", 0))
+    return made

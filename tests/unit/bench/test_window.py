@@ -1,0 +1,56 @@
+"""What the video benchmarks compute of the frames that a viewer saw."""
+
+import pytest
+
+from bench.video.window import Glance, Window, longest_gap_ms, slope
+
+
+def glances(*times_s: tuple[float, float]) -> list[Glance]:
+    return [Glance(captured_s, decoded_s) for captured_s, decoded_s in times_s]
+
+
+def test_frames_count_by_their_capture_in_the_window() -> None:
+    seen = glances((0.9, 1.1), (1.0, 1.2), (1.9, 2.4), (2.0, 2.1))
+    assert [one.captured_s for one in Window.of(seen, 1.0, 2.0).glances] == [1.0, 1.9]
+
+
+def test_torn_and_repeated_frames_are_not_delivered() -> None:
+    seen = [Glance(1.0, 1.1), Glance(1.0, 1.3), Glance(1.2, 1.3, corrupt=True), Glance(1.4, 1.5)]
+    window = Window.of(seen, 1.0, 2.0)
+    assert window.delivered_percent(captured=4) == 50.0
+    assert window.frames_per_s == 2.0
+    assert window.glances[0].decoded_s == 1.1
+
+
+def test_a_repaired_frame_counts_after_a_torn_one() -> None:
+    seen = [Glance(1.0, 1.1, corrupt=True), Glance(1.0, 1.2)]
+    assert len(Window.of(seen, 1.0, 2.0).glances) == 1
+
+
+def test_median_and_99th_percentile() -> None:
+    window = Window.of(glances(*((n / 1000, n / 1000 + n / 1000) for n in range(1, 100))), 0.0, 1.0)
+    assert window.median_ms == pytest.approx(50)
+    assert window.p99_ms == pytest.approx(99)
+
+
+@pytest.mark.parametrize(
+    ("times_s", "longest_ms"),
+    [
+        ((), 1000),
+        ((1.5,), 500),
+        ((1.6, 1.1), 500),
+        ((1.3, 1.6), 400),
+        ((0.5, 1.05, 1.9, 2.5), 850),
+    ],
+)
+def test_the_longest_gap_counts_the_edges(times_s: tuple[float, ...], longest_ms: float) -> None:
+    seen = glances(*((decoded_s, decoded_s) for decoded_s in times_s))
+    assert longest_gap_ms(seen, 1.0, 2.0) == pytest.approx(longest_ms)
+
+
+def test_a_torn_frame_does_not_end_a_gap() -> None:
+    assert longest_gap_ms([Glance(1.5, 1.5, corrupt=True)], 1.0, 2.0) == pytest.approx(1000)
+
+
+def test_slope_for_one_more_viewer() -> None:
+    assert slope((1, 4, 16), (10.0 + 1 * 2, 10.0 + 4 * 2, 10.0 + 16 * 2)) == pytest.approx(2.0)
