@@ -25,7 +25,11 @@ class Peaks:
 
 @asynccontextmanager
 async def gauging(pid: int) -> AsyncIterator[Peaks]:
-    """Reads four times a second while the block lasts."""
+    """Reads four times a second while the block lasts.
+
+    Raises:
+        RuntimeError: when it ends; the program has ended before.
+    """
     process, peaks = psutil.Process(pid), Peaks()
 
     def read() -> None:
@@ -42,4 +46,9 @@ async def gauging(pid: int) -> AsyncIterator[Peaks]:
         yield peaks
     finally:
         reading.cancel()
-        await asyncio.to_thread(read)
+        # Only the newest reading matters: that of a program that has ended fails like all since.
+        await asyncio.gather(reading, return_exceptions=True)
+        try:
+            await asyncio.to_thread(read)
+        except psutil.NoSuchProcess:
+            raise RuntimeError("the gateway's program ended amid the siege") from None
