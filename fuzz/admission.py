@@ -2,24 +2,21 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Final
 
 from common.errors import TooMuchError
 from gateway.config import LimitSettings
-from gateway.rpc.admission import (
-    LOGIN_GRACE_S,
-    MAX_PENDING,
-    MAX_PENDING_PER_ADDRESS,
-    MAX_WAITING_REFUSALS,
-    Admission,
-)
 from gateway.rpc.calls.call import Peer, peer_of
+from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, Admission
 
 _LIMITS: Final = LimitSettings(
     connections=6, connections_per_address=4, streams_per_connection=2, requests_per_s=2, burst=4
 )
 _HOSTS: Final = tuple(f"10.0.0.{number}" for number in range(8))
 _TICK_S: Final = 0.125
+_MAX_CONNECTIONS: Final = 32
+_MAX_PENDING: Final = _MAX_CONNECTIONS // 4
 
 
 class Model:
@@ -27,18 +24,17 @@ class Model:
 
     Attributes:
         present: addresses of the connections that there are.
-        admitted: those of them with an admitted call.
+        served: those of them that were admitted and have not been dismissed since; some may have lost their
+            place to another.
         streams: open ones, by address.
-        waiting: refusals that wait, by address.
     """
 
     def __init__(self) -> None:
         self._now_s = 1000.0
-        self._admission = Admission(_LIMITS, lambda: self._now_s)
+        self._admission = Admission(_LIMITS, lambda: self._now_s, max_connections=_MAX_CONNECTIONS)
         self.present: dict[str, float] = {}
-        self.admitted: set[str] = set()
+        self.served: set[str] = set()
         self.streams: Counter[str] = Counter()
-        self.waiting: Counter[str] = Counter()
         self._next_port = 1000
 
     def connect(self, number: int) -> None:
@@ -48,24 +44,20 @@ class Model:
             self.present[f"{host}:{self._next_port}"] = -1.0
             self._next_port += 1
 
-    def call(self, number: int) -> None:
-        """A call whose caller is admitted."""
+    def admitted_call(self, number: int) -> None:
+        """A call with a valid credential; there may be no place for it."""
         if (peer := self._chosen(number)) and self._takes_token(peer):
-            self._admission.admit(peer)
-            self.admitted.add(peer.address)
+            with suppress(TooMuchError):
+                self._admission.admit(peer)
+                self.served.add(peer.address)
 
     def refused_call(self, number: int) -> None:
-        """A call whose refusal waits."""
-        if peer := self._chosen(number):
-            self._takes_token(peer)
-            self._admission.refusal_waits(peer, +1)
-            self.waiting[peer.address] += 1
-
-    def answer_refusal(self, number: int) -> None:
-        """One of them has waited."""
-        if (peer := self._chosen(number)) and self.waiting[peer.address]:
-            self._admission.refusal_waits(peer, -1)
-            self.waiting[peer.address] -= 1
+        """A call with a wrong credential."""
+        if (peer := self._chosen(number)) and self._takes_token(peer):
+            self._admission.dismiss(peer)
+            if peer.address in self.served:
+                self.served.discard(peer.address)
+                self.present[peer.address] = self._now_s
 
     def open_stream(self, number: int) -> None:
         """A stream, if the connection may have one more."""
@@ -75,13 +67,17 @@ class Model:
         try:
             self._admission.open_stream(peer)
         except TooMuchError:
-            assert self.streams[peer.address] >= _LIMITS.streams_per_connection
+            assert self.streams[peer.address] >= min(_LIMITS.streams_per_connection, PENDING_STREAMS)
             return
+        if peer.address in self.served:
+            try:
+                self._admission.admit(peer)
+            except TooMuchError:
+                self._admission.close_stream(peer)
+                self.served.discard(peer.address)
+                return
         self.streams[peer.address] += 1
         assert self.streams[peer.address] <= _LIMITS.streams_per_connection
-        busy = [address.rpartition(":")[0] for address, count in self.streams.items() if count]
-        assert len(busy) <= _LIMITS.connections
-        assert max(Counter(busy).values()) <= _LIMITS.connections_per_address
 
     def close_stream(self, number: int) -> None:
         """The end of one."""
@@ -105,24 +101,23 @@ class Model:
                 self.present[address] = self._now_s
         surplus = self._admission.surplus(list(self.present))
         assert len(set(surplus)) == len(surplus)
+        busy = {address for address in self.served if self.streams[address]}
         for address in surplus:
             assert address in self.present
-            assert address not in self.admitted or self.waiting[address] > MAX_WAITING_REFUSALS
+            assert address not in busy, "a place with an open stream is no one else's"
             self._end(_peer(address))
-        pending = {
-            address: since_s for address, since_s in self.present.items() if address not in self.admitted
+        strangers = {
+            address: since_s for address, since_s in self.present.items() if address not in self.served
         }
-        assert len(pending) <= MAX_PENDING
-        hosts = Counter(address.rpartition(":")[0] for address in pending)
-        assert all(count <= MAX_PENDING_PER_ADDRESS for count in hosts.values())
-        assert all(self._now_s - since_s <= LOGIN_GRACE_S for since_s in pending.values())
+        assert len(strangers) <= _MAX_PENDING
+        hosts = Counter(address.rpartition(":")[0] for address in strangers)
+        assert all(count <= _MAX_PENDING // 2 for count in hosts.values())
+        assert all(self._now_s - since_s <= PENDING_S for since_s in strangers.values())
 
     def _end(self, peer: Peer) -> None:
         for _ in range(self.streams.pop(peer.address, 0)):
             self._admission.close_stream(peer)
-        for _ in range(self.waiting.pop(peer.address, 0)):
-            self._admission.refusal_waits(peer, -1)
-        self.admitted.discard(peer.address)
+        self.served.discard(peer.address)
         del self.present[peer.address]
 
     def _takes_token(self, peer: Peer) -> bool:
@@ -142,9 +137,8 @@ _EVENTS: Final[Mapping[int, Callable[[Model, int], None]]] = dict(
     enumerate(
         (
             Model.connect,
-            Model.call,
+            Model.admitted_call,
             Model.refused_call,
-            Model.answer_refusal,
             Model.open_stream,
             Model.close_stream,
             Model.disconnect,

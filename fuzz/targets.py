@@ -6,7 +6,6 @@ What may come of bad input (a decoder's own error, one line for people) is caugh
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from types import MappingProxyType, SimpleNamespace
@@ -169,7 +168,7 @@ def audit_line(data: bytes) -> None:
     """A control action of a caller that sends anything: one line, which reads back."""
     text = data.decode("utf-8", "replace")
     action = ControlAction(text, text, "SetPreviewMode", text, ControlResult.REFUSED, text, request_id=text)
-    line = line_of(action, datetime.now(UTC))
+    line = line_of(action)
     assert line.isascii()
     assert line.splitlines() == [line.rstrip("\n")]
     assert json.loads(line)["request"] == text

@@ -16,7 +16,7 @@ from rich.console import Console
 from bench import report
 from bench.siege.ground import CommandKeeper, Ground
 from bench.siege.judgement import measured
-from bench.siege.size import FULL, SMALL
+from bench.siege.size import FULL
 
 
 def main() -> int:
@@ -36,11 +36,10 @@ def main() -> int:
         "--credentials", required=True, metavar="COMMAND", help="what stands before 'add NAME --role ROLE'"
     )
     parser.add_argument("--metrics-port", type=int, help="for siege.closed, where the gateway serves metrics")
-    parser.add_argument("--small", action="store_true", help="a tenth of the attackers, one turn")
     given = parser.parse_args()
     host, _, port = given.target.rpartition(":")
     ground = Ground(host, int(port), CommandKeeper(given.credentials), given.pid, given.metrics_port)
-    rows = measured(ground, SMALL if given.small else FULL)
+    rows = measured(ground, FULL)
     Console(width=None if sys.stdout.isatty() else 200).print(report.table(rows))
     return 0 if all(row.ok for row in rows) else 1
 

@@ -2,10 +2,10 @@
 
 import asyncio
 import statistics
-import sys
 from collections import Counter
 from typing import Final
 
+from bench.progress import log
 from bench.rows import Row
 from bench.siege.ground import Ground
 from bench.siege.rounds import Outcome, besiege
@@ -28,7 +28,7 @@ def measured(ground: Ground, size: Size) -> list[Row]:
     for failure, count in Counter(
         each for record in (*outcome.besieged, *outcome.between) for each in record.failures
     ).items():
-        print(f"siege: {count} times: {failure}", file=sys.stderr)
+        log(f"siege: {count} times: {failure}")
     return rows(outcome, size)
 
 
@@ -38,64 +38,79 @@ def p99_ms(took_ms: list[float]) -> float:
 
 
 def rows(outcome: Outcome, size: Size) -> list[Row]:
-    """Returns what the outcome says; without what the ground does not show."""
-    besieged, alone = outcome.besieged, outcome.alone
-    working = (*besieged, *outcome.between)
-    calls = sum(each.asked for each in working)
+    """Returns what the outcome says, turn by turn; without what the ground does not show."""
     opened, refused = (sum(getattr(each, name) for each in outcome.attacks) for name in ("opened", "refused"))
     found = [
         Row(
-            "siege.answered",
-            f"an operator's calls and statuses that came, of {calls}, among {size}; these opened "
+            name="siege.answered",
+            what=f"share of an operator's calls and statuses that were answered, among {size}; these opened "
             f"{opened} connections and had {refused} calls refused",
-            "of 1",
-            1 - sum(len(each.failures) for each in working) / calls,
-            None,
-            1.0,
-            "higher",
+            unit="of 1",
+            values=_answered(outcome),
+            bar=1.0,
+            better="higher",
+            judged="worst",
         ),
         Row(
-            "siege.p99",
-            "GetSystemStatus of the operator ten times a second, 99th percentile, besieged against alone",
-            "ms",
-            p99_ms([took for each in besieged for took in each.status_ms]),
-            p99_ms([took for each in alone for took in each.status_ms]),
-            P99_RATIO,
+            name="siege.p99",
+            what="GetSystemStatus of the operator at 10 Hz, 99th percentile, besieged against alone",
+            unit="ms",
+            values=[p99_ms(each.status_ms) for each in outcome.besieged],
+            references=[p99_ms(each.status_ms) for each in outcome.alone],
+            bar=P99_RATIO,
         ),
         Row(
-            "siege.login_ms",
-            "a new connection of the operator, to its first status: the slowest",
-            "ms",
-            max(took for each in besieged for took in each.login_ms),
-            None,
-            LOGIN_MS,
+            name="siege.login_ms",
+            what="a new connection of the operator, to its first status: the slowest of a turn",
+            unit="ms",
+            values=[max(each.login_ms) for each in outcome.besieged],
+            bar=LOGIN_MS,
+            judged="worst",
         ),
         Row(
-            "siege.revocation_s",
-            f"a credential revoked amid the siege, to the end of its {size.streams} streams: the slowest",
-            "s",
-            max(outcome.revocation_s),
-            None,
-            REVOCATION_S,
+            name="siege.revocation_s",
+            what=f"a credential revoked amid the siege, to the end of its {size.streams} streams",
+            unit="s",
+            values=outcome.revocation_s,
+            bar=REVOCATION_S,
+            judged="worst",
         ),
         Row(
-            "siege.rss_mib",
-            "resident memory of the gateway, peak",
-            "MiB",
-            outcome.peaks.resident_mib,
-            None,
-            MEMORY_MIB,
+            name="siege.rss_mib",
+            what="resident memory of the gateway, peak of all turns",
+            unit="MiB",
+            values=[outcome.peaks.resident_mib],
+            bar=MEMORY_MIB,
+            single=True,
         ),
         Row(
-            "siege.descriptors",
-            "its open descriptors, peak",
-            "",
-            outcome.peaks.descriptors,
-            None,
-            DESCRIPTORS,
+            name="siege.descriptors",
+            what="its open descriptors, peak of all turns",
+            unit="",
+            values=[outcome.peaks.descriptors],
+            bar=DESCRIPTORS,
+            single=True,
         ),
     ]
     if outcome.closed is not None:
-        closed = "connections that the gateway's guard closed"
-        found.append(Row("siege.closed", closed, "", outcome.closed, None, 1, "higher"))
+        found.append(
+            Row(
+                name="siege.closed",
+                what="connections that the gateway's guard closed in all turns",
+                unit="",
+                values=[outcome.closed],
+                bar=1,
+                better="higher",
+                single=True,
+            )
+        )
     return found
+
+
+def _answered(outcome: Outcome) -> list[float]:
+    """Returns the share of the calls that were answered, by turn: under attack, and before and after it."""
+    shares = []
+    for turn, besieged in enumerate(outcome.besieged):
+        working = (besieged, *outcome.between[2 * turn : 2 * turn + 2])
+        shares.append(1 - sum(len(each.failures) for each in working) / sum(each.asked for each in working))
+    return shares

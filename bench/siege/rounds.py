@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import asdict, dataclass, field
 
+from bench.progress import log
 from bench.siege.crowd import Counts
 from bench.siege.gauge import Peaks, gauging
 from bench.siege.ground import Ground
@@ -84,7 +85,7 @@ async def besiege(ground: Ground, size: Size) -> Outcome:
                 outcome.attacks += [await holders.end(), await flooders.end()]
                 outcome.revocation_s.append(max(0.0, await _last_end_s(streams) - revoked_s))
             await asyncio.sleep(_RECOVERY_S)
-            print(f"siege: turn {turn + 1} of {size.turns}", file=sys.stderr)
+            log(f"siege: turn {turn + 1} of {size.turns}")
         after = await asyncio.to_thread(ground.closed_connections)
         outcome.closed = None if after is None or before is None else after - before
     await asyncio.to_thread(ground.keeper.revoke, _OPERATOR)

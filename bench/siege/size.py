@@ -57,7 +57,7 @@ FULL: Final = Size(
     Plan(idle=2000, addresses=100, idle_per_address=50, slow=100),
     flooders=10,
     streams=100,
-    turns=4,
+    turns=5,
     alone_s=10,
     besieged_s=20,
 )
