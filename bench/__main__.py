@@ -22,8 +22,8 @@ GROUPS = {
     "viewer": "bench.viewer",
     "monitor": "bench.monitor",
 }
-# Too long to be part of a run without names.
-ON_REQUEST = {"soak": "bench.soak"}
+# Too long, or too hard on the machine, to be part of a run without names.
+ON_REQUEST = {"siege": "bench.siege", "soak": "bench.soak"}
 _ALL = GROUPS | ON_REQUEST
 _PIPE_WIDTH = 240
 

@@ -61,7 +61,7 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
         # One that can't even be killed keeps its driver busy: the next one would hang, too.
         ended = child.returncode is not None
         raise TrialError(f"it hung: no result within {timeout_s:g} s", passing=ended)
-    return _result(output, child.returncode or 0)
+    return parse_result(output, child.returncode or 0)
 
 
 async def _kill(child: asyncio.subprocess.Process) -> None:
@@ -73,15 +73,30 @@ async def _kill(child: asyncio.subprocess.Process) -> None:
             await asyncio.wait_for(child.wait(), _KILL_S)
 
 
-def _result(output: bytes, code: int) -> dict[str, Any]:
+def parse_result(output: bytes, code: int) -> dict[str, Any]:
+    """Returns what a child has reported.
+
+    Args:
+        output: all that it printed.
+        code: its exit code, negative for a signal.
+
+    Raises:
+        TrialError: it crashed, reported an error, or printed something else.
+    """
     if code < 0:
         # SIGKILL comes from outside: from the kernel when memory is short.
-        name = signal.Signals(-code).name
-        raise TrialError(f"it crashed when tried ({name})", passing=-code == signal.SIGKILL)
+        raise TrialError(f"it crashed when tried ({_signal_name(-code)})", passing=-code == signal.SIGKILL)
     try:
         result = dict(json.loads(output))
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, RecursionError):
         raise TrialError(f"its trial ended with code {code} and without a result") from None
     if reason := result.get("error"):
         raise TrialError(str(reason))
     return result
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"  # a real-time one

@@ -28,6 +28,11 @@ NAMES: Final = (
     "known_robots",
     "long_list",
     "robots_message",
+    "certificate",
+    "trial_result",
+    "terminal_text",
+    "audit_line",
+    "admission",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

@@ -5,6 +5,7 @@ from typing import Any, Final
 from rclpy.serialization import serialize_message
 
 from fuzz.robot import SOURCES, type_of
+from gateway.access.ca import new_ca
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 
@@ -63,6 +64,11 @@ _SEEDS: Final = {
         + b"A" * 43
         + b"\nauthority:\n-----BEGIN CERTIFICATE-----\n"
     ],
+    "certificate": [new_ca("lab2", 100).certificate],
+    "trial_result": [b'{"error": "", "fps": 29.5}', b'{"error": "no such element"}'],
+    "terminal_text": ["robot healthy\x1b]0;x\x07\u202e\u00fc".encode()],
+    "audit_line": [b"enabled: true, profile: LOW_BW"],
+    "admission": [bytes((0, 8, 1, 0, 4, 0, 2, 1, 8, 0, 7, 90, 8, 0, 3, 1, 5, 0, 6, 0))],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 

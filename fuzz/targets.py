@@ -3,6 +3,7 @@
 What may come of bad input (a decoder's own error, one line for people) is caught here, and nothing else.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -15,10 +16,15 @@ from google.protobuf.message import DecodeError, Message
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
+from common.trial import TrialError, parse_result
 from console.client.mapping.methods import METHODS
+from console.client.printable import escaped, printable, printable_lines
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
+from fuzz.admission import admission
 from fuzz.robot import robots_message
+from gateway.access.audit import line_of
+from gateway.access.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
@@ -28,13 +34,16 @@ from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation
+from gateway.status.event import ControlAction, ControlResult
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import desired_state
+from tests.support.control_characters import CONTROL_CHARACTERS
 
 Target = Callable[[bytes], None]
 
 _VALIDATION: Final = Validation(GatewaySettings().limits.request_bytes)
+_OBEYED: Final = frozenset(CONTROL_CHARACTERS)
 _METHODS: Final = [Method(f"/{CONTRACT.full_name}/{method.name}") for method in CONTRACT.methods]
 
 
@@ -130,6 +139,41 @@ def long_list(data: bytes) -> None:
     assert truncated >= 0
 
 
+def certificate(data: bytes) -> None:
+    """A certificate file."""
+    with suppress(ValueError):
+        certificate_info(data)
+
+
+def trial_result(data: bytes) -> None:
+    """What a child has printed before it ended, well or by a signal."""
+    for code in (0, 1, -1 - (data[0] % 64 if data else 0)):
+        with suppress(TrialError):
+            assert isinstance(parse_result(data, code), dict)
+
+
+def terminal_text(data: bytes) -> None:
+    """A robot's text: nothing that a terminal obeys is left of it, and JSON keeps its meaning."""
+    text = data.decode("utf-8", "surrogateescape")
+    shown = printable(text)
+    assert len(shown) == len(text)
+    assert not _OBEYED & set(shown)
+    assert not _OBEYED & set(printable_lines(text)) - {"\n"}
+    document = escaped(json.dumps({"text": text}, ensure_ascii=False))
+    assert json.loads(document) == {"text": text}
+    assert not _OBEYED & set(document)
+
+
+def audit_line(data: bytes) -> None:
+    """A control action of a caller that sends anything: one line, which reads back."""
+    text = data.decode("utf-8", "replace")
+    action = ControlAction(text, text, "SetPreviewMode", text, ControlResult.REFUSED, text, request_id=text)
+    line = line_of(action)
+    assert line.isascii()
+    assert line.splitlines() == [line.rstrip("\n")]
+    assert json.loads(line)["request"] == text
+
+
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
     {
         target.__name__: target
@@ -147,6 +191,11 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             known_robots,
             long_list,
             robots_message,
+            certificate,
+            trial_result,
+            terminal_text,
+            audit_line,
+            admission,
         )
     }
 )

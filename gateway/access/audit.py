@@ -69,7 +69,7 @@ class AuditLog:
         if self._path is None:
             return
         try:
-            self._queue.put_nowait(_line(action))
+            self._queue.put_nowait(line_of(action))
         except queue.Full:
             self._lose("the disk is too slow")
 
@@ -131,8 +131,11 @@ class AuditLog:
             _log.error("audit: %s; %d lines are lost so far", why, self.lost)
 
 
-def _line(action: ControlAction) -> str:
-    """Returns a JSON object; for several actions, with their number and the times of the first ones."""
+def line_of(action: ControlAction) -> str:
+    """Returns a JSON object in one line of ASCII, whatever the caller sent.
+
+    Several actions have their number in it, and the times of the first ones.
+    """
     fields: dict[str, str | int | list[str]] = {
         "time": _timestamp(action.unix_s),
         "who": action.who,

@@ -38,6 +38,7 @@ class Guarded:
         home: the laptop's configuration directory.
         own: an admin's credentials, for the test itself.
         log_file: where the gateway writes.
+        pid: of the gateway.
         kind: of all credentials here.
     """
 
@@ -46,6 +47,7 @@ class Guarded:
     home: Path
     own: Credentials
     log_file: Path
+    pid: int
     kind: Kind = Kind.TOKEN
 
     def log_in(self, person: str, role: Role) -> dict[str, Any]:
@@ -134,7 +136,7 @@ def guarded_program(
     with log_file.open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
     own = parse_login(bundle.text()).credentials
-    robot = Guarded(admin, f"127.0.0.1:{port}", home, own, log_file, kind)
+    robot = Guarded(admin, f"127.0.0.1:{port}", home, own, log_file, process.pid, kind)
     try:
         wait_until(lambda: process.poll() is not None or robot.answers(), "the gateway is up", _UP_WITHIN_S)
         assert process.poll() is None, robot.log()

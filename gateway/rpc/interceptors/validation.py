@@ -46,8 +46,7 @@ class Validation(Interceptor[CallContext]):
         try:
             message = message_type.FromString(request)
         except DecodeError as error:
-            name = message_type.DESCRIPTOR.full_name
-            raise InvalidRequestError(f"the request can't be parsed as {name}") from error
+            raise _unparsable(message_type) from error
         call.request = message
         if call.method.has_parameters:
             validate(message)
@@ -60,11 +59,19 @@ def validate(message: Message) -> None:
     Raises:
         InvalidRequestError: it breaks some; each is named.
     """
-    found = _VALIDATOR.collect_violations(message)
+    try:
+        found = _VALIDATOR.collect_violations(message)
+    except ValueError as error:
+        # The validator parses it again, and is stricter with unknown fields than protobuf for Python.
+        raise _unparsable(type(message)) from error
     if found:
         violations = tuple(_field_violation(each) for each in found)
         sentences = (f"{each.field}: {each.description}".removeprefix(": ") for each in violations)
         raise InvalidRequestError("; ".join(sentences), violations)
+
+
+def _unparsable(message_type: type[Message]) -> InvalidRequestError:
+    return InvalidRequestError(f"the request can't be parsed as {message_type.DESCRIPTOR.full_name}")
 
 
 def _field_violation(violation: Violation) -> FieldViolation:

@@ -43,6 +43,20 @@ async def test_a_failure_says_why(arguments: tuple[str, ...], reason: str) -> No
     assert await outcome(*arguments) == reason
 
 
+@pytest.mark.parametrize(
+    ("output", "code", "reason"),
+    [
+        (b"[" * 100_000, 0, "its trial ended with code 0 and without a result"),
+        (b"", -(signal.SIGRTMIN + 1), f"it crashed when tried (signal {signal.SIGRTMIN + 1})"),
+    ],
+    ids=["nested too deeply", "a real-time signal"],
+)
+def test_what_no_child_of_ours_would_do(output: bytes, code: int, reason: str) -> None:
+    with pytest.raises(trial.TrialError) as failure:
+        trial.parse_result(output, code)
+    assert str(failure.value) == reason
+
+
 async def test_a_child_that_hangs_is_killed_at_its_deadline() -> None:
     assert await outcome("hang", "x", timeout_s=1) == "it hung: no result within 1 s; passing"
 

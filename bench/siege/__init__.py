@@ -1,0 +1,21 @@
+"""A guarded gateway under attack while an operator works: what the operator notices, and what it costs.
+
+The operator is measured alone and besieged, in turns, by the same clients. Attackers are programs of their
+own with the same priority as all others and take what CPU they get; on a robot they would run on other
+machines. They call from other addresses of this machine than the operator, and return when cut off. A turn
+begins with their first connections. Against a deployment: `python -m bench.siege --help`.
+"""
+
+import tempfile
+from pathlib import Path
+
+from bench.rows import Row
+from bench.siege.ground import own_ground
+from bench.siege.judgement import measured
+from bench.siege.size import FULL
+
+
+def run(names: list[str]) -> list[Row]:
+    with tempfile.TemporaryDirectory() as directory, own_ground(Path(directory)) as ground:
+        rows = measured(ground, FULL)
+    return [row for row in rows if not names or row.name in names]

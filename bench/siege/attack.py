@@ -1,0 +1,48 @@
+"""Attackers in a process of their own: `python -m bench.siege.attack HOST PORT PLAN`, PLAN as JSON.
+
+Prints "ready", begins with a line on its standard input, ends when that ends, and prints its counts as JSON.
+"""
+
+import asyncio
+import json
+import resource
+import sys
+from collections.abc import Coroutine, Iterator
+from dataclasses import asdict
+from typing import Any
+
+import uvloop
+
+from bench.siege.crowd import Crowd
+from bench.siege.size import Plan
+
+
+async def main(host: str, port: int, plan: Plan) -> None:
+    crowd = Crowd((host, port))
+    attackers = [asyncio.create_task(each) for each in _attackers(crowd, plan)]
+    await asyncio.to_thread(sys.stdin.read)
+    for each in attackers:
+        each.cancel()
+    # One that failed is a defect of this program: then there was no attack to speak of.
+    for ended in await asyncio.gather(*attackers, return_exceptions=True):
+        if not isinstance(ended, asyncio.CancelledError):
+            raise ended
+    print(json.dumps(asdict(crowd.counts)), flush=True)
+
+
+def _attackers(crowd: Crowd, plan: Plan) -> Iterator[Coroutine[Any, Any, Any]]:
+    """Source addresses are of 127.0.0.0/8, all of which is this machine."""
+    yield from (crowd.idle("127.2.0.1") for _ in range(plan.idle))
+    for address in range(plan.addresses):
+        yield from (crowd.idle(f"127.1.0.{1 + address}") for _ in range(plan.idle_per_address))
+    yield from (crowd.drip("127.3.0.1") for _ in range(plan.slow))
+    for number in range(plan.flooders):
+        yield crowd.flood(f"127.4.0.{1 + number}", plan.tokens[number % len(plan.tokens)])
+
+
+if __name__ == "__main__":
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))  # a descriptor for each connection
+    print("ready", flush=True)
+    sys.stdin.readline()
+    uvloop.run(main(sys.argv[1], int(sys.argv[2]), Plan(**json.loads(sys.argv[3]))))

@@ -1,0 +1,45 @@
+"""A small siege (bench/siege) of the real program, held to the promises of the large one."""
+
+import asyncio
+
+import pytest
+
+from bench.siege.ground import own_ground
+from bench.siege.judgement import MEMORY_MIB, REVOCATION_S
+from bench.siege.rounds import Outcome, besiege
+from bench.siege.size import SMALL
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    with own_ground(tmp_path_factory.mktemp("siege")) as ground:
+        return asyncio.run(besiege(ground, SMALL))
+
+
+def test_the_siege_was_one(outcome: Outcome) -> None:
+    held, flooded = outcome.attacks
+    plan = SMALL.holders
+    assert held.opened >= plan.idle + plan.addresses * plan.idle_per_address + plan.slow
+    assert flooded.opened >= SMALL.flooders
+    assert flooded.refused >= SMALL.flooders
+
+
+def test_every_call_of_the_operator_is_answered(outcome: Outcome) -> None:
+    for record in (*outcome.alone, *outcome.besieged, *outcome.between):
+        assert record.failures == []
+        assert record.status_ms
+    assert outcome.besieged[0].login_ms
+
+
+def test_a_revocation_ends_every_stream_amid_the_siege(outcome: Outcome) -> None:
+    assert max(outcome.revocation_s) <= REVOCATION_S
+
+
+def test_memory_stays_within_its_share_of_the_container(outcome: Outcome) -> None:
+    assert outcome.peaks.resident_mib <= MEMORY_MIB
+
+
+def test_connections_without_an_admitted_call_are_closed(outcome: Outcome) -> None:
+    plan = SMALL.holders
+    assert outcome.closed
+    assert outcome.closed >= plan.idle + plan.addresses * plan.idle_per_address - plan.idle_per_address
