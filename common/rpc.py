@@ -20,9 +20,12 @@ _SERVER_OPTIONS: Final = (
     # Requests are small: a larger one is rejected before it takes memory.
     ("grpc.max_receive_message_length", 256 * 1024),
     ("grpc.max_send_message_length", 4 * 1024 * 1024),
-    # Per connection (SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2). Without it, one connection that
-    # begins and cancels calls crowds out the others: gRPC rejects every call while 1000 wait for a handler.
+    # Per connection (SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2): what one client can have handled at
+    # once, before those of others.
     ("grpc.max_concurrent_streams", 256),
+    # Calls of all connections that wait for a handler; gRPC cancels any more, whoever makes them.
+    ("grpc.server.max_pending_requests", 4096),
+    ("grpc.server.max_pending_requests_hard_limit", 8192),
     # From the connection to the HTTP/2 preface.
     ("grpc.server_handshake_timeout_ms", 5_000),
     # A peer that vanished is noticed after 5 + 3 s.
@@ -45,7 +48,7 @@ are reset by HTTP/2, which a flooding caller may see as UNAVAILABLE."""
 def possible_connections(wanted: int) -> int:
     """Returns how many connections to accept at once: at most half of the descriptors that there may be.
 
-    Each takes some 45 KiB with TLS besides, whatever it does.
+    Each takes some 45 to 100 KiB with TLS besides, whatever it does.
     """
     descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return wanted if descriptors == resource.RLIM_INFINITY else min(wanted, descriptors // 2)

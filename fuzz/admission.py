@@ -8,7 +8,7 @@ from typing import Final
 from common.errors import TooMuchError
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer, peer_of
-from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, Admission
+from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, SPARED_S, Admission
 
 _LIMITS: Final = LimitSettings(
     connections=6, connections_per_address=4, streams_per_connection=2, requests_per_s=2, burst=4
@@ -110,7 +110,8 @@ class Model:
             address: since_s for address, since_s in self.present.items() if address not in self.served
         }
         assert len(strangers) <= _MAX_PENDING
-        hosts = Counter(address.rpartition(":")[0] for address in strangers)
+        settled = [address for address, since_s in strangers.items() if self._now_s - since_s > SPARED_S]
+        hosts = Counter(address.rpartition(":")[0] for address in settled)
         assert all(count <= _MAX_PENDING // 2 for count in hosts.values())
         assert all(self._now_s - since_s <= PENDING_S for since_s in strangers.values())
 

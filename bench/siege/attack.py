@@ -5,6 +5,7 @@ Prints "ready", begins with a line on its standard input, ends when that ends, a
 
 import asyncio
 import json
+import os
 import resource
 import sys
 from collections.abc import Coroutine, Iterator
@@ -40,7 +41,13 @@ def _attackers(crowd: Crowd, plan: Plan) -> Iterator[Coroutine[Any, Any, Any]]:
         yield crowd.flood(f"127.4.0.{1 + number}", plan.tokens[number % len(plan.tokens)])
 
 
+def share_one_core() -> None:
+    """Leaves the other cores to gateway and operator: attackers come with computers of their own."""
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+
+
 if __name__ == "__main__":
+    share_one_core()
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))  # a descriptor for each connection
     print("ready", flush=True)

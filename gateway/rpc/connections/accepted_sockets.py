@@ -3,15 +3,27 @@
 gRPC's Python API neither reports connections nor closes one: a peer that makes no call is invisible there.
 """
 
+import ctypes
 import os
 import socket
 import stat
-from contextlib import suppress
+import struct
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
 
 _DESCRIPTORS: Final = Path("/proc/self/fd")
 _FAMILIES: Final = frozenset({socket.AF_INET, socket.AF_INET6})
+_NONE: Final = -1
+"""No descriptor."""
+_BYTES_RECEIVED: Final = struct.Struct("128xQ")
+"""tcpi_bytes_received in struct tcp_info (linux/tcp.h, since 4.1)."""
+_SO_ATTACH_FILTER: Final = 26
+"""asm-generic/socket.h; Python's socket module does not have it."""
+_DROP_ALL: Final = ctypes.create_string_buffer(struct.pack("=HBBI", 0x06, 0, 0, 0))
+"""One instruction of classic BPF, `ret 0`: the kernel keeps no byte of any packet."""
+_FILTER: Final = struct.pack("@HP", 1, ctypes.addressof(_DROP_ALL))
+"""struct sock_fprog (linux/filter.h)."""
 
 
 class AcceptedSockets:
@@ -55,15 +67,44 @@ class AcceptedSockets:
 
         gRPC keeps the descriptor and closes it when it reads the end of the stream.
         """
-        descriptor = self._descriptors.pop(address, None)
-        if descriptor is None:
-            return False
-        with suppress(OSError), _duplicate(descriptor) as ours:
-            # The number may belong to another socket by now.
-            if _address_of(ours) == address:
-                ours.shutdown(socket.SHUT_RDWR)
-                return True
+        with suppress(OSError), self._connection(address) as connection:
+            del self._descriptors[address]
+            connection.shutdown(socket.SHUT_RDWR)
+            return True
         return False
+
+    def mute(self, address: str) -> bool:
+        """Has the kernel drop every further packet of this peer, and returns whether it was still there.
+
+        Unlike a peer whose connection is closed, it does not connect again before it has noticed. gRPC closes
+        the connection when a keepalive ping stays unanswered.
+        """
+        with suppress(OSError), self._connection(address) as connection:
+            connection.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, _FILTER)
+            return True
+        return False
+
+    def received_bytes(self, address: str) -> int:
+        """Returns how much this peer has sent since it connected; 0 where that is not known."""
+        with suppress(OSError), self._connection(address) as connection:
+            info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _BYTES_RECEIVED.size)
+            return int(_BYTES_RECEIVED.unpack(info)[0]) if len(info) == _BYTES_RECEIVED.size else 0
+        return 0
+
+    def _connection(self, address: str) -> socket.socket:
+        """Returns a duplicate of the socket that `scan` found with this peer.
+
+        Raises:
+            OSError: it was closed meanwhile.
+        """
+        ours = _duplicate(self._descriptors.get(address, _NONE))
+        with ExitStack() as stack:
+            stack.enter_context(ours)
+            # The number may belong to another socket by now.
+            if _address_of(ours) != address:
+                raise ConnectionError(address)
+            stack.pop_all()
+        return ours
 
     def _peer_address(self, descriptor: int) -> str:
         with _duplicate(descriptor) as ours:

@@ -24,8 +24,11 @@ FORGIVEN_AFTER_S: Final = 5.0
 """Without a refusal; until then a connection's bucket hardly fills."""
 PENDING_S: Final = 10.0
 """How long a connection may be pending: a TLS handshake and a call over a bad link."""
-MAX_PENDING: Final = 256
+MAX_PENDING: Final = 128
 """Pending connections, or a quarter of those that are accepted, and half of them from one address."""
+SPARED_S: Final = 1.0
+"""So long many of one address may be pending, as where all operators come back after a restart, if there is
+room for all."""
 PENDING_STREAMS: Final = 4
 """Of one pending connection, of which the health service is all that it can use."""
 _REDUCED_BURST_S: Final = 0.01
@@ -174,8 +177,14 @@ class Admission:
         return [
             address
             for kept, (rank, age_s, address) in enumerate(ranked)
-            if rank >= self._max_pending // 2 or kept >= self._max_pending or age_s > PENDING_S
+            if age_s > PENDING_S
+            or kept >= self._max_pending
+            or (rank >= self._max_pending // 2 and age_s > SPARED_S)
         ]
+
+    def pending(self) -> list[str]:
+        """Returns the addresses of the connections that have no place."""
+        return [address for address, each in self._connections.items() if not each.admitted]
 
     def _new(self, prefix: str, now_s: float) -> _Connection:
         return _Connection(prefix, TokenBucket(self._limits.burst, now_s), now_s)

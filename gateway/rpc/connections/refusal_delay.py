@@ -13,9 +13,9 @@ REFUSAL_DELAY_S: Final = 0.5
 """Minimum delay of a refusal."""
 REFUSAL_SPACING_S: Final = 0.005
 """Minimum spacing of delayed refusals, over all connections."""
-_MAX_DELAYED: Final = 2560
-"""Refusals that are delayed at once, the last of them for 13 s: all that ten connections can have open, each
-of some 25 KiB. Any more leave at once, since the server takes 4096 calls, and operators need some of them."""
+_MAX_DELAYED: Final = 1024
+"""Refusals that are delayed at once, the last of them for 5.6 s, each of some 25 KiB: all that four
+connections can have open. Any more leave at once."""
 _LONGEST_DELAY_S: Final = REFUSAL_DELAY_S + _MAX_DELAYED * REFUSAL_SPACING_S
 """Also behind refusals whose callers have left, whose turns are not given back."""
 

@@ -187,6 +187,33 @@ def test_only_connections_of_the_port_are_found_and_closed() -> None:
             assert untouched.recv(1) == b"x"
 
 
+def test_a_muted_peer_is_not_heard_any_more() -> None:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.create_connection(server.getsockname()) as muted,
+        socket.create_connection(server.getsockname()) as other,
+    ):
+        from_muted, _ = server.accept()
+        from_other, _ = server.accept()
+        with from_muted, from_other:
+            sockets = AcceptedSockets(server.getsockname()[1])
+            sockets.scan()
+            address = f"127.0.0.1:{muted.getsockname()[1]}"
+            muted.sendall(b"heard")
+            assert from_muted.recv(16) == b"heard"
+            assert sockets.received_bytes(address) == len(b"heard")
+            assert sockets.mute(address)
+            muted.sendall(b"not heard")
+            other.sendall(b"heard")
+            assert from_other.recv(16) == b"heard"
+            from_muted.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                from_muted.recv(16)
+            assert sockets.received_bytes(address) == len(b"heard")
+    assert sockets.received_bytes("127.0.0.1:1") == 0
+    assert not sockets.mute("127.0.0.1:1")
+
+
 def test_a_descriptor_that_was_used_again_is_left_alone() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

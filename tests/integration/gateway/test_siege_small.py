@@ -9,6 +9,8 @@ from bench.siege.judgement import MEMORY_MIB, REVOCATION_S
 from bench.siege.rounds import Outcome, besiege
 from bench.siege.size import SMALL
 
+pytestmark = pytest.mark.timed
+
 
 @pytest.fixture(scope="module")
 def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:

@@ -75,6 +75,7 @@ class World:
     failures = 3
     open = 12
     closed = 34
+    muted = 35
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -151,6 +152,7 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_event_gaps_total", ""] == 1
     assert shown["robot_gateway_connections", ""] == 12
     assert shown["robot_gateway_connections_closed_total", ""] == 34
+    assert shown["robot_gateway_connections_muted_total", ""] == 35
 
 
 def test_the_robot_and_its_sources() -> None:

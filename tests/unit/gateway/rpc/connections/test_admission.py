@@ -6,7 +6,7 @@ from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import peer_of
-from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, QUIET_AFTER_S, Admission
+from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, QUIET_AFTER_S, SPARED_S, Admission
 
 PLACES, PER_ADDRESS = 40, 20
 """Of connections with an admitted call, and the same of those without."""
@@ -84,16 +84,31 @@ def test_an_address_that_is_used_again_begins_anew(admission: Admission, clock: 
 def test_of_one_address_the_oldest_go(admission: Admission, clock: Clock) -> None:
     old, new = from_one(PER_ADDRESS), from_one(5, first_port=5000)
     assert admission.surplus(old) == []
-    clock.now_s += 1
+    clock.now_s += SPARED_S + 0.1
     surplus = admission.surplus([*old, *new])
     assert len(surplus) == len(new)
     assert set(surplus) < set(old), "a newcomer has its chance"
 
 
-def test_the_addresses_of_one_network_are_one(admission: Admission) -> None:
+def test_the_addresses_of_one_network_are_one(admission: Admission, clock: Clock) -> None:
     """A host chooses 64 bits of its IPv6 address itself."""
     addresses = [f"[2001:db8::{number:x}]:1000" for number in range(1, PER_ADDRESS + 4)]
+    admission.surplus(addresses)
+    clock.now_s += SPARED_S + 0.1
     assert len(admission.surplus(addresses)) == 3
+
+
+def test_all_of_one_address_are_spared_for_a_moment_while_there_is_room(
+    admission: Admission, clock: Clock
+) -> None:
+    """After a restart all operators behind one router come back at once."""
+    back = from_one(PLACES)
+    assert admission.surplus(back) == []
+    clock.now_s += SPARED_S
+    assert admission.surplus(back) == []
+    clock.now_s += 0.1
+    assert len(admission.surplus(back)) == PLACES - PER_ADDRESS
+    assert len(admission.surplus(from_one(PLACES + 7, first_port=5000))) == 7, "there was no room"
 
 
 def test_of_all_addresses_the_oldest_go(admission: Admission, clock: Clock) -> None:
