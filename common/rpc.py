@@ -23,7 +23,7 @@ _SERVER_OPTIONS: Final = (
     # Per connection (SETTINGS_MAX_CONCURRENT_STREAMS, RFC 9113 6.5.2): what one client can have handled at
     # once, before those of others.
     ("grpc.max_concurrent_streams", 256),
-    # Calls of all connections that wait for a handler; gRPC cancels any more, whoever makes them.
+    # Calls of all connections that wait for a handler; gRPC cancels any more, of any caller.
     ("grpc.server.max_pending_requests", 4096),
     ("grpc.server.max_pending_requests_hard_limit", 8192),
     # From the connection to the HTTP/2 preface.

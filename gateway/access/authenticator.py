@@ -98,7 +98,7 @@ class Authenticator:
 
     def _unreadable(self) -> NotAuthenticatedError:
         return NotAuthenticatedError(
-            f"this robot can't tell which credentials are revoked: {self._problem}",
+            f"this robot can't read which credentials are revoked: {self._problem}",
             Reason.CREDENTIALS_UNREADABLE,
         )
 

@@ -51,9 +51,9 @@ def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> 
 
         # SRT itself notices a dead sender after 5 s only; the console's viewer connects anew after a second.
         with Watcher(demo.preview_port) as anew:
-            told = lookout.wait_for(PreviewState.FAULTED, killed_s, 10)
-            assert "preview service unreachable" in told.status.preview.last_error
-            assert not told.status.preview.service_reachable
+            reported = lookout.wait_for(PreviewState.FAULTED, killed_s, 10)
+            assert "preview service unreachable" in reported.status.preview.last_error
+            assert not reported.status.preview.service_reachable
             back_s = restarted_s(demo, "preview", 0)
             assert first_picture_s(anew, back_s) - killed_s < BACK_WITHIN_S
         first_picture_s(viewer, back_s)
@@ -72,11 +72,11 @@ def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
         stopped_s = time.time()
         demo.signal_all("preview", signal.SIGSTOP)
         try:
-            told = lookout.wait_for(PreviewState.FAULTED, stopped_s, 10)
+            reported = lookout.wait_for(PreviewState.FAULTED, stopped_s, 10)
         finally:
             demo.signal_all("preview", signal.SIGCONT)
-        assert told.at_s - stopped_s < NOTICED_WITHIN_S
-        assert "preview service unreachable" in told.status.preview.last_error
+        assert reported.at_s - stopped_s < NOTICED_WITHIN_S
+        assert "preview service unreachable" in reported.status.preview.last_error
 
         again_s = time.time()
         lookout.wait_for(PreviewState.RUNNING, again_s, 10)

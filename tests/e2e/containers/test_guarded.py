@@ -71,7 +71,7 @@ class Guarded:
     ben: Credentials
 
     def audit(self, who: str) -> list[dict[str, str]]:
-        """The records of somebody, done before refused, oldest first, as the page says to read them."""
+        """One caller's records, done before refused, oldest first, read as the page says."""
         files = [typed(self.deployment, command).stdout for command in (READ_AUDIT, READ_REFUSED)]
         lines = [line for file in files for line in file.splitlines()]
         return [record for record in map(json.loads, lines) if record["who"] == who]

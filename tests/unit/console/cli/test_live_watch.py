@@ -22,22 +22,14 @@ from console.client import (
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+from tests.support.clock import Clock
 
 PREVIEW = GET_SYSTEM_STATUS.decode(SystemStatus().SerializeToString()).preview
 
 
-class Clock:
-    """Moves by hand."""
-
-    now_s = 0.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-
 @pytest.fixture
 def clock() -> Clock:
-    return Clock()
+    return Clock(0.0)
 
 
 @pytest.fixture

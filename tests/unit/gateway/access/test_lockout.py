@@ -5,14 +5,7 @@ import pytest
 from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.access.lockout import FORGET_AFTER_S, FREE_FAILURES, LONGEST_WAIT_S, MAX_ENTRIES, Lockout
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now_s = 1000.0
-
-    def __call__(self) -> float:
-        return self.now_s
+from tests.support.clock import Clock
 
 
 def waits_s(lockout: Lockout, host: str = "10.0.0.5", credential: str = "a") -> float:

@@ -6,6 +6,7 @@ from common.errors import UserError
 from preview.encoders.catalogue import CATALOGUE, Encoder
 from preview.encoders.probe import TrialProber, Verdict
 from preview.encoders.selection import Selection
+from tests.support.clock import Clock
 
 ORDER = [CATALOGUE[name] for name in ("mpp-h265", "va-h265", "x264")]
 GOOD = Verdict(present=True, proven=True, first_byte_ms=5)
@@ -21,13 +22,6 @@ def prober(results: dict[str, Verdict]) -> TrialProber:
         return results[encoder.name]
 
     return TrialProber(attempt)
-
-
-class Clock:
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 def selection(verdicts: dict[str, Verdict], clock: Clock | None = None) -> Selection:
@@ -54,11 +48,11 @@ def test_the_first_proven_one_wins() -> None:
 def test_one_that_failed_is_passed_over_until_it_is_forgiven() -> None:
     clock = Clock()
     encoders = selection(ALL_GOOD, clock)
-    clock.now = 100
+    clock.now_s = 100
     encoders.pass_over("mpp-h265", "encoder mpp-h265 failed: oh")
-    for clock.now in (101, 699):
+    for clock.now_s in (101, 699):
         assert chosen(encoders) == ("va-h265", "encoder mpp-h265 failed: oh")
-    clock.now = 701
+    clock.now_s = 701
     assert chosen(encoders) == ("mpp-h265", "")
 
 

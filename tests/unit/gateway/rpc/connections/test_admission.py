@@ -7,17 +7,11 @@ from common.reasons import Reason
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import peer_of
 from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, QUIET_AFTER_S, SPARED_S, Admission
+from tests.support.clock import Clock
 
 PLACES, PER_ADDRESS = 40, 20
 """Of connections with an admitted call, and the same of those without."""
 LIMITS = LimitSettings(connections=PLACES, connections_per_address=PER_ADDRESS)
-
-
-class Clock:
-    now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 @pytest.fixture

@@ -16,15 +16,9 @@ from gateway.rpc.connections.admission import FORGIVEN_AFTER_S, QUIET_AFTER_S, A
 from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from tests.support.calls import call_of
+from tests.support.clock import Clock
 
 SMALL = LimitSettings(connections=3, streams_per_connection=2, requests_per_s=10, burst=5)
-
-
-class Clock:
-    now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
 
 
 @pytest.fixture

@@ -11,13 +11,7 @@ from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.stats import RECENT_S, Stats
 from tests.support.calls import call_of, serve
-
-
-class Clock:
-    now_s = 100.0
-
-    def __call__(self) -> float:
-        return self.now_s
+from tests.support.clock import Clock
 
 
 class Refusing(Interceptor[CallContext]):
