@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import pytest
 
@@ -19,6 +19,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 T = TypeVar("T")
 KEPT_IN = Path(__file__).parents[2] / "artifacts" / "monitor"
 """Screenshots of windows; git does not look there."""
+_FOR_THE_DOCUMENTS: Final = "SCREENSHOTS_FOR_DOCUMENTS"
+"""Environment variable: set where screenshots for docs/images are taken."""
 _LAID_OUT_AFTER_S = 0.3
 """Texts that have just changed have found their place."""
 LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
@@ -69,8 +71,16 @@ def press(
     QTest.keyClick(widget, key, *modifier)
 
 
-def keep_screenshot(widget: QWidget, name: str) -> Path:
-    """A screenshot, as an artefact; in lossless PNG."""
+def keep_screenshot(widget: QWidget, name: str, *, fills_in_s: float = 0.0) -> Path:
+    """A screenshot, as an artefact; in lossless PNG.
+
+    Args:
+        widget: what is shown.
+        name: of the file.
+        fills_in_s: time until plots and texts are worth a picture in the documents.
+    """
+    if os.environ.get(_FOR_THE_DOCUMENTS):
+        let_pass(fills_in_s)
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"
     let_pass(_LAID_OUT_AFTER_S)
