@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -12,7 +12,7 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", f"offscreen:configfile={Path(__file__).with_name('offscreen.json')}")
 
 from PySide6.QtCore import QEventLoop, QSettings, Qt, QTimer
-from PySide6.QtGui import QColor, QPalette
+from PySide6.QtGui import QColor, QImage, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -59,6 +59,15 @@ def until(condition: Callable[[], T | None], what: str, within_s: float = 20.0) 
         assert time.monotonic() < deadline_s, f"not within {within_s:g} s: {what}"
         let_pass(0.01)
     return answer
+
+
+def pixel_rows(image: QImage) -> Iterator[Iterator[tuple[int, int, int]]]:
+    """Yields the rows of an image: red, green and blue of each pixel, ten times as fast as `pixelColor`."""
+    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
+    data, stride, length = bytes(rgb.constBits()), rgb.bytesPerLine(), 3 * rgb.width()
+    for first in range(0, stride * rgb.height(), stride):
+        row = data[first : first + length]
+        yield zip(row[::3], row[1::3], row[2::3], strict=True)
 
 
 def press(

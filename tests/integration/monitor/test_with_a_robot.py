@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -21,7 +22,7 @@ from console.window.lines import StatusLine
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from tests.support.promise import keeps
-from tests.support.qt import keep_screenshot, let_pass, press, until
+from tests.support.qt import keep_screenshot, let_pass, pixel_rows, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
@@ -93,10 +94,9 @@ def watch(ros_domain: int, tmp_path: Path) -> Iterator[Watch]:  # noqa: ARG001  
 def yellow_pixels(image: QImage) -> int:
     """Pixels in the colour of the boxes, one in four looked at."""
     count = 0
-    for y in range(0, image.height(), 2):
-        for x in range(0, image.width(), 2):
-            colour = image.pixelColor(x, y)
-            count += colour.red() > 200 and 180 < colour.green() < 240 and 30 < colour.blue() < 110
+    for row in islice(pixel_rows(image), None, None, 2):
+        for red, green, blue in islice(row, None, None, 2):
+            count += red > 200 and 180 < green < 240 and 30 < blue < 110
     return count
 
 
