@@ -43,7 +43,7 @@ def first_picture_s(viewer: Watcher, since_s: float) -> float:
 
 
 @pytest.mark.timed
-def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> None:
+def test_a_killed_preview_is_reported_and_comes_back_by_itself(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
         viewer.wait_for_frames(30)
