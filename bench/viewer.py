@@ -47,19 +47,25 @@ def run(_names: list[str]) -> list[Row]:
     ]
 
 
-def extra_latency_ms(workdir: Path, rounds: int) -> Generator[float, None, None]:
-    """Yields the difference of the medians of both sides for each round, in ms."""
+def extra_latency_ms(workdir: Path, rounds: int, watch_s: float = WATCH_S) -> Generator[float, None, None]:
+    """Yields the difference of the medians of both sides for each round, in ms.
+
+    Args:
+        workdir: for files.
+        rounds: how many.
+        watch_s: how long each side watches in a round.
+    """
     with camera(workdir, FPS) as source, product.robot(workdir, source, LATENCY_MS) as robot, robot.preview():
         for _ in range(rounds):
             with robot.viewer() as receiver:
                 watch(receiver, SETTLE_S)
-                bare = statistics.median(one.latency_ms for one in watch(receiver, WATCH_S))
-            painted = statistics.median(_painted_ms(robot))
+                bare = statistics.median(one.latency_ms for one in watch(receiver, watch_s))
+            painted = statistics.median(_painted_ms(robot, watch_s))
             log(f"decoded after {bare:.1f} ms, painted after {painted:.1f} ms")
             yield painted - bare
 
 
-def _painted_ms(robot: product.Robot) -> list[float]:
+def _painted_ms(robot: product.Robot, watch_s: float) -> list[float]:
     """Returns the time from capture to painted of each frame that the window showed, in ms."""
     found: list[float] = []
     with _window(robot) as view:
@@ -73,7 +79,7 @@ def _painted_ms(robot: product.Robot) -> list[float]:
         _let_pass(SETTLE_S)
         # A timer of 0 ms fires after the painting, when the screen has the new frame.
         view.painted.connect(lambda: QTimer.singleShot(0, look))
-        _let_pass(WATCH_S)
+        _let_pass(watch_s)
     return found
 
 

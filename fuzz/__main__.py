@@ -5,13 +5,15 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
 from rich.table import Table
+
+from fuzz import OUTPUT
 
 _SHORT: Final = 20_000
 NAMES: Final = (
@@ -56,8 +58,7 @@ def main() -> int:
     kept = Path(tempfile.mkdtemp(prefix="fuzz-"))
     table = Table("target", "inputs", "seconds", "peak MiB", "found")
     found = False
-    for name in [arguments.target] if arguments.target else NAMES:
-        outcome = _try(name, arguments.runs, kept)
+    for name, outcome in _outcomes([arguments.target] if arguments.target else NAMES, arguments.runs, kept):
         found |= bool(outcome.defect)
         table.add_row(
             name,
@@ -72,18 +73,21 @@ def main() -> int:
     return int(found)
 
 
-def _try(name: str, runs: int, kept: Path) -> Outcome:
-    corpus = kept / name / "corpus"
-    corpus.mkdir(parents=True)
-    began_s = time.monotonic()
-    ended = subprocess.run(
-        _worker(name, str(runs), str(corpus)), capture_output=True, text=True, errors="replace", check=False
+def _outcomes(names: Sequence[str], runs: int, kept: Path) -> Iterator[tuple[str, Outcome]]:
+    """Yields the outcome of each target, all of them at the end.
+
+    Raises:
+        subprocess.CalledProcessError: the worker itself failed.
+    """
+    worker = subprocess.run(
+        _worker(str(kept), str(runs), *names), stdout=subprocess.PIPE, text=True, check=True
     )
-    seconds = time.monotonic() - began_s
-    # The exception is told on the one, the figures on the other.
-    said = ended.stdout + ended.stderr
-    defect = "" if ended.returncode == 0 else last_words(said)
-    return Outcome(_figure("number_of_executed_units", said), seconds, _figure("peak_rss_mb", said), defect)
+    for line in worker.stdout.splitlines():
+        name, code, seconds = line.split()
+        said = (kept / name / OUTPUT).read_text(errors="replace")
+        defect = "" if code == "0" else last_words(said)
+        inputs, peak_mib = _figure("number_of_executed_units", said), _figure("peak_rss_mb", said)
+        yield name, Outcome(inputs, float(seconds), peak_mib, defect)
 
 
 def _worker(*arguments: str) -> list[str]:

@@ -22,6 +22,8 @@ _BACKDATED: Final = timedelta(days=1)
 """Certificates are valid from a day before their issue, because the laptop's clock may differ."""
 _MAX_COMMON_NAME: Final = 64
 """ub-common-name of RFC 5280, appendix A.1."""
+_BROKEN: Final = (x509.InvalidVersion, x509.DuplicateExtension, x509.UnsupportedGeneralNameType)
+"""Raised beside ValueError for a certificate that breaks RFC 5280 (4.1.2.1, 4.2, 4.2.1.6)."""
 _KEY_USAGES: Final = (
     "digital_signature",
     "content_commitment",
@@ -89,16 +91,18 @@ def certificate_info(pem: bytes) -> CertificateInfo:
     """Parses the first certificate of a PEM file.
 
     Raises:
-        ValueError: it contains none.
+        ValueError: it contains none, or one that breaks RFC 5280.
     """
-    certificate = x509.load_pem_x509_certificate(pem)
     hosts: list[str] = []
     try:
+        certificate = x509.load_pem_x509_certificate(pem)
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         hosts += names.get_values_for_type(x509.DNSName)
         hosts += map(str, names.get_values_for_type(x509.IPAddress))
     except x509.ExtensionNotFound:
         pass
+    except _BROKEN as error:
+        raise ValueError(f"no valid certificate: {error}") from error
     return CertificateInfo(
         fingerprint=certificate.fingerprint(hashes.SHA256()).hex(),
         ends_s=int(certificate.not_valid_after_utc.timestamp()),

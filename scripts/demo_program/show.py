@@ -17,7 +17,7 @@ from demo_program.ground import DEFAULT_GRPC_PORT, Ground
 from demo_program.programs import Programs
 from demo_program.ready import status_or_none, wait_until_up
 
-_TABLE_EVERY_S: Final = 0.5
+_LOOK_EVERY_S: Final = 0.5
 _LINE_EVERY_S: Final = 5.0
 _SRT_LATENCY_MS: Final = 125
 
@@ -62,7 +62,7 @@ def _table(console: Console, robot: GatewayClient, programs: Programs) -> None:
         while True:
             programs.check_alive()
             live.update(_view(status_or_none(robot), robot.target), refresh=True)
-            time.sleep(_TABLE_EVERY_S)
+            time.sleep(_LOOK_EVERY_S)
 
 
 def _view(status: SystemStatus | None, target: str) -> RenderableType:
@@ -78,4 +78,7 @@ def _lines(robot: GatewayClient, programs: Programs) -> None:
         if status is None:
             raise UserError(f"{robot.target} does not answer")
         print(status_line(status), file=sys.stdout, flush=True)
-        time.sleep(_LINE_EVERY_S)
+        next_s = time.monotonic() + _LINE_EVERY_S
+        while time.monotonic() < next_s:
+            programs.check_alive()
+            time.sleep(_LOOK_EVERY_S)

@@ -1,20 +1,42 @@
 """How pytest-xdist spreads the tests over its workers: a file stays together, the longest files go first.
 
-All that run containers are one unit, because they share a deployment.
+Files that share the containers of `_shared_demo` (tests/e2e/containers/conftest.py) are one unit.
 """
 
-from typing import Any
+from typing import Any, Final
 
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
-_CONTAINERS = "tests/e2e/containers/"
-_LONG = ("tests/e2e/", "tests/integration/fuzz/", "tests/integration/monitor/")
+_SHARING: Final = tuple(
+    f"tests/e2e/containers/test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
+)
+_LONGEST: Final = (
+    "tests/e2e/test_demo.py",
+    *_SHARING,
+    *(f"tests/e2e/containers/test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
+    *(f"tests/integration/preview/test_{name}.py" for name in ("listener", "encrypted", "sources")),
+    "tests/integration/console/test_client.py",
+    "tests/integration/viewer/test_session.py",
+    "tests/integration/gateway/test_hostile_callers.py",
+    *(f"tests/integration/viewer/test_{name}.py" for name in ("window", "decoders", "command")),
+    "tests/e2e/test_install_console.py",
+    *(
+        f"tests/integration/ros/test_{name}.py"
+        for name in ("told_to_operators", "freshness", "no_harm", "rates")
+    ),
+    *(f"tests/integration/preview/test_{name}.py" for name in ("program", "fallback", "service")),
+    "tests/integration/access/test_takes_effect.py",
+    "tests/integration/monitor/test_with_a_robot.py",
+    "tests/integration/fuzz/test_fuzz.py",
+)
+"""Files of more than 20 s, the longest first: one that a worker began late would leave the others idle."""
+_RANKS: Final = {file: rank for rank, file in enumerate(_LONGEST)}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts the longest files first, so that no worker begins one when the others are done."""
-    items.sort(key=lambda item: (not item.nodeid.startswith(_CONTAINERS), not item.nodeid.startswith(_LONG)))
+    """Puts the longest files first."""
+    items.sort(key=lambda item: _RANKS.get(_file_of(item.nodeid), len(_RANKS)))
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -25,4 +47,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
     def _split_scope(self, nodeid: str) -> str:
-        return _CONTAINERS if nodeid.startswith(_CONTAINERS) else nodeid.partition("::")[0]
+        file = _file_of(nodeid)
+        return _SHARING[0] if file in _SHARING else file
+
+
+def _file_of(nodeid: str) -> str:
+    return nodeid.partition("::")[0]

@@ -2,9 +2,9 @@
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import pytest
 
@@ -12,13 +12,15 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", f"offscreen:configfile={Path(__file__).with_name('offscreen.json')}")
 
 from PySide6.QtCore import QEventLoop, QSettings, Qt, QTimer
-from PySide6.QtGui import QColor, QPalette
+from PySide6.QtGui import QColor, QImage, QPalette
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 T = TypeVar("T")
 KEPT_IN = Path(__file__).parents[2] / "artifacts" / "monitor"
 """Screenshots of windows; git does not look there."""
+_FOR_THE_DOCUMENTS: Final = "SCREENSHOTS_FOR_DOCUMENTS"
+"""Environment variable: set where screenshots for docs/images are taken."""
 _LAID_OUT_AFTER_S = 0.3
 """Texts that have just changed have found their place."""
 LIGHT, DARK = QColor("#efefef"), QColor("#2d2d30")
@@ -59,6 +61,15 @@ def until(condition: Callable[[], T | None], what: str, within_s: float = 20.0) 
     return answer
 
 
+def pixel_rows(image: QImage) -> Iterator[Iterator[tuple[int, int, int]]]:
+    """Yields the rows of an image: red, green and blue of each pixel, ten times as fast as `pixelColor`."""
+    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
+    data, stride, length = bytes(rgb.constBits()), rgb.bytesPerLine(), 3 * rgb.width()
+    for first in range(0, stride * rgb.height(), stride):
+        row = data[first : first + length]
+        yield zip(row[::3], row[1::3], row[2::3], strict=True)
+
+
 def press(
     widget: QWidget, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier
 ) -> None:
@@ -69,8 +80,16 @@ def press(
     QTest.keyClick(widget, key, *modifier)
 
 
-def keep_screenshot(widget: QWidget, name: str) -> Path:
-    """A screenshot, as an artefact; in lossless PNG."""
+def keep_screenshot(widget: QWidget, name: str, *, fills_in_s: float = 0.0) -> Path:
+    """A screenshot, as an artefact; in lossless PNG.
+
+    Args:
+        widget: what is shown.
+        name: of the file.
+        fills_in_s: time until plots and texts are worth a picture in the documents.
+    """
+    if os.environ.get(_FOR_THE_DOCUMENTS):
+        let_pass(fills_in_s)
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"
     let_pass(_LAID_OUT_AFTER_S)

@@ -33,7 +33,7 @@ def test_a_wrong_configuration_ends_the_start_with_one_line(tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("images")
-def test_a_configuration_broken_later_is_told_at_every_attempt(tmp_path: Path) -> None:
+def test_a_configuration_broken_later_is_reported_at_every_attempt(tmp_path: Path) -> None:
     config = tmp_path / "gateway.yaml"
     config.write_text("name: good\n", encoding="utf-8")
     with (

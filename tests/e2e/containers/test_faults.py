@@ -13,7 +13,7 @@ from tests.e2e.containers.lookout import Lookout
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
 
-pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timed, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.docker, pytest.mark.gst, pytest.mark.timeout(900)]
 
 BACK_WITHIN_S = 5.0
 NOTICED_WITHIN_S = 3.0
@@ -42,7 +42,8 @@ def first_picture_s(viewer: Watcher, since_s: float) -> float:
     return wait_until(first, "pictures again", 30)
 
 
-def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> None:
+@pytest.mark.timed
+def test_a_killed_preview_is_reported_and_comes_back_by_itself(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.BALANCED)
         viewer.wait_for_frames(30)
@@ -65,6 +66,7 @@ def test_a_killed_preview_is_told_and_comes_back_by_itself(demo: Deployment) -> 
         assert demo.restarts("gateway") == 0
 
 
+@pytest.mark.timed
 def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
     with demo.client() as robot, Lookout(robot) as lookout, Watcher(demo.preview_port) as viewer:
         robot.enable_preview(PreviewProfile.LOW_BW)
@@ -85,6 +87,7 @@ def test_a_stopped_preview_is_noticed_and_taken_back(demo: Deployment) -> None:
         assert lookout.slowest_s < ANSWERED_WITHIN_S
 
 
+@pytest.mark.timed
 def test_a_preview_that_hangs_is_restarted(demo: Deployment) -> None:
     """Documented: after 11 s without a heartbeat. Docker alone would leave it as it is, unhealthy."""
     with demo.client() as robot, Lookout(robot) as lookout:
@@ -95,6 +98,7 @@ def test_a_preview_that_hangs_is_restarted(demo: Deployment) -> None:
         lookout.wait_for(PreviewState.RUNNING, time.time(), BACK_WITHIN_S)
 
 
+@pytest.mark.timed
 def test_a_killed_gateway_leaves_the_stream_alone(demo: Deployment) -> None:
     """Viewers keep their picture: the preview goes on for timeouts.without_gateway_s, 30 s here."""
     with demo.client() as robot, Watcher(demo.preview_port) as viewer:

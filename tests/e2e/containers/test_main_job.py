@@ -48,6 +48,7 @@ def test_health_by_the_standard_service_inside_and_out(demo: Deployment) -> None
     assert state_of(target) == "SERVING", "a dead preview is no fault of the gateway's"
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("service", ["gateway", "preview"])
 def test_a_stop_takes_less_than_three_seconds(demo: Deployment, service: str) -> None:
     with demo.client() as robot:

@@ -18,7 +18,7 @@ from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES
 from omniseer.gateway.v1 import robot_gateway_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
-from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot
+from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot, refuse_at_once
 from tests.support.running_gateway import raw_unary
 
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
@@ -33,6 +33,11 @@ PATHS = {
     for method in SERVICE.methods
 } | {REFLECTION: (Role.VIEWER, True)}
 """Every method that needs a role: which, and whether it streams."""
+
+
+@pytest.fixture(autouse=True)
+def no_refusal_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    refuse_at_once(monkeypatch)
 
 
 async def called(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[grpc.StatusCode, str]:

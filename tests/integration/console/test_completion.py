@@ -17,14 +17,18 @@ BOOK = "\n".join(f'[robots.{name}]\ntarget = "{name}.local"' for name in ("lab1"
 
 @pytest.fixture
 def settings(tmp_path: Path) -> dict[str, str]:
+    return settings_of(tmp_path)
+
+
+def settings_of(home: Path) -> dict[str, str]:
     """A person's home with three robots, and our robotctl first in the path."""
-    book = tmp_path / ".config/robotctl/config.toml"
+    book = home / ".config/robotctl/config.toml"
     book.parent.mkdir(parents=True)
     book.write_text(BOOK)
     # What was in there stays, and is what our prompt comes from.
-    (tmp_path / ".bashrc").write_text("PS1='$ '\n")
+    (home / ".bashrc").write_text("PS1='$ '\n")
     path = f"{ROBOTCTL.parent}:/usr/bin:/bin"
-    return {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path / ".config"), "PATH": path, "PS1": "$ "}
+    return {"HOME": str(home), "XDG_CONFIG_HOME": str(home / ".config"), "PATH": path, "PS1": "$ "}
 
 
 def run(words: list[str], settings: dict[str, str], **extra: str) -> str:
@@ -40,13 +44,21 @@ def run(words: list[str], settings: dict[str, str], **extra: str) -> str:
     return ran.stdout
 
 
-@pytest.fixture
-def bash(settings: dict[str, str]) -> Iterator[Terminal]:
-    """After `robotctl --install-completion`, typed in a bash, a new one."""
-    with terminal_with(["bash", "--norc", "-i"], extra=settings) as first:
+@pytest.fixture(scope="module")
+def completed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The .bashrc after `robotctl --install-completion`, typed in a bash."""
+    home = tmp_path_factory.mktemp("home")
+    with terminal_with(["bash", "--norc", "-i"], extra=settings_of(home)) as first:
         first.wait_for("$ ")
         first.press("robotctl --install-completion; echo done $?\n")
         first.wait_for("done 0")
+    return home / ".bashrc"
+
+
+@pytest.fixture
+def bash(settings: dict[str, str], completed: Path) -> Iterator[Terminal]:
+    """A new bash of someone who has installed the completion."""
+    shutil.copy(completed, settings["HOME"])
     with terminal_with(["bash", "--rcfile", f"{settings['HOME']}/.bashrc", "-i"], extra=settings) as screen:
         screen.wait_for("$ ")
         yield screen

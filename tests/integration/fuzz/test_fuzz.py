@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import fuzz.__main__ as program
+from fuzz import OUTPUT
 
 ROOT = Path(__file__).parents[3]
 LONG_S = 300
@@ -45,18 +46,18 @@ def test_a_defect_is_found_and_can_be_tried_again(tmp_path: Path) -> None:
         "from fuzz.worker import main\n"
         "main(sys.argv[1:])\n"
     )
-    corpus = tmp_path / "corpus"
-    corpus.mkdir()
-    command = [sys.executable, "-c", careless, "operators_request"]
     found = subprocess.run(
-        [*command, "50000", str(corpus)],
+        [sys.executable, "-c", careless, str(tmp_path), "50000", "operators_request"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=LONG_S,
-        check=False,
+        check=True,
     )
-    assert found.returncode != 0
-    assert program.last_words(found.stdout + found.stderr).startswith("KeyError: ")
-    (kept,) = tmp_path.glob("crash-*")
+    name, code, _ = found.stdout.split()
+    assert name == "operators_request"
+    assert code != "0"
+    directory = tmp_path / name
+    assert program.last_words((directory / OUTPUT).read_text(errors="replace")).startswith("KeyError: ")
+    (kept,) = directory.glob("crash-*")
     assert run("fuzz", "--target", "operators_request", "--input", str(kept)).returncode == 0, "ours takes it"

@@ -1,6 +1,7 @@
 """The window with a whole robot behind it: real messages, real gateway, real video; each of them fails.
 
-Frames of every situation are kept in artifacts/monitor; docs/images has the good ones.
+Screenshots of every situation are kept in artifacts/monitor; docs/images has those that were taken with
+SCREENSHOTS_FOR_DOCUMENTS=1.
 """
 
 import statistics
@@ -8,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -20,7 +22,7 @@ from console.window.lines import StatusLine
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from tests.support.promise import keeps
-from tests.support.qt import keep_screenshot, let_pass, press, until
+from tests.support.qt import keep_screenshot, let_pass, pixel_rows, press, until
 from tests.support.whole_robot import WholeRobot, whole_robot
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
@@ -92,10 +94,9 @@ def watch(ros_domain: int, tmp_path: Path) -> Iterator[Watch]:  # noqa: ARG001  
 def yellow_pixels(image: QImage) -> int:
     """Pixels in the colour of the boxes, one in four looked at."""
     count = 0
-    for y in range(0, image.height(), 2):
-        for x in range(0, image.width(), 2):
-            colour = image.pixelColor(x, y)
-            count += colour.red() > 200 and 180 < colour.green() < 240 and 30 < colour.blue() < 110
+    for row in islice(pixel_rows(image), None, None, 2):
+        for red, green, blue in islice(row, None, None, 2):
+            count += red > 200 and 180 < green < 240 and 30 < blue < 110
     return count
 
 
@@ -110,8 +111,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     watch.video_moves()
     boxes_are_drawn(watch)
     until(lambda: watch.window.plots.all[0].value_text.endswith(" fps"), "the video's rate is plotted")
-    let_pass(8)  # what the plots show shall be worth a picture
-    keep_screenshot(watch.window, "preview-running")
+    keep_screenshot(watch.window, "preview-running", fills_in_s=8)
 
     watch.robot.sensors.change(silent=["odometry"])
     watch.mark_is("Motion", "STALE")
@@ -143,8 +143,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     assert not watch.window.preview.switch.isEnabled()
     watch.mark_is("Motion", "STALE")
     watch.video_moves()  # the stream does not need the gateway
-    let_pass(3)
-    keep_screenshot(watch.window, "unreachable")
+    keep_screenshot(watch.window, "unreachable", fills_in_s=3)
 
     watch.robot.start_gateway()
     QTest.mouseClick(watch.window.banner.button, Qt.MouseButton.LeftButton)
@@ -157,8 +156,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
         "the restart is an event",
     )
     watch.video_moves()
-    let_pass(2)
-    keep_screenshot(watch.window, "reconnected")
+    keep_screenshot(watch.window, "reconnected", fills_in_s=2)
 
 
 def boxes_are_drawn(watch: Watch) -> None:

@@ -132,6 +132,9 @@ def plays(port: int, passphrase: str) -> bool:
         "-v",
         "error",
         "-nostdin",
+        # By default it looks at five seconds of the stream before it shows anything.
+        "-analyzeduration",
+        "500000",
         "-i",
         f"{address}&passphrase={passphrase}" if passphrase else address,
     ]

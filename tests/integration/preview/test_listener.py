@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from omniseer.preview.v1 import preview_service_pb2 as pb
 from tests.support.free import udp_port_is_free
 from tests.support.receiver import Receiver
 from tests.support.running_preview import RunningPreview
+from tests.support.udp_link import UdpLink
 from tests.support.visitors import visit
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -23,6 +25,9 @@ from tests.support.watcher import Watcher
 pytestmark = pytest.mark.gst
 
 PASSPHRASE = "correct horse battery staple"
+WATCHERS = 5
+STUTTERS = 3
+LONGEST_PAUSE_S = 1.0
 
 
 @contextmanager
@@ -111,19 +116,35 @@ def test_a_wrong_passphrase_takes_no_place_for_long(tmp_path: Path) -> None:
             viewers(preview, 1)
 
 
-def test_a_viewer_that_freezes_or_dies_does_not_disturb_the_others(preview: RunningPreview) -> None:
+def test_viewers_that_freeze_stutter_vanish_or_die_pause_none_of_the_others(preview: RunningPreview) -> None:
     preview.enable()
     preview.running()
-    with player(preview.port) as freezing, player(preview.port) as dying, Watcher(preview.port) as watcher:
-        viewers(preview, 3)
-        watcher.wait_for_frames(5)
-        freezing.send_signal(signal.SIGSTOP)
-        dying.kill()
-        watcher.wait_for_frames(60)
-        # Both are given up after SRT's own 5 s.
-        viewers(preview, 1)
-        assert watcher.reconnects == 0
-        assert watcher.longest_pause_s < 1.0
+    with ExitStack() as stack:
+        frozen, dying, stuttering = (
+            [stack.enter_context(player(preview.port)) for _ in range(count)] for count in (2, 2, 1)
+        )
+        link = stack.enter_context(UdpLink(preview.port))
+        stack.enter_context(player(link.port))
+        watchers = [Watcher(preview.port) for _ in range(WATCHERS)]
+        for watcher in watchers:
+            stack.enter_context(watcher)
+            watcher.wait_for_frames(5)
+        viewers(preview, len(watchers) + 6)
+        before = [len(watcher.arrivals_s) for watcher in watchers]
+        for process in frozen:
+            process.send_signal(signal.SIGSTOP)
+        for process in dying:
+            process.kill()
+        link.impairment.loss = link.impairment.control_loss = 1.0
+        for number in (signal.SIGSTOP, signal.SIGCONT) * STUTTERS:
+            stuttering[0].send_signal(number)
+            watchers[0].wait_for_frames(10)
+        # All but the stuttering one are given up after SRT's own 5 s.
+        viewers(preview, len(watchers) + 1)
+        for watcher, earlier in zip(watchers, before, strict=True):
+            arrivals_s = watcher.arrivals_s[earlier - 1 :]
+            assert max(later - sooner for sooner, later in pairwise(arrivals_s)) < LONGEST_PAUSE_S
+            assert watcher.reconnects == 0
     assert preview.running().counters.faults == 0
 
 
@@ -152,7 +173,7 @@ def test_two_hundred_come_and_go_within_one_stream(preview: RunningPreview) -> N
         visit(preview.port, 200)
         watcher.wait_for_frames(5)
         assert watcher.reconnects == 0
-        assert watcher.longest_pause_s < 1.0
+        assert watcher.longest_pause_s < LONGEST_PAUSE_S
         viewers(preview, 1)
         wait_until(lambda: preview.descriptors() <= descriptors, "as many descriptors as before")
         grown_mib = preview.resident_mib() - resident

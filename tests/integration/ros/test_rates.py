@@ -33,7 +33,7 @@ def test_a_thousand_values_a_second_are_one_fresh_value(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("ros_domain")
-def test_one_value_in_ten_seconds_is_fresh_for_as_long_as_it_is_told_to_be(tmp_path: Path) -> None:
+def test_one_value_in_ten_seconds_is_fresh_for_as_long_as_configured(tmp_path: Path) -> None:
     """The same topic for a limit that suits its rate, and for one that does not."""
     kept = [source.model_dump(mode="json") for source in DEFAULT_SOURCES if source.name != "battery"]
     battery = next(source for source in DEFAULT_SOURCES if source.name == "battery").model_dump(mode="json")

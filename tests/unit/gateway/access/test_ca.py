@@ -1,5 +1,6 @@
 """Certificates have the issuer, names, purposes and validity that TLS verifies."""
 
+import ssl
 import time
 
 import pytest
@@ -75,3 +76,23 @@ def test_keys_match_their_certificates_and_are_in_no_repr() -> None:
 def test_an_invalid_host_is_one_line() -> None:
     with pytest.raises(UserError, match="neither a host name nor an address"):
         issue_server_certificate(CA, "lab", ("läb",), 1)
+
+
+VERSION = bytes.fromhex("a003020102")
+"""X.509 version 3 (RFC 5280 4.1.2.1)."""
+BASIC_CONSTRAINTS, KEY_USAGE = bytes.fromhex("0603551d13"), bytes.fromhex("0603551d0f")
+"""Identifiers of extensions that every CA certificate has here (RFC 5280 4.2.1)."""
+
+
+@pytest.mark.parametrize(
+    ("original", "replacement"),
+    [
+        pytest.param(KEY_USAGE, BASIC_CONSTRAINTS, id="one extension twice"),
+        pytest.param(VERSION, VERSION[:-1] + b"\x09", id="a version that does not exist"),
+    ],
+)
+def test_a_certificate_that_breaks_the_standard_is_a_value_error(original: bytes, replacement: bytes) -> None:
+    der = ssl.PEM_cert_to_DER_cert(CA.certificate.decode())
+    assert der.count(original) == 1
+    with pytest.raises(ValueError, match="certificate"):
+        certificate_info(ssl.DER_cert_to_PEM_cert(der.replace(original, replacement)).encode())
