@@ -16,8 +16,8 @@ SCAN_EVERY_S: Final = 0.1
 """What is accepted in between is bounded by the server's limit of connections."""
 PENDING_BYTES: Final = 1_048_576
 """What a pending connection may send: a few of the largest requests, or thousands of small ones."""
-UNTHROTTLED_BYTES: Final = 16_384
-"""What it may send until it is answered slowly: a TLS handshake, and more calls than a login takes."""
+UNTHROTTLED_BYTES: Final = 65_536
+"""What it may send until it is answered slowly: hundreds of calls."""
 THROTTLED_BYTES_PER_S: Final = 1024
 """Some ten refusals a second."""
 _LOG_EVERY_S: Final = 10.0

@@ -89,6 +89,7 @@ class Auth(Interceptor[CallContext]):
             self._admission.admit(call.peer)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
+            call.refusal = error
             await self._refusals.refuse(error)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
