@@ -1,14 +1,19 @@
 """Certificates have the issuer, names, purposes and validity that TLS verifies."""
 
+import ssl
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
 from common.errors import UserError
 from gateway.access.ca import (
+    KeyPair,
     certificate_info,
     issue_client_certificate,
     issue_server_certificate,
@@ -75,3 +80,26 @@ def test_keys_match_their_certificates_and_are_in_no_repr() -> None:
 def test_an_invalid_host_is_one_line() -> None:
     with pytest.raises(UserError, match="neither a host name nor an address"):
         issue_server_certificate(CA, "lab", ("läb",), 1)
+
+
+def test_a_malformed_certificate_is_refused_as_such() -> None:
+    """An extension twice, which is noticed when extensions are read, and an unknown version (RFC 5280 4)."""
+    oid = x509.ObjectIdentifier("2.5.29.99")
+    key, name = ec.generate_private_key(ec.SECP256R1()), x509.Name([])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder(name, name, key.public_key(), 1, now, now + timedelta(days=1))
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .add_extension(x509.UnrecognizedExtension(oid, b"\x04\x00"), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    der = certificate.public_bytes(serialization.Encoding.DER)
+    twice = der.replace(b"\x06\x03\x55\x1d\x63", b"\x06\x03\x55\x1d\x0e")
+    unknown = der.replace(b"\xa0\x03\x02\x01\x02", b"\xa0\x03\x02\x01\x22")
+    assert certificate_info(ssl.DER_cert_to_PEM_cert(der).encode())
+    for malformed in (twice, unknown):
+        assert malformed != der
+        with pytest.raises(ValueError, match=r"Duplicate|version"):
+            certificate_info(ssl.DER_cert_to_PEM_cert(malformed).encode())
+    with pytest.raises(ValueError, match="version"):
+        key_matches(KeyPair(ssl.DER_cert_to_PEM_cert(unknown).encode(), CA.key))
