@@ -54,7 +54,7 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     output = None
     try:
         with suppress(TimeoutError):
-            output, _ = await asyncio.wait_for(child.communicate(), timeout_s)
+            output = await asyncio.wait_for(_output(child), timeout_s)
     finally:
         await _kill(child)
     if output is None:
@@ -62,6 +62,26 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
         ended = child.returncode is not None
         raise TrialError(f"it hung: no result within {timeout_s:g} s", passing=ended)
     return parse_result(output, child.returncode or 0)
+
+
+async def _output(child: asyncio.subprocess.Process) -> bytes:
+    """Returns what the child has printed, when it has ended.
+
+    Raises:
+        TrialError: it printed too much; it is killed then, and the rest is read away to free the pipe.
+    """
+    assert child.stdout is not None  # noqa: S101  # a pipe
+    output = b""
+    while chunk := await child.stdout.read(_MAX_OUTPUT_BYTES):
+        if len(output) <= _MAX_OUTPUT_BYTES:
+            output += chunk
+        elif child.returncode is None:
+            with suppress(ProcessLookupError):
+                child.kill()
+    await child.wait()
+    if len(output) > _MAX_OUTPUT_BYTES:
+        raise TrialError(f"its trial printed more than {_MAX_OUTPUT_BYTES // 1024} KiB")
+    return output
 
 
 async def _kill(child: asyncio.subprocess.Process) -> None:

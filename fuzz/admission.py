@@ -74,7 +74,9 @@ class Model:
                 self._admission.admit(peer)
             except TooMuchError:
                 self._admission.close_stream(peer)
+                # Another one had taken its place since it was last served: pending since then.
                 self.served.discard(peer.address)
+                self.present[peer.address] = self._now_s
                 return
         self.streams[peer.address] += 1
         assert self.streams[peer.address] <= _LIMITS.streams_per_connection

@@ -50,7 +50,7 @@ from gateway.status.board import Board
 
 _log = logging.getLogger(__name__)
 
-_BESIDE_PLACES: Final = 3 * MAX_PENDING
+_BESIDE_PLACES: Final = 2 * MAX_PENDING
 """Accepted connections: pending ones, and surplus ones for the moment until they are closed."""
 _PASSPHRASE_BYTES: Final = 24
 """32 characters of base64: 192 random bits, beyond guessing whatever the length of SRT's AES key."""

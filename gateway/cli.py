@@ -8,7 +8,7 @@ from rich.console import Console
 
 from common import logs
 from common.findings import exit_code, print_findings
-from common.program import run, run_to_exit
+from common.program import bound_arenas, run, run_to_exit
 from gateway.access.reloader import load_access
 from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, load_settings
@@ -32,6 +32,7 @@ def serve(config: Config = None) -> None:
     """Serve operators until SIGINT or SIGTERM."""
     settings = load_settings(config)
     logs.configure(settings.log_level, settings.log_format)
+    bound_arenas()
     run(lambda stop: serve_until(settings, stop))
 
 

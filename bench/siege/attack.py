@@ -4,18 +4,21 @@ Prints "ready", begins with a line on its standard input, ends when that ends, a
 """
 
 import asyncio
+import hashlib
 import json
 import os
 import resource
 import sys
 from collections.abc import Coroutine, Iterator
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final, NoReturn
 
 import uvloop
 
 from bench.siege.crowd import Crowd
 from bench.siege.size import Plan
+
+_BLOCK: Final = bytes(65_536)
 
 
 async def main(host: str, port: int, plan: Plan) -> None:
@@ -37,8 +40,16 @@ def _attackers(crowd: Crowd, plan: Plan) -> Iterator[Coroutine[Any, Any, Any]]:
     for address in range(plan.addresses):
         yield from (crowd.idle(f"127.1.0.{1 + address}") for _ in range(plan.idle_per_address))
     yield from (crowd.drip("127.3.0.1") for _ in range(plan.slow))
+    if plan.burns:
+        yield _burn()
     for number in range(plan.flooders):
         yield crowd.flood(f"127.4.0.{1 + number}", plan.tokens[number % len(plan.tokens)])
+
+
+async def _burn() -> NoReturn:
+    while True:
+        hashlib.sha256(_BLOCK)
+        await asyncio.sleep(0)  # until it is cancelled
 
 
 def share_one_core() -> None:

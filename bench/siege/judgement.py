@@ -60,6 +60,14 @@ def rows(outcome: Outcome, size: Size) -> list[Row]:
             bar=P99_RATIO,
         ),
         Row(
+            name="siege.p99_beside",
+            what="the same against the operator beside two programs that only take the attackers' core",
+            unit="ms",
+            values=[p99_ms(each.status_ms) for each in outcome.besieged],
+            references=[p99_ms(each.status_ms) for each in outcome.beside],
+            bar=None,
+        ),
+        Row(
             name="siege.login_ms",
             what="a new connection of the operator, to its first status: the slowest of a turn",
             unit="ms",

@@ -32,6 +32,7 @@ class Outcome:
 
     Attributes:
         alone: the operator, undisturbed, per turn.
+        beside: the same while two programs without connections take the attackers' core, per turn.
         besieged: the same under attack.
         between: the same while attackers get ready, and while the gateway recovers from them.
         attacks: what the attackers achieved, per process and turn.
@@ -42,6 +43,7 @@ class Outcome:
 
     peaks: Peaks
     alone: list[Record] = field(default_factory=list)
+    beside: list[Record] = field(default_factory=list)
     besieged: list[Record] = field(default_factory=list)
     between: list[Record] = field(default_factory=list)
     attacks: list[Counts] = field(default_factory=list)
@@ -67,6 +69,7 @@ async def besiege(ground: Ground, size: Size) -> Outcome:
         for turn in range(size.turns):
             outcome.alone.append(operator.begin_record())
             await asyncio.sleep(size.alone_s)
+            outcome.beside.append(await _beside(ground, operator, size.alone_s))
             name = f"siege-revoked-{turn}"
             outcome.between.append(operator.begin_record())
             async with (
@@ -90,6 +93,19 @@ async def besiege(ground: Ground, size: Size) -> Outcome:
         outcome.closed = None if after is None or before is None else after - before
     await asyncio.to_thread(ground.keeper.revoke, _OPERATOR)
     return outcome
+
+
+async def _beside(ground: Ground, operator: Operator, duration_s: float) -> Record:
+    """What the operator notices of the attackers' CPU alone, on this machine; not of their connections."""
+    async with _attack(ground, Plan(burns=True)) as one, _attack(ground, Plan(burns=True)) as other:
+        for each in (one, other):
+            each.begin()
+        record = operator.begin_record()
+        await asyncio.sleep(duration_s)
+        operator.begin_record()
+        await one.end()
+        await other.end()
+    return record
 
 
 async def _added(ground: Ground, name: str, role: Role) -> str:

@@ -15,6 +15,7 @@ class Plan:
         slow: callers that send a byte of their TLS handshake each second.
         flooders: callers with wrong tokens, each from an address of its own.
         tokens: theirs, in turns.
+        burns: whether the process does nothing but take its core, as a control.
     """
 
     idle: int = 0
@@ -23,6 +24,7 @@ class Plan:
     slow: int = 0
     flooders: int = 0
     tokens: tuple[str, ...] = ()
+    burns: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +36,7 @@ class Size:
         flooders: how many attackers make calls.
         streams: of the caller that is revoked.
         turns: how often the operator is measured alone, then besieged.
-        alone_s: duration of the one.
+        alone_s: duration of the one, and of the control between the two.
         besieged_s: duration of the other, the attackers' arrival included.
     """
 

@@ -22,8 +22,13 @@ _BACKDATED: Final = timedelta(days=1)
 """Certificates are valid from a day before their issue, because the laptop's clock may differ."""
 _MAX_COMMON_NAME: Final = 64
 """ub-common-name of RFC 5280, appendix A.1."""
-_BROKEN: Final = (x509.InvalidVersion, x509.DuplicateExtension, x509.UnsupportedGeneralNameType)
-"""Raised beside ValueError for a certificate that breaks RFC 5280 (4.1.2.1, 4.2, 4.2.1.6)."""
+_MALFORMED: Final = (
+    UnsupportedAlgorithm,
+    x509.DuplicateExtension,
+    x509.InvalidVersion,
+    x509.UnsupportedGeneralNameType,
+)
+"""What the parser raises besides ValueError; some of it only when extensions are read."""
 _KEY_USAGES: Final = (
     "digital_signature",
     "content_commitment",
@@ -91,7 +96,7 @@ def certificate_info(pem: bytes) -> CertificateInfo:
     """Parses the first certificate of a PEM file.
 
     Raises:
-        ValueError: it contains none, or one that breaks RFC 5280.
+        ValueError: it contains none that is well-formed.
     """
     hosts: list[str] = []
     try:
@@ -101,8 +106,8 @@ def certificate_info(pem: bytes) -> CertificateInfo:
         hosts += map(str, names.get_values_for_type(x509.IPAddress))
     except x509.ExtensionNotFound:
         pass
-    except _BROKEN as error:
-        raise ValueError(f"no valid certificate: {error}") from error
+    except _MALFORMED as error:
+        raise ValueError(str(error)) from error
     return CertificateInfo(
         fingerprint=certificate.fingerprint(hashes.SHA256()).hex(),
         ends_s=int(certificate.not_valid_after_utc.timestamp()),
@@ -120,7 +125,7 @@ def key_matches(pair: KeyPair) -> bool:
         certificate = x509.load_pem_x509_certificate(pair.certificate)
         key = serialization.load_pem_private_key(pair.key, password=None)
         return key.public_key() == certificate.public_key()
-    except (TypeError, UnsupportedAlgorithm) as error:
+    except (TypeError, *_MALFORMED) as error:
         raise ValueError(str(error)) from error
 
 

@@ -24,10 +24,13 @@ POLL_INTERVAL_S: Final = 0.5
 """Bounds how long a revoked credential remains usable."""
 _UNKNOWN_INTERVAL_S: Final = 0.1
 """Minimum interval of polls caused by unknown credentials, of which there may be a flood."""
+UNKNOWN_WITHIN_S: Final = 2.0
+"""How long a caller with an unknown credential waits for a poll."""
 CLOSED_AFTER_S: Final = 60.0
 """How long the list of credentials may be unreadable before none is accepted."""
 _FAILURES_REPORTED: Final = 3
 """Consecutive failures before a fault: two files that belong together do not change at the same instant."""
+_DISK_HANGS: Final = "the list of credentials can't be read: the disk does not answer"
 _CERTIFICATES: Final = {
     "server_certificate": ("the gateway's certificate", "server"),
     "authority": ("the robot's certificate authority", "ca"),
@@ -127,26 +130,33 @@ class CredentialReloader:
         self._seen = self._signatures()
         self.loaded = load_access(directory, tls)
         self._error, self._failures = "", 0
-        self._unreadable_since_s: float | None = None
+        self._unconfirmed_since_s: float | None = None
+        """When the first attempt began that has not shown yet that the list in effect is the newest."""
         self._polling = asyncio.Lock()
         self._polled_s = -math.inf
         self._next_poll: asyncio.Task[None] | None = None
 
     async def run(self) -> NoReturn:
         """Polls the files until cancelled."""
-        while True:
-            await asyncio.sleep(POLL_INTERVAL_S)
-            await self._poll()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._keep_polling(), name="credential files")
+            while True:
+                # Apart from the polls: one on a disk that hangs does not end.
+                await asyncio.sleep(POLL_INTERVAL_S)
+                self._close_if_overdue(self._error or _DISK_HANGS)
 
     async def reload_for_unknown(self) -> None:
         """Returns after a poll that began after this call, because the credential may just have been added.
 
-        Concurrent calls share polls, which are at least 0.1 s apart.
+        Concurrent calls share polls, which are at least 0.1 s apart. Returns in any case after
+        UNKNOWN_WITHIN_S: the disk may hang.
         """
         if self._next_poll is None:
             self._next_poll = asyncio.create_task(self._poll_when_due(), name="reload for unknown credential")
-        # Shielded: a caller that leaves must not cancel the poll of the others.
-        await asyncio.shield(self._next_poll)
+        # Does not cancel the poll, which is that of others, too.
+        done, _ = await asyncio.wait((self._next_poll,), timeout=UNKNOWN_WITHIN_S)
+        for each in done:
+            each.result()
 
     def view(self, audit_error: str = "") -> AccessView:
         """Returns the state of access control that operators see."""
@@ -158,6 +168,11 @@ class CredentialReloader:
             closed=bool(self.loaded.problem),
         )
 
+    async def _keep_polling(self) -> NoReturn:
+        while True:
+            await asyncio.sleep(POLL_INTERVAL_S)
+            await self._poll()
+
     async def _poll_when_due(self) -> None:
         await asyncio.sleep(max(0.0, self._polled_s + _UNKNOWN_INTERVAL_S - time.monotonic()))
         self._next_poll = None
@@ -167,41 +182,44 @@ class CredentialReloader:
         # One at a time: an earlier poll that ended later would put a revoked credential back into effect.
         async with self._polling:
             self._polled_s = time.monotonic()
-            await self._reload_if_changed()
+            if self._unconfirmed_since_s is None:
+                self._unconfirmed_since_s = self._polled_s
+            if await self._reload_if_changed():
+                self._unconfirmed_since_s = None
 
-    async def _reload_if_changed(self) -> None:
+    async def _reload_if_changed(self) -> bool:
+        """Returns whether the list of credentials could be read."""
         # Files are read in a worker thread, because a disk may be slow.
         seen = await asyncio.to_thread(self._signatures)
-        if seen == self._seen and not self._failures:
-            return
+        if seen == self._seen and not self._failures and not self.loaded.problem:
+            return True
         try:
             store = await asyncio.to_thread(self._directory.read_store)
         except UserError as error:
             self._note(error)
-            self._close_if_overdue(error)
-            return
-        self._unreadable_since_s = None
+            self._close_if_overdue(error.what)
+            return False
         try:
             loaded = await asyncio.to_thread(_with_certificates, store, self._tls)
         except UserError as error:
             self._note(error)
             # A certificate that can't be read must not keep a revocation from taking effect.
             self._put_in_effect(replace(self.loaded, store=store, problem=""))
-            return
+            return True
         self._seen, self._error, self._failures = seen, "", 0
         self._put_in_effect(loaded)
+        return True
 
     def _note(self, error: UserError) -> None:
         self._failures += 1
         if self._failures >= _FAILURES_REPORTED:
             self._error = error.what
 
-    def _close_if_overdue(self, error: UserError) -> None:
-        now_s = time.monotonic()
-        if self._unreadable_since_s is None:
-            self._unreadable_since_s = now_s
-        if now_s - self._unreadable_since_s >= CLOSED_AFTER_S:
-            self._put_in_effect(replace(self.loaded, problem=error.what))
+    def _close_if_overdue(self, why: str) -> None:
+        since_s = self._unconfirmed_since_s
+        if since_s is not None and time.monotonic() - since_s >= CLOSED_AFTER_S and not self.loaded.problem:
+            self._error = why
+            self._put_in_effect(replace(self.loaded, problem=why))
 
     def _put_in_effect(self, loaded: LoadedAccess) -> None:
         if loaded != self.loaded:

@@ -109,6 +109,8 @@ class GatewayCollector(Collector):
         yield _counter(
             "connections_closed", "Connections closed because no call of theirs was admitted.", guard.closed
         )
+        throttled = "Connections throttled because they sent much without an admitted call."
+        yield _counter("connections_throttled", throttled, guard.throttled)
         muted = "Connections muted because they sent too much without an admitted call."
         yield _counter("connections_muted", muted, guard.muted)
 

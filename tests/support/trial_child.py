@@ -23,5 +23,8 @@ def main(how: str, what: str) -> None:
             ctypes.PyDLL(None).sleep(60)
         case "nonsense":
             print("no JSON")
+        case "flood":
+            while True:
+                print(what * 1000)
         case _:
             raise ValueError(how)

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 from google.protobuf.message import Message
 
+from common.errors import DomainError
 from common.interceptors import Call, RpcContext
 from gateway.access.address_prefix import address_prefix
 from gateway.access.credential import Principal
@@ -53,15 +54,17 @@ class CallContext(Call):
         method: as the schema describes it.
         peer: where the call comes from.
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
+        refusal: why `Auth` refuses the call, while the refusal is delayed and after; None otherwise.
         request: the newest message of the caller; None before the first.
         responded: whether a message has left for the caller.
         response: the newest message to the caller, of control actions alone; serialised or not.
     """
 
-    __slots__ = ("peer", "principal", "request", "responded", "response")
+    __slots__ = ("peer", "principal", "refusal", "request", "responded", "response")
 
     method: Method
     principal: Principal | None
+    refusal: DomainError | None
     request: Message | None
     response: Message | bytes | None
 
@@ -69,6 +72,7 @@ class CallContext(Call):
         super().__init__(method, rpc)
         self.peer = peer_of(rpc.peer())
         self.principal = None
+        self.refusal = None
         self.request = None
         self.responded = False
         self.response = None

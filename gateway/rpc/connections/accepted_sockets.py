@@ -20,6 +20,10 @@ _BYTES_RECEIVED: Final = struct.Struct("128xQ")
 """tcpi_bytes_received in struct tcp_info (linux/tcp.h, since 4.1)."""
 _SO_ATTACH_FILTER: Final = 26
 """asm-generic/socket.h; Python's socket module does not have it."""
+_SO_MAX_PACING_RATE: Final = 47
+"""asm-generic/socket.h, since 3.13; TCP paces by itself since 4.13, whatever the queueing discipline."""
+UNLIMITED: Final = 0xFFFF_FFFF
+"""The rate of a connection that is not throttled."""
 _DROP_ALL: Final = ctypes.create_string_buffer(struct.pack("=HBBI", 0x06, 0, 0, 0))
 """One instruction of classic BPF, `ret 0`: the kernel keeps no byte of any packet."""
 _FILTER: Final = struct.pack("@HP", 1, ctypes.addressof(_DROP_ALL))
@@ -73,11 +77,20 @@ class AcceptedSockets:
             return True
         return False
 
+    def throttle(self, address: str, bytes_per_s: int) -> None:
+        """Bounds the rate at which this peer is answered, until it is called again with UNLIMITED.
+
+        A peer that waits for answers before it calls again is slowed down by it, at no cost.
+        """
+        with suppress(OSError), self._connection(address) as connection:
+            rate = struct.pack("=I", bytes_per_s)
+            connection.setsockopt(socket.SOL_SOCKET, _SO_MAX_PACING_RATE, rate)
+
     def mute(self, address: str) -> bool:
-        """Has the kernel drop every further packet of this peer, and returns whether it was still there.
+        """Has the kernel drop every further packet of this peer, and returns whether it does.
 
         Unlike a peer whose connection is closed, it does not connect again before it has noticed. gRPC closes
-        the connection when a keepalive ping stays unanswered.
+        the connection when a keepalive ping stays unanswered. Some kernels permit it to root alone.
         """
         with suppress(OSError), self._connection(address) as connection:
             connection.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, _FILTER)

@@ -145,6 +145,11 @@ class Admission:
         connection.admitted = True
         self._places[prefix] += 1
 
+    def has_place(self, peer: Peer) -> bool:
+        """Returns whether the connection has a place, or needs none."""
+        connection = self._connections.get(peer.address)
+        return connection is None or connection.admitted
+
     def dismiss(self, peer: Peer) -> None:
         """Takes the connection's place away, after a credential was invalid."""
         connection = self._connections.get(peer.address)

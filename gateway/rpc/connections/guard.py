@@ -1,12 +1,13 @@
-"""Closes connections that take room without making calls that are admitted, and mutes those that flood."""
+"""Closes connections that make no call that is admitted, throttles those that flood, and mutes the worst."""
 
 import asyncio
 import logging
 import math
 import time
+from dataclasses import dataclass, replace
 from typing import Final, NoReturn
 
-from gateway.rpc.connections.accepted_sockets import AcceptedSockets
+from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import Admission
 
 _log = logging.getLogger(__name__)
@@ -15,9 +16,29 @@ SCAN_EVERY_S: Final = 0.1
 """What is accepted in between is bounded by the server's limit of connections."""
 PENDING_BYTES: Final = 1_048_576
 """What a pending connection may send: a few of the largest requests, or thousands of small ones."""
+UNTHROTTLED_BYTES: Final = 65_536
+"""What it may send until it is answered slowly: hundreds of calls."""
+THROTTLED_BYTES_PER_S: Final = 1024
+"""Some ten refusals a second."""
 _LOG_EVERY_S: Final = 10.0
-_PLACED: Final = 0.0
-"""Limit of a connection that has a place, until it loses that: none."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Watched:
+    """What is known of a connection.
+
+    Attributes:
+        before: bytes that it had sent when it became pending.
+    """
+
+    before: int = 0
+    throttled: bool = False
+    cut_off: bool = False
+
+
+_FRESH: Final = _Watched()
+_PLACED: Final = _Watched()
+"""Of a connection that has a place."""
 
 
 class ConnectionGuard:
@@ -29,6 +50,7 @@ class ConnectionGuard:
     Attributes:
         open: connections at the last look.
         closed: connections that were closed here since the start.
+        throttled: connections that were throttled here since the start.
         muted: connections that were muted here since the start.
     """
 
@@ -36,9 +58,10 @@ class ConnectionGuard:
         self._admission = admission
         self.open = 0
         self.closed = 0
+        self.throttled = 0
         self.muted = 0
-        self._limits: dict[str, float] = {}
-        """Bytes that a connection may have sent until it is muted, by address."""
+        self._watched: dict[str, _Watched] = {}
+        """By address."""
         self._logged_s = -math.inf
 
     async def run(self, port: int) -> NoReturn:
@@ -52,36 +75,50 @@ class ConnectionGuard:
                 # No descriptors are left; the server's limit keeps connections from being the cause.
                 self._log(logging.ERROR, f"connections can't be examined: {error}")
                 continue
+            done = self.closed + self.throttled + self.muted
             closed = sum(sockets.close(address) for address in self._admission.surplus(present))
-            muted = sum(sockets.mute(address) for address in self.flooding(sockets, present))
             self.open = len(present) - closed
             self.closed += closed
-            self.muted += muted
-            if closed or muted:
+            self.restrain(sockets, present)
+            if self.closed + self.throttled + self.muted > done:
                 self._log(
                     logging.WARNING,
                     f"of connections without an admitted call, {self.closed} were closed since the start, "
-                    f"and {self.muted} were muted because they sent too much; {self.open} are open",
+                    f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
+                    f"{self.open} are open",
                 )
 
-    def flooding(self, sockets: AcceptedSockets, present: list[str]) -> list[str]:
-        """Returns the pending connections that have sent more than PENDING_BYTES while they were pending."""
+    def restrain(self, sockets: AcceptedSockets, present: list[str]) -> None:
+        """Throttles pending connections that have sent much, and cuts off those that have sent too much."""
         pending = set(self._admission.pending())
-        limits: dict[str, float] = {}
-        flooding = []
+        watched: dict[str, _Watched] = {}
         for address in present:
+            state = self._watched.get(address, _FRESH)
             if address not in pending:
-                limits[address] = _PLACED
+                if state.throttled:
+                    sockets.throttle(address, UNLIMITED)
+                watched[address] = _PLACED
                 continue
-            received, limit = sockets.received_bytes(address), self._limits.get(address, PENDING_BYTES)
-            if limit == _PLACED:
-                limit = received + PENDING_BYTES
-            elif received > limit:
-                limit = math.inf
-                flooding.append(address)
-            limits[address] = limit
-        self._limits = limits
-        return flooding
+            received = sockets.received_bytes(address)
+            if state is _PLACED:
+                state = _Watched(received)
+            sent = received - state.before
+            if sent > PENDING_BYTES and not state.cut_off:
+                self._cut_off(sockets, address)
+                state = replace(state, cut_off=True)
+            elif sent > UNTHROTTLED_BYTES and not state.throttled:
+                sockets.throttle(address, THROTTLED_BYTES_PER_S)
+                self.throttled += 1
+                state = replace(state, throttled=True)
+            watched[address] = state
+        self._watched = watched
+
+    def _cut_off(self, sockets: AcceptedSockets, address: str) -> None:
+        """Mutes the connection, or closes it where the kernel does not permit that."""
+        if sockets.mute(address):
+            self.muted += 1
+        elif sockets.close(address):
+            self.closed += 1
 
     def _log(self, level: int, message: str) -> None:
         """Logs a message, unless there was one lately: attackers must not fill the log."""

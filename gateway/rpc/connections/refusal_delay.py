@@ -13,9 +13,9 @@ REFUSAL_DELAY_S: Final = 0.5
 """Minimum delay of a refusal."""
 REFUSAL_SPACING_S: Final = 0.005
 """Minimum spacing of delayed refusals, over all connections."""
-_MAX_DELAYED: Final = 1024
-"""Refusals that are delayed at once, the last of them for 5.6 s, each of some 25 KiB: all that four
-connections can have open. Any more leave at once."""
+_MAX_DELAYED: Final = 512
+"""Refusals that are delayed at once, the last of them for 3.1 s, each of some 25 KiB: all that two
+connections can have open. Any more leave at once, as fast as their connection is answered (guard.py)."""
 _LONGEST_DELAY_S: Final = REFUSAL_DELAY_S + _MAX_DELAYED * REFUSAL_SPACING_S
 """Also behind refusals whose callers have left, whose turns are not given back."""
 

@@ -65,9 +65,11 @@ class Audit(Interceptor[CallContext]):
     def on_end(self, call: CallContext, error: BaseException | None) -> None:
         """Records how the action ended.
 
-        Left out are refusals for a rate or a lockout, and calls that ended before they were admitted: a
-        caller that leaves while it is authenticated has done nothing.
+        Left out are refusals for a rate or a lockout, and calls that ended before they were admitted or
+        refused: a caller that leaves while it is authenticated has done nothing.
         """
+        if isinstance(error, asyncio.CancelledError | GeneratorExit) and call.refusal:
+            error = call.refusal  # the caller has left while it was delayed
         if error is None:
             self._record(call, ControlResult.ACCEPTED, _answer(call))
         elif isinstance(error, TooMuchError) and error.reason is not Reason.MESSAGE_TOO_LARGE:

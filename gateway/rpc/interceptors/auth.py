@@ -89,6 +89,7 @@ class Auth(Interceptor[CallContext]):
             self._admission.admit(call.peer)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
+            call.refusal = error
             await self._refusals.refuse(error)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
@@ -146,6 +147,9 @@ class Auth(Interceptor[CallContext]):
 
     def _dismiss(self, call: CallContext) -> None:
         """Takes the connection's place away, unless a stream of a valid caller is open on it."""
+        # A stranger's has none, and is not searched for: there may be thousands of such calls a second.
+        if not self._admission.has_place(call.peer):
+            return
         address = call.peer.address
         if not any(each.peer.address == address for each in self._streams):
             self._admission.dismiss(call.peer)

@@ -46,6 +46,13 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert services[name]["pids_limit"] <= 256
 
 
+@pytest.mark.parametrize("overlay", [each for each in OVERLAYS if each != "demo"])
+def test_the_gateway_hears_its_own_machines_graph_alone(overlay: str) -> None:
+    """The demo's containers are machines to each other, on a network of their own."""
+    environment = config(overlay)["services"]["gateway"]["environment"]
+    assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+
+
 def test_video_yields_to_the_mission() -> None:
     services = config()["services"]
     assert services["preview"]["cpu_shares"] < 1024

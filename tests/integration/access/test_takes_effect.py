@@ -3,6 +3,7 @@
 import asyncio
 import json
 import ssl
+import threading
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from common.reasons import Reason
 from console.client.refusal import refusal_in
+from gateway.access import reloader
 from gateway.access.credential import Kind
 from gateway.access.repeats import BURST
 from gateway.access.role import Role
@@ -294,6 +296,42 @@ async def test_a_list_that_stays_unreadable_admits_none_until_it_is_readable(
         await until(serving, True)
 
 
+async def test_a_disk_that_hangs_admits_none_until_it_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reads do not fail there, they do not end."""
+    monkeypatch.setattr("gateway.access.reloader.CLOSED_AFTER_S", 1.0)
+    monkeypatch.setattr("gateway.access.reloader.UNKNOWN_WITHIN_S", 0.2)
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    answers = threading.Event()
+    answers.set()
+    signature = reloader._signature
+
+    def slow_signature(path: Path) -> tuple[int, ...]:
+        answers.wait(30)
+        return signature(path)
+
+    monkeypatch.setattr("gateway.access.reloader._signature", slow_signature)
+    async with guarded_gateway(robot):
+        calls = stub(robot)
+        stream = calls.WatchSystemStatus(WatchSystemStatusRequest(), metadata=login.metadata())
+        await stream.read()
+        answers.clear()
+        try:
+            assert await ping(calls, login) == ""
+            with pytest.raises(grpc.aio.AioRpcError) as caught:
+                await asyncio.wait_for(to_its_end(stream), 10)
+            assert refusal_in(caught.value.trailing_metadata()).reason == Reason.CREDENTIALS_UNREADABLE
+            assert await ping(calls, login) == Reason.CREDENTIALS_UNREADABLE
+            assert await ping(calls, Login(new_token("0" * 12).text())) == Reason.CREDENTIAL_UNKNOWN, (
+                "it is not kept waiting"
+            )
+        finally:
+            answers.set()
+        await until(lambda: ping(calls, login), "")
+
+
 async def test_certificates_near_their_end_are_faults(tmp_path: Path) -> None:
     robot = new_robot(tmp_path)
     _, login = robot.add(Role.VIEWER)
@@ -351,6 +389,17 @@ async def test_every_control_action_is_recorded_whoever_tries(tmp_path: Path) ->
         assert each["time"].endswith("+00:00")
     for file in (robot.audit_file, robot.refused_file):
         assert file.stat().st_mode & 0o777 == 0o600
+
+
+async def test_a_stranger_that_hangs_up_before_its_refusal_is_recorded(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    async with guarded_gateway(robot):
+        with pytest.raises(grpc.aio.AioRpcError):  # sooner than a refusal leaves
+            await stub(robot).SetPreviewMode(
+                SetPreviewModeRequest(enabled=True), metadata=NOTHING.metadata(), timeout=0.2
+            )
+    [record] = records_of(robot.refused_file)
+    assert (record["who"], record["action"], record["result"]) == ("", "SetPreviewMode", "refused")
 
 
 async def test_operators_see_who_was_refused_and_a_flood_by_its_number(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from common.rpc import new_server
 from console.client import NotAllowed
 from gateway.access.role import Role
 from gateway.rpc.calls.call import peer_of
-from gateway.rpc.connections.accepted_sockets import AcceptedSockets
+from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import MAX_PENDING
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, WatchSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
@@ -185,6 +185,32 @@ def test_only_connections_of_the_port_are_found_and_closed() -> None:
             assert client.recv(1) == b""
             bystander.sendall(b"x")
             assert untouched.recv(1) == b"x"
+
+
+def test_a_throttled_peer_is_answered_slowly_until_it_is_released() -> None:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        socket.create_connection(server.getsockname(), timeout=0.3) as peer,
+    ):
+        accepted, _ = server.accept()
+        with accepted:
+            sockets = AcceptedSockets(server.getsockname()[1])
+            (address,) = sockets.scan()
+            sockets.throttle(address, 1000)
+            for _ in range(10):  # the kernel does not pace these
+                accepted.sendall(b"x" * 1000)
+                peer.recv(4000)
+            accepted.sendall(b"x" * 1000)
+            with pytest.raises(TimeoutError):
+                peer.recv(4000)
+            sockets.throttle(address, UNLIMITED)
+            peer.settimeout(5)
+            assert peer.recv(4000)
+            began_s = time.monotonic()
+            for _ in range(10):
+                accepted.sendall(b"x" * 1000)
+                assert peer.recv(4000)
+            assert time.monotonic() - began_s < 5, "ten seconds at the old rate"
 
 
 def test_a_muted_peer_is_not_heard_any_more() -> None:

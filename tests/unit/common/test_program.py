@@ -1,4 +1,4 @@
-"""Programs run with as many descriptors as they may have."""
+"""Programs run with as many descriptors as they may have, and with few arenas."""
 
 import subprocess
 import sys
@@ -18,3 +18,29 @@ run(main)
 def test_the_soft_limit_of_descriptors_is_raised_to_the_hard_one() -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["512", "512"]
+
+
+ARENAS = """
+import ctypes, threading
+from common.program import bound_arenas
+
+bound_arenas()
+c = ctypes.CDLL(None)
+c.malloc.restype = ctypes.c_void_p
+ready = threading.Barrier(9)
+
+def allocate() -> None:
+    c.malloc(100_000)
+    ready.wait()
+
+for _ in range(8):
+    threading.Thread(target=allocate, daemon=True).start()
+ready.wait()
+c.malloc_info(0, ctypes.c_void_p.in_dll(c, "stdout"))
+c.fflush(None)
+"""
+
+
+def test_threads_share_two_arenas() -> None:
+    done = subprocess.run([sys.executable, "-c", ARENAS], capture_output=True, text=True, check=True)
+    assert done.stdout.count("<heap nr=") <= 2

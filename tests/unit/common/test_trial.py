@@ -61,6 +61,12 @@ async def test_a_child_that_hangs_is_killed_at_its_deadline() -> None:
     assert await outcome("hang", "x", timeout_s=1) == "it hung: no result within 1 s; passing"
 
 
+async def test_a_child_that_prints_without_end_is_killed() -> None:
+    began_s = time.monotonic()
+    assert await outcome("flood", "x") == "its trial printed more than 64 KiB"
+    assert time.monotonic() - began_s < 10, "long before its deadline"
+
+
 async def test_a_process_that_can_not_be_started_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/not/there")
     assert await outcome("report", "7") == "its trial can't be started: No such file or directory; passing"

@@ -2,14 +2,18 @@
 
 import ssl
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
 from common.errors import UserError
 from gateway.access.ca import (
+    KeyPair,
     certificate_info,
     issue_client_certificate,
     issue_server_certificate,
@@ -78,21 +82,24 @@ def test_an_invalid_host_is_one_line() -> None:
         issue_server_certificate(CA, "lab", ("läb",), 1)
 
 
-VERSION = bytes.fromhex("a003020102")
-"""X.509 version 3 (RFC 5280 4.1.2.1)."""
-BASIC_CONSTRAINTS, KEY_USAGE = bytes.fromhex("0603551d13"), bytes.fromhex("0603551d0f")
-"""Identifiers of extensions that every CA certificate has here (RFC 5280 4.2.1)."""
-
-
-@pytest.mark.parametrize(
-    ("original", "replacement"),
-    [
-        pytest.param(KEY_USAGE, BASIC_CONSTRAINTS, id="one extension twice"),
-        pytest.param(VERSION, VERSION[:-1] + b"\x09", id="a version that does not exist"),
-    ],
-)
-def test_a_certificate_that_breaks_the_standard_is_a_value_error(original: bytes, replacement: bytes) -> None:
-    der = ssl.PEM_cert_to_DER_cert(CA.certificate.decode())
-    assert der.count(original) == 1
-    with pytest.raises(ValueError, match="certificate"):
-        certificate_info(ssl.DER_cert_to_PEM_cert(der.replace(original, replacement)).encode())
+def test_a_malformed_certificate_is_refused_as_such() -> None:
+    """An extension twice, which is noticed when extensions are read, and an unknown version (RFC 5280 4)."""
+    oid = x509.ObjectIdentifier("2.5.29.99")
+    key, name = ec.generate_private_key(ec.SECP256R1()), x509.Name([])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder(name, name, key.public_key(), 1, now, now + timedelta(days=1))
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .add_extension(x509.UnrecognizedExtension(oid, b"\x04\x00"), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    der = certificate.public_bytes(serialization.Encoding.DER)
+    twice = der.replace(b"\x06\x03\x55\x1d\x63", b"\x06\x03\x55\x1d\x0e")
+    unknown = der.replace(b"\xa0\x03\x02\x01\x02", b"\xa0\x03\x02\x01\x22")
+    assert certificate_info(ssl.DER_cert_to_PEM_cert(der).encode())
+    for malformed in (twice, unknown):
+        assert malformed != der
+        with pytest.raises(ValueError, match=r"Duplicate|version"):
+            certificate_info(ssl.DER_cert_to_PEM_cert(malformed).encode())
+    with pytest.raises(ValueError, match="version"):
+        key_matches(KeyPair(ssl.DER_cert_to_PEM_cert(unknown).encode(), CA.key))

@@ -75,7 +75,8 @@ class World:
     failures = 3
     open = 12
     closed = 34
-    muted = 35
+    throttled = 35
+    muted = 36
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -152,7 +153,8 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_event_gaps_total", ""] == 1
     assert shown["robot_gateway_connections", ""] == 12
     assert shown["robot_gateway_connections_closed_total", ""] == 34
-    assert shown["robot_gateway_connections_muted_total", ""] == 35
+    assert shown["robot_gateway_connections_throttled_total", ""] == 35
+    assert shown["robot_gateway_connections_muted_total", ""] == 36
 
 
 def test_the_robot_and_its_sources() -> None:

@@ -1,81 +1,135 @@
-"""Which connections the guard mutes: pending ones that have sent too much."""
+"""Which connections the guard throttles, and which it cuts off: pending ones that have sent too much."""
 
 from typing import Any
 
+import pytest
+
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer, peer_of
+from gateway.rpc.connections.accepted_sockets import UNLIMITED
 from gateway.rpc.connections.admission import Admission
-from gateway.rpc.connections.guard import PENDING_BYTES, ConnectionGuard
+from gateway.rpc.connections.guard import (
+    PENDING_BYTES,
+    THROTTLED_BYTES_PER_S,
+    UNTHROTTLED_BYTES,
+    ConnectionGuard,
+)
 
 STRANGER, OPERATOR = "10.0.0.1:1000", "10.0.0.2:1000"
+THROTTLED, RELEASED = (STRANGER, THROTTLED_BYTES_PER_S), (STRANGER, UNLIMITED)
 
 
 class Sockets:
-    """Connections that have sent so many bytes."""
+    """Connections that have sent so many bytes, and what was done to them."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, mutes: bool = True) -> None:
         self.received = {STRANGER: 0, OPERATOR: 0}
+        self.throttled: list[tuple[str, int]] = []
+        self.muted: list[str] = []
+        self.closed: list[str] = []
+        self._mutes = mutes
 
     def received_bytes(self, address: str) -> int:
         return self.received[address]
+
+    def throttle(self, address: str, bytes_per_s: int) -> None:
+        self.throttled.append((address, bytes_per_s))
+
+    def mute(self, address: str) -> bool:
+        if self._mutes:
+            self.muted.append(address)
+        return self._mutes
+
+    def close(self, address: str) -> bool:
+        self.closed.append(address)
+        return True
 
 
 class Ground:
     """A guard, an account with an operator in it, and connections without a kernel."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, mutes: bool = True) -> None:
         self.admission = Admission(LimitSettings())
-        self.sockets = Sockets()
-        self._guard = ConnectionGuard(self.admission)
-        self.admission.take_token(peer(OPERATOR))
-        self.admission.admit(peer(OPERATOR))
+        self.sockets = Sockets(mutes=mutes)
+        self.guard = ConnectionGuard(self.admission)
+        self.admit(OPERATOR)
 
-    def flooding(self) -> list[str]:
+    def admit(self, address: str) -> None:
+        self.admission.take_token(peer(address))
+        self.admission.admit(peer(address))
+
+    def look(self, **received: int) -> None:
+        self.sockets.received.update({globals()[name]: count for name, count in received.items()})
         present = list(self.sockets.received)
         sockets: Any = self.sockets
         self.admission.surplus(present)
-        return self._guard.flooding(sockets, present)
+        self.guard.restrain(sockets, present)
+
+
+@pytest.fixture
+def ground() -> Ground:
+    return Ground()
 
 
 def peer(address: str) -> Peer:
     return peer_of(f"ipv4:{address}")
 
 
-def test_a_stranger_is_muted_once_beyond_its_bytes() -> None:
-    ground = Ground()
-    ground.sockets.received[STRANGER] = PENDING_BYTES
-    assert ground.flooding() == []
-    ground.sockets.received[STRANGER] += 1
-    assert ground.flooding() == [STRANGER]
-    ground.sockets.received[STRANGER] *= 2
-    assert ground.flooding() == []
+def test_a_stranger_is_throttled_once_beyond_its_bytes(ground: Ground) -> None:
+    ground.look(STRANGER=UNTHROTTLED_BYTES)
+    assert ground.sockets.throttled == []
+    ground.look(STRANGER=UNTHROTTLED_BYTES + 1)
+    ground.look(STRANGER=2 * UNTHROTTLED_BYTES)
+    assert ground.sockets.throttled == [THROTTLED]
+    assert ground.guard.throttled == 1
 
 
-def test_an_operator_may_send_as_much_as_it_likes() -> None:
-    ground = Ground()
-    ground.sockets.received[OPERATOR] = 100 * PENDING_BYTES
-    assert ground.flooding() == []
+def test_it_is_answered_at_full_speed_once_it_is_admitted(ground: Ground) -> None:
+    ground.look(STRANGER=2 * UNTHROTTLED_BYTES)
+    ground.admit(STRANGER)
+    ground.look()
+    ground.look()
+    assert ground.sockets.throttled == [THROTTLED, RELEASED]
 
 
-def test_what_was_sent_before_access_was_lost_does_not_count() -> None:
-    ground = Ground()
-    ground.sockets.received[OPERATOR] = 100 * PENDING_BYTES
-    ground.flooding()
+def test_a_stranger_is_muted_once_beyond_many_more(ground: Ground) -> None:
+    ground.look(STRANGER=PENDING_BYTES)
+    assert ground.sockets.muted == []
+    ground.look(STRANGER=PENDING_BYTES + 1)
+    ground.look(STRANGER=2 * PENDING_BYTES)
+    assert ground.sockets.muted == [STRANGER]
+    assert (ground.guard.muted, ground.guard.closed, ground.sockets.closed) == (1, 0, [])
+
+
+def test_where_the_kernel_does_not_permit_it_the_stranger_is_cut_off() -> None:
+    ground = Ground(mutes=False)
+    ground.look(STRANGER=PENDING_BYTES + 1)
+    ground.look()
+    assert ground.sockets.closed == [STRANGER]
+    assert (ground.guard.muted, ground.guard.closed) == (0, 1)
+
+
+def test_an_operator_may_send_as_much_as_it_likes(ground: Ground) -> None:
+    ground.look(OPERATOR=100 * PENDING_BYTES)
+    assert (ground.sockets.throttled, ground.sockets.muted) == ([], [])
+
+
+def test_what_was_sent_before_access_was_lost_does_not_count(ground: Ground) -> None:
+    before = 100 * PENDING_BYTES
+    ground.look(OPERATOR=before)
     ground.admission.dismiss(peer(OPERATOR))
-    assert ground.flooding() == []
-    ground.sockets.received[OPERATOR] += PENDING_BYTES
-    assert ground.flooding() == []
-    ground.sockets.received[OPERATOR] += 1
-    assert ground.flooding() == [OPERATOR]
+    ground.look(OPERATOR=before)
+    ground.look(OPERATOR=before + UNTHROTTLED_BYTES)
+    assert (ground.sockets.throttled, ground.sockets.muted) == ([], [])
+    ground.look(OPERATOR=before + PENDING_BYTES + 1)
+    assert ground.sockets.muted == [OPERATOR]
 
 
-def test_another_connection_of_the_same_address_begins_anew() -> None:
-    ground = Ground()
-    ground.sockets.received[STRANGER] = PENDING_BYTES + 1
-    assert ground.flooding() == [STRANGER]
+def test_another_connection_of_the_same_address_begins_anew(ground: Ground) -> None:
+    ground.look(STRANGER=PENDING_BYTES + 1)
     del ground.sockets.received[STRANGER]
-    ground.flooding()
-    ground.sockets.received[STRANGER] = PENDING_BYTES
-    assert ground.flooding() == []
-    ground.sockets.received[STRANGER] += 1
-    assert ground.flooding() == [STRANGER]
+    ground.look()
+    ground.look(STRANGER=PENDING_BYTES)
+    assert ground.sockets.muted == [STRANGER]
+    ground.look(STRANGER=PENDING_BYTES + 1)
+    assert ground.sockets.muted == [STRANGER, STRANGER]

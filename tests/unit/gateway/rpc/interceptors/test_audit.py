@@ -231,6 +231,25 @@ async def test_a_caller_that_leaves_before_it_is_authenticated_has_done_nothing(
     assert ground.records.events == []
 
 
+class LeavingWhileRefused(Interceptor[CallContext]):
+    """In the place of Auth, while it delays a refusal: the caller leaves meanwhile."""
+
+    def on_call(self, call: CallContext) -> None:
+        call.refusal = NotAuthenticatedError("the token is unknown", Reason.CREDENTIAL_UNKNOWN)
+        raise asyncio.CancelledError
+
+
+async def test_a_caller_that_leaves_before_its_refusal_is_recorded_and_folded() -> None:
+    ground = Ground()
+    for _ in range(BURST + 5):
+        with pytest.raises(asyncio.CancelledError):
+            await serve([ground.audit, LeavingWhileRefused(), Validation(10_000)], "SetPreviewMode", None)
+    assert ground.records.actions == []
+    assert [each.answer for each in ground.refused.actions] == ["the token is unknown"] * BURST
+    ground.audit.record_all()
+    assert sum(each.count for each in ground.refused.actions) == BURST + 5
+
+
 @pytest.mark.parametrize("refused", [True, False])
 async def test_a_flood_fills_neither_log_nor_events_and_is_recorded_by_its_number(
     refused: bool,

@@ -1,0 +1,66 @@
+"""A viewer's token that calls as fast as it can: it is held to its share, and an operator does not notice."""
+
+import asyncio
+from contextlib import AsyncExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import grpc
+
+from common.reasons import Reason
+from console.client.refusal import refusal_in
+from gateway.access.role import Role
+from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, SetPreviewModeRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.detour import detour
+from tests.support.guarded_gateway import Login, guarded_gateway, new_robot
+
+LIMITS = {"requests_per_s": 20, "burst": 20, "connections": 8, "connections_per_address": 4}
+LOGINS = 3
+AT_ONCE = 20
+
+
+async def flood(stub: Any, login: Login, ends: asyncio.Event) -> tuple[int, set[str]]:
+    """Twenty calls at a time; how many were answered, and why the others were not."""
+    answered, reasons = 0, set()
+
+    async def call() -> None:
+        nonlocal answered
+        try:
+            await stub.GetSystemStatus(GetSystemStatusRequest(), metadata=login.metadata(), timeout=10)
+            answered += 1
+        except grpc.aio.AioRpcError as error:
+            reasons.add(refusal_in(error.trailing_metadata()).reason or error.code().name)
+
+    while not ends.is_set():
+        await asyncio.gather(*(call() for _ in range(AT_ONCE)))
+    return answered, reasons
+
+
+async def test_a_viewer_that_floods_takes_its_share_and_no_operators(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, viewer = robot.add(Role.VIEWER, name="ben")
+    _, operator = robot.add(Role.OPERATOR)
+    async with guarded_gateway(robot, limits=LIMITS) as robot, AsyncExitStack() as stack:
+        port = await stack.enter_async_context(detour("127.0.0.2", robot.port))
+        ends, elsewhere = asyncio.Event(), replace(robot, port=port)
+        # More connections than one address may have.
+        floods = [
+            asyncio.create_task(flood(RobotGatewayStub(elsewhere.channel()), viewer, ends)) for _ in range(6)
+        ]
+        began_s = asyncio.get_running_loop().time()
+        for _ in range(LOGINS):
+            calls: Any = RobotGatewayStub(robot.channel())
+            for _ in range(5):
+                switch = SetPreviewModeRequest(enabled=False)
+                assert await calls.SetPreviewMode(switch, metadata=operator.metadata(), timeout=5)
+                await asyncio.sleep(0.1)
+        took_s = asyncio.get_running_loop().time() - began_s
+        ends.set()
+        found = await asyncio.gather(*floods)
+    answered = sum(count for count, _ in found)
+    reasons = set().union(*(each for _, each in found))
+    assert reasons == {Reason.TOO_MANY_REQUESTS, Reason.TOO_MANY_CONNECTIONS}
+    share = LIMITS["connections_per_address"] * (LIMITS["burst"] + LIMITS["requests_per_s"] * (took_s + 2))
+    assert 0 < answered <= share
