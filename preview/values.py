@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Final
 
 from preview.lifecycle import Counters, State
+
+CAPTURE_OFFSET_NS: Final = -3_600 * 1_000_000_000
+"""Capture time on CLOCK_MONOTONIC minus PTS: mpegtsmux adds an hour (TS_MUX_CLOCK_BASE), so that no DTS is
+negative. pipeline/capture_clock.py makes it true."""
 
 
 class Profile(Enum):

@@ -19,7 +19,7 @@ from typing import Any, Final
 from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
-from preview.pipeline import builder, faults, statistics
+from preview.pipeline import builder, capture_clock, faults, statistics
 from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
@@ -86,7 +86,8 @@ class Runner:
         self._loop.add_reader(self._bus_fd, self._read_bus)
         pipeline = self._parts.pipeline
         try:
-            outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
+            start = partial(capture_clock.play, pipeline, self._parts.source)
+            outcome = await in_thread(start, self._timeouts.start_s)
         except TimeoutError:
             self._fail(faults.blocked(self._parts, self.plan, self._timeouts.start_s))
             return
