@@ -133,6 +133,7 @@ class ActualState:
         address: where viewers reach the listener: as bound, or as its container's port is published.
         port: UDP port of the listener.
         latency_ms: SRT latency of the listener (SRTO_LATENCY).
+        capture_offset_ns: capture time minus PTS, of every stream.
         stream: None while no pipeline exists.
         encoder: None while no pipeline exists.
         measurement: None before the end of the first window.
@@ -147,6 +148,7 @@ class ActualState:
     address: str
     port: int
     latency_ms: int
+    capture_offset_ns: int
     stream: StreamState | None = None
     encoder: EncoderChoice | None = None
     measurement: Measurement | None = None
