@@ -101,15 +101,19 @@ def errors_ms(preview: RunningPreview, directory: Path) -> list[float]:
 
 
 def is_true(preview: RunningPreview, directory: Path, what: str) -> None:
-    """Judges the median: on a busy machine the shared memory is read late, and stamped when it is read."""
+    """Judges the frames that were handed over soonest, the 5th percentile.
+
+    An error of the mapping is in every frame. What a busy machine adds is not: it copies and reads the shared
+    memory late, and a frame is stamped when it is read.
+    """
 
     def error_ms() -> float:
         found = errors_ms(preview, directory)
-        typical, most = statistics.median(found), statistics.quantiles(found, n=20)[-1]
-        print(f"{what}: {len(found)} frames, median {typical:.2f} ms, 95 % within {most:.2f} ms")
+        soonest, half, most = (statistics.quantiles(found, n=20)[at] for at in (0, 9, 18))
+        print(f"{what}: {len(found)} frames, {soonest:.2f}, {half:.2f}, {most:.2f} ms (5, 50, 95 %)")
         assert len(found) > RECORD_S * 10
         assert min(found) > -WITHIN_MS, "captured before its stamp"
-        return statistics.median(found)
+        return soonest
 
     keeps(WITHIN_MS, f"ms after the stamp, {what}", error_ms)
 
