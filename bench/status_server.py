@@ -137,6 +137,11 @@ class _PreviewInMemory:
     async def apply(self, _desired: Desired[PreviewSpec]) -> PreviewReport:
         return _RUNNING
 
+    async def request_key_frame(self, _newest_pts: int | None) -> bool:
+        return True
+
+    async def report_picture_age(self, _age_ms: int) -> None: ...
+
 
 def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
     """Returns the reference methods: they do nothing but answer."""

@@ -97,6 +97,12 @@ class TooMuchError(DomainError):
         self.retry_after_s = retry_after_s
 
 
+class NotRunningError(DomainError):
+    """The preview is not running: there is no stream to act on."""
+
+    reason = Reason.PREVIEW_NOT_RUNNING
+
+
 class NotAuthenticatedError(DomainError):
     """The caller is not authenticated: no credential, or one that is not valid.
 

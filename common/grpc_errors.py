@@ -16,6 +16,7 @@ from common.errors import (
     InvalidRequestError,
     NotAllowedError,
     NotAuthenticatedError,
+    NotRunningError,
     TooMuchError,
     UnknownServiceError,
 )
@@ -29,6 +30,7 @@ STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
     NotAllowedError: grpc.StatusCode.PERMISSION_DENIED,
+    NotRunningError: grpc.StatusCode.FAILED_PRECONDITION,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
     DefectError: grpc.StatusCode.INTERNAL,

@@ -13,6 +13,8 @@ class Reason(StrEnum):
     """The request is invalid; google.rpc.BadRequest names the fields."""
     UNKNOWN_SERVICE = "UNKNOWN_SERVICE"
     """The health service knows no service of that name."""
+    PREVIEW_NOT_RUNNING = "PREVIEW_NOT_RUNNING"
+    """The preview is not running, and the request makes sense only while it is."""
     MESSAGE_TOO_LARGE = "MESSAGE_TOO_LARGE"
     """The request exceeds the gateway's size limit."""
     TOO_MANY_CONNECTIONS = "TOO_MANY_CONNECTIONS"

@@ -43,6 +43,14 @@ _SEEDS: Final = {
             enabled=True, profile=preview_pb2.PREVIEW_PROFILE_LOW_BW
         ).SerializeToString(),
         robot_gateway_pb2.WatchSystemStatusRequest(min_interval_ms=100).SerializeToString(),
+        robot_gateway_pb2.RequestKeyFrameRequest(newest_pts=1 << 32).SerializeToString(),
+        robot_gateway_pb2.ReportPictureRequest(
+            viewer_id="left",
+            picture_age_ms=140,
+            rtt_ms=20,
+            loss_percent=2.5,
+            delivery=preview_pb2.PICTURE_DELIVERY_DIRECT,
+        ).SerializeToString(),
     ],
     "gateways_request": [preview_pb.ApplyDesiredStateRequest(desired=_DESIRED_STATE).SerializeToString()],
     "previews_report": [_ACTUAL.SerializeToString()],

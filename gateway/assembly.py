@@ -18,10 +18,10 @@ from common.health import Health
 from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
-from gateway.links.link import Connector, ServiceLink
+from gateway.links.link import ServiceLink
 from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.feedback import Feedback, PreviewServiceConnector
 from gateway.links.preview.model import PreviewModel
-from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.preview.wire import PreviewConnector
 from gateway.links.reconciler import Reconciler
 from gateway.metrics.collector import GatewayCollector
@@ -62,7 +62,7 @@ class Outside(Protocol):
     def feeding(self, board: Board) -> AbstractContextManager[None]:
         """Writes the robot's values to the board while the block lasts."""
 
-    def preview_connector(self) -> Connector[PreviewSpec, PreviewReport]:
+    def preview_connector(self) -> PreviewServiceConnector:
         """Returns what opens connections to the preview service."""
 
 
@@ -95,7 +95,8 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     first_revision = time.clock_gettime_ns(time.CLOCK_BOOTTIME) // 1_000_000
     model = PreviewModel(settings.encrypts_preview, partial(secrets.token_urlsafe, _PASSPHRASE_BYTES))
     name = f"preview service at {settings.preview.socket}"
-    link = ServiceLink(name, outside.preview_connector(), Reconciler(first_revision, model))
+    feedback = Feedback(outside.preview_connector())
+    link = ServiceLink(name, feedback, Reconciler(first_revision, model))
     control = PreviewControl(link, settings.preview.settle_ms / 1000)
     stats = Stats(CONTRACT.methods_by_name)
     state = State(settings, link, stats)
@@ -109,7 +110,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     event_stream = EventStream(state.events, state.event_added)
     services = Services(
         status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
-        preview=PreviewService(control, state, recipients),
+        preview=PreviewService(control, feedback, state, state, recipients),
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
     )

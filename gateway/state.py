@@ -18,6 +18,7 @@ from gateway.status.event import Event
 from gateway.status.event_log import EventLog
 from gateway.status.faults.rules import FaultRules
 from gateway.status.faults.tracker import FaultTracker
+from gateway.status.pictures import NO_PICTURES, PictureReport, PictureReports, Pictures
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Runtime, Snapshot, take
 
@@ -56,6 +57,7 @@ class State:
         )
         self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
         self.event_added = Broadcast()
+        self._pictures = PictureReports()
         self.access: AccessView = UNGUARDED
 
     @property
@@ -72,6 +74,7 @@ class State:
             rules=self._rules,
             board=self.board,
             preview=self._preview_link.view,
+            pictures=self._counting_pictures(now_s),
             events=self.events.newest(),
             faults=self._tracker.faults,
             now_s=now_s,
@@ -95,6 +98,17 @@ class State:
         _log.info("event: %s", event.sentence or event.message)
         self.events.add(event, time.monotonic())
         self.event_added.notify_all()
+
+    def take_picture(self, caller: str, viewer_id: str, report: PictureReport) -> Pictures:
+        """Takes a viewer's report of this instant; returns what all say that count now."""
+        now_s = time.monotonic()
+        self._pictures.take(caller, viewer_id, report, now_s)
+        return self._counting_pictures(now_s)
+
+    def _counting_pictures(self, now_s: float) -> Pictures:
+        """Without a viewer on the stream no report counts: it is of no picture of this robot."""
+        measured = self._preview_link.view.measured
+        return self._pictures.counting(now_s) if measured and measured.value.viewer_count else NO_PICTURES
 
     def _runtime(self, now_s: float) -> Runtime:
         return Runtime(

@@ -44,7 +44,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from common.broadcast import Broadcast
-from common.errors import UserError
+from common.errors import NotRunningError, UserError
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.crash_marker import CrashMarkerFile
@@ -52,7 +52,15 @@ from preview.encoders.selection import Selection
 from preview.lifecycle import Event, Lifecycle, State
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.values import ActualState, DesiredState, EncoderChoice, Measurement, Profile, StreamState
+from preview.values import (
+    CAPTURE_OFFSET_NS,
+    ActualState,
+    DesiredState,
+    EncoderChoice,
+    Measurement,
+    Profile,
+    StreamState,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -84,6 +92,12 @@ class Pipeline(Protocol):
 
     async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
+
+    def request_key_frame(self, newest_pts: int | None) -> bool:
+        """Requests a key frame for a viewer that lost a picture; see `KeyframeGate.request_after_loss`."""
+
+    def take_picture_age(self, age_ms: int) -> None:
+        """Takes the age of the oldest picture that a viewer shows, for the adaptive bit rate."""
 
     async def stop(self) -> "asyncio.Task[bool]":
         """Stops listener and source, and returns the teardown of the encoder; False when that hangs.
@@ -167,10 +181,26 @@ class Supervisor:
             address=self._settings.srt.reached_at,
             port=self._settings.srt.port,
             latency_ms=self._settings.srt.latency_ms,
+            capture_offset_ns=CAPTURE_OFFSET_NS,
             stream=pipeline.stream if pipeline else None,
             encoder=pipeline.plan.choice if pipeline else None,
             measurement=pipeline.measurement if pipeline else None,
         )
+
+    def request_key_frame(self, newest_pts: int | None) -> bool:
+        """Requests a key frame for a viewer that lost a picture; see `Pipeline.request_key_frame`.
+
+        Raises:
+            NotRunningError: no frames leave.
+        """
+        if self._pipeline is None or self._lifecycle.state is not State.RUNNING:
+            raise NotRunningError(f"the preview is {self._lifecycle.state.value}")
+        return self._pipeline.request_key_frame(newest_pts)
+
+    def take_picture_age(self, age_ms: int) -> None:
+        """Takes the age of the oldest picture that a viewer shows; ignored without a pipeline."""
+        if self._pipeline:
+            self._pipeline.take_picture_age(age_ms)
 
     @contextmanager
     def watched(self) -> Iterator[None]:

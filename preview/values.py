@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Final
 
 from preview.lifecycle import Counters, State
+
+CAPTURE_OFFSET_NS: Final = -3_600 * 1_000_000_000
+"""Capture time on CLOCK_MONOTONIC minus PTS: mpegtsmux adds an hour (TS_MUX_CLOCK_BASE), so that no DTS is
+negative. pipeline/capture_clock.py makes it true."""
 
 
 class Profile(Enum):
@@ -128,6 +133,7 @@ class ActualState:
         address: where viewers reach the listener: as bound, or as its container's port is published.
         port: UDP port of the listener.
         latency_ms: SRT latency of the listener (SRTO_LATENCY).
+        capture_offset_ns: capture time minus PTS, of every stream.
         stream: None while no pipeline exists.
         encoder: None while no pipeline exists.
         measurement: None before the end of the first window.
@@ -142,6 +148,7 @@ class ActualState:
     address: str
     port: int
     latency_ms: int
+    capture_offset_ns: int
     stream: StreamState | None = None
     encoder: EncoderChoice | None = None
     measurement: Measurement | None = None

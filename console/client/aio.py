@@ -11,7 +11,11 @@ from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
+    REPORT_PICTURE,
+    REQUEST_KEY_FRAME,
     DesiredPreview,
+    key_frame_request,
+    picture_request,
 )
 from console.client.options import ClientOptions
 from console.client.streams import Outage, Streams
@@ -52,6 +56,7 @@ class AsyncGatewayClient:
         self._transport = GrpcTransport(self.target, options, credentials or Credentials())
         self._calls = UnaryCalls(self._transport, options)
         self._streams = Streams(self._transport, options)
+        self._within_s = options.answer_within_s
 
     @property
     def reconnects(self) -> int:
@@ -106,6 +111,23 @@ class AsyncGatewayClient:
     async def ping(self) -> Offset:
         """Returns the offset of the robot's clock. Each call improves `clock`."""
         return await self._calls.ping(self.clock)
+
+    async def request_key_frame(self, newest_pts: int | None = None) -> results.KeyFrameAnswer:
+        """Requests a key frame of the running preview, to repair a picture that lost packets have torn.
+
+        Args:
+            newest_pts: PTS of the newest picture of which anything was received. A key frame after it that
+                has already been made serves the request; None asks for one that is still to come.
+
+        Raises:
+            Refused: The preview is not running.
+            Overloaded: It was called more than three times a second.
+        """
+        return await self._calls.call(REQUEST_KEY_FRAME, key_frame_request(newest_pts), self._within_s)
+
+    async def report_picture(self, report: results.PictureReport) -> None:
+        """Reports the picture that a viewer shows; one to four times a second is enough."""
+        await self._calls.call(REPORT_PICTURE, picture_request(report), self._within_s)
 
     def watch_status(
         self, min_interval_s: float = 0.1, *, include_detections: bool = False

@@ -90,6 +90,8 @@ class GatewayClient:
     disable_preview = _blocking(AsyncGatewayClient.disable_preview)
     set_preview = _blocking(AsyncGatewayClient.set_preview)
     ping = _blocking(AsyncGatewayClient.ping)
+    request_key_frame = _blocking(AsyncGatewayClient.request_key_frame)
+    report_picture = _blocking(AsyncGatewayClient.report_picture)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 

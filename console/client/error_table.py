@@ -33,6 +33,7 @@ ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
 
 REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
     Reason.INVALID_REQUEST: errors.InvalidRequest,
+    Reason.PREVIEW_NOT_RUNNING: errors.Refused,
     Reason.MESSAGE_TOO_LARGE: errors.InvalidRequest,
     Reason.UNKNOWN_SERVICE: errors.Refused,
     Reason.TOO_MANY_CONNECTIONS: errors.Overloaded,

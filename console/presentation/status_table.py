@@ -257,6 +257,7 @@ def _network(network: results.Network, compact: bool) -> str:
 
 def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
+    picture_age_ms = measured.worst_picture_age_ms
     return joined(
         quantity(measured.bitrate_kbps, "kbit/s", 0) + ("" if compact else f" of {target_kbps}"),
         quantity(measured.fps, "fps"),
@@ -265,6 +266,7 @@ def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int
         ""
         if loss_percent is None or (compact and not loss_percent)
         else f"loss {quantity(loss_percent, '%')}",
+        "" if compact or picture_age_ms is None else f"picture {quantity(picture_age_ms, 'ms', 0)} old",
     )
 
 

@@ -26,5 +26,6 @@ several operators request at the same time
 
 reconciler.py decides (pure), link.py keeps the connection, grpc_client.py has what services on gRPC share.
 Each service has a folder with the same files: state.py (desired and reported state), wire.py (its schema and
-client), model.py (its rules and its view), control.py (answers to operators).
+client), model.py (its rules and its view), control.py (answers to operators). The preview's has feedback.py
+besides: what viewers request and report.
 """

@@ -196,6 +196,10 @@ def _stream(now: Snapshot) -> Iterator[Metric]:
     yield _gauge("preview_frames_per_second", "Leaving.", measured.fps)
     age_s = measured.last_frame_age_ms / 1000
     yield _gauge("preview_frame_age_seconds", "Of the newest one that left.", age_s)
+    yield _gauge("preview_reporting_viewers", "That report the picture they show.", now.pictures.viewer_count)
+    if now.pictures.worst_age_ms is not None:
+        worst = "Of the oldest picture that a viewer shows, as viewers report it."
+        yield _gauge("preview_picture_age_seconds", worst, now.pictures.worst_age_ms / 1000)
     if measured.worst_rtt_ms is not None:
         yield _gauge("preview_worst_rtt_seconds", "Of all viewers.", measured.worst_rtt_ms / 1000)
     if measured.worst_loss_percent is not None:

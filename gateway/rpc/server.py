@@ -51,6 +51,8 @@ class Services:
             "GetOverlaySnapshot": self.status.get_overlay_snapshot,
             "WatchSystemStatus": self.status.watch_system_status,
             "SetPreviewMode": self.preview.set_preview_mode,
+            "RequestKeyFrame": self.preview.request_key_frame,
+            "ReportPicture": self.preview.report_picture,
             "SubscribeEvents": self.events.subscribe_events,
             "GetGatewayInfo": self.info.get_gateway_info,
             "Ping": self.info.ping,

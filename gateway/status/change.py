@@ -57,6 +57,8 @@ PROJECTIONS: Final[Mapping[str, Callable[[Any], object]]] = {
     # The measurement is the next field: its time of reception is no change.
     "preview": attrgetter(*(field.name for field in fields(PreviewView) if field.name != "measured")),
     "preview_measured": _value_and_staleness,
+    # The age is no change, as no age is.
+    "pictures": attrgetter("viewer_count"),
     "sources": _sources,
     "faults": _faults,
 }

@@ -37,11 +37,13 @@ class Listener:
 
     Attributes:
         address: where viewers reach it; empty if an older preview service does not report it.
+        capture_offset_ns: of its streams, see StreamEndpoint in the contract; None if it is not reported.
     """
 
     port: int
     latency_ms: int
     address: str
+    capture_offset_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

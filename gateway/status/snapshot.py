@@ -11,6 +11,7 @@ from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
 from gateway.status.freshness import ABSENT, Sample, sample
 from gateway.status.health import NOT_READ, RobotHealth, assess
+from gateway.status.pictures import NO_PICTURES, Pictures
 from gateway.status.preview import Measurement, PreviewView
 from gateway.status.source_view import SourceView, source_view
 from gateway.status.sources import (
@@ -85,6 +86,7 @@ class Snapshot:
         command: the effective command with the mux input it is attributed to.
         sources: the state of each configured source.
         events: the overlay's short list, oldest first.
+        pictures: what viewers report of the pictures that they show.
         ros_stalled: whether the ROS sampler makes no progress, so that the sources' ages accuse no publisher.
     """
 
@@ -96,6 +98,7 @@ class Snapshot:
     command: Sample[Command]
     preview: PreviewView
     preview_measured: Sample[Measurement]
+    pictures: Pictures
     sources: tuple[SourceView, ...]
     events: tuple[OperatorEvent, ...]
     faults: tuple[Fault, ...]
@@ -121,6 +124,7 @@ def take(
     faults: tuple[Fault, ...] = (),
     gateway: Runtime = _UNKNOWN,
     access: AccessView = UNGUARDED,
+    pictures: Pictures = NO_PICTURES,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
     configured = rules.sources
@@ -143,6 +147,7 @@ def take(
         command=_command(rules, board, now_s),
         preview=preview,
         preview_measured=sample(preview.measured, MEASUREMENT_STALE_AFTER_MS, now_s),
+        pictures=pictures,
         sources=tuple(
             source_view(
                 spec,

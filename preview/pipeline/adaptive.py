@@ -44,12 +44,14 @@ class LinkReport:
         loss_percent: packets reported lost.
         retransmitted_percent: packets sent again.
         dropped_percent: packets dropped by the sender because they were too late to send (SRTO_TLPKTDROP).
+        age_ms: age of the oldest picture that a viewer shows, as viewers report it; None if none does.
     """
 
     rtt_ms: float
     loss_percent: float
     retransmitted_percent: float
     dropped_percent: float
+    age_ms: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from typing import Any, Final
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
+from preview.pipeline import capture_clock
 from preview.pipeline.plan import Plan
 
 _TABLES_EVERY: Final = 4500
@@ -62,6 +63,7 @@ def build(plan: Plan) -> Parts:
         UserError: an element is missing, or the source's description is invalid.
     """
     pipeline = Gst.Pipeline.new("preview")
+    capture_clock.use(pipeline)
     source = _source(plan)
     body = _parsed(
         _body(plan),

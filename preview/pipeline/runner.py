@@ -19,7 +19,7 @@ from typing import Any, Final
 from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
-from preview.pipeline import builder, faults, statistics
+from preview.pipeline import builder, capture_clock, faults, statistics
 from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
@@ -38,6 +38,8 @@ _WINDOW_S: Final = 0.5
 """Window of the statistics, rounded up to a multiple of _CHECK_INTERVAL_S."""
 _DRIVER_DEADLINE_S: Final = 2.0
 """For a call into the encoder's driver while it runs."""
+_PICTURE_AGE_COUNTS_S: Final = 3.0
+"""As the gateway counts a viewer's report."""
 _GRAPH_DEADLINE_S: Final = 0.3
 _MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
 
@@ -70,6 +72,8 @@ class Runner:
         self._bus_fd = self._bus.get_pollfd().fd
         self._tasks: dict[str, asyncio.Task[None]] = {}
         """The newest task of each kind."""
+        self._picture_age_ms = 0
+        self._picture_age_at = float("-inf")
         self._driver_lock = asyncio.Lock()
         self._ended: asyncio.Future[None] = loop.create_future()
         """Done when the pipeline has failed or is being stopped; no event is reported from then on."""
@@ -86,7 +90,8 @@ class Runner:
         self._loop.add_reader(self._bus_fd, self._read_bus)
         pipeline = self._parts.pipeline
         try:
-            outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), self._timeouts.start_s)
+            start = partial(capture_clock.play, pipeline, self._parts.source)
+            outcome = await in_thread(start, self._timeouts.start_s)
         except TimeoutError:
             self._fail(faults.blocked(self._parts, self.plan, self._timeouts.start_s))
             return
@@ -110,6 +115,14 @@ class Runner:
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
+
+    def request_key_frame(self, newest_pts: int | None) -> bool:
+        """Requests a key frame for a viewer that lost a picture; see `KeyframeGate.request_after_loss`."""
+        return not self._ended.done() and self._keyframe_gate.request_after_loss(newest_pts)
+
+    def take_picture_age(self, age_ms: int) -> None:
+        """Takes the age of the oldest picture that a viewer shows; it counts for `_PICTURE_AGE_COUNTS_S`."""
+        self._picture_age_ms, self._picture_age_at = age_ms, time.monotonic()
 
     async def stop(self) -> "asyncio.Task[bool]":
         """Tears the pipeline down, each part with a deadline.
@@ -209,9 +222,14 @@ class Runner:
         now = statistics.read(self._framing, self._parts.sink)
         self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
         if self.plan.settings.adaptive.enabled:
-            self._adapt_bitrate(statistics.link_report(before, now))
+            link = statistics.link_report(before, now)
+            self._adapt_bitrate(replace(link, age_ms=self._picture_age(now.at)) if link else None)
         self._events.measured(self._viewer_limit.take_refused())
         return now
+
+    def _picture_age(self, now: float) -> float | None:
+        """Returns the newest reported age; None where no viewer has reported one lately."""
+        return self._picture_age_ms if now - self._picture_age_at < _PICTURE_AGE_COUNTS_S else None
 
     # --- calls into the encoder's driver ---
 

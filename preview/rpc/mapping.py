@@ -59,7 +59,12 @@ def actual_state(actual: ActualState) -> pb.ActualState:
         encoder=pb.Encoder(**asdict(actual.encoder)) if actual.encoder else None,
         measurement=pb.Measurement(**asdict(actual.measurement)) if actual.measurement else None,
         counters=pb.Counters(**asdict(actual.counters)),
-        listener=pb.Listener(address=actual.address, port=actual.port, latency_ms=actual.latency_ms),
+        listener=pb.Listener(
+            address=actual.address,
+            port=actual.port,
+            latency_ms=actual.latency_ms,
+            capture_offset_ns=actual.capture_offset_ns,
+        ),
     )
 
 

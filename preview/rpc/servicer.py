@@ -65,3 +65,17 @@ class PreviewServicer(pb_grpc.PreviewServiceServicer):
         """Returns all encoders with the results of their trials; runs those that are still missing."""
         verdicts = [(encoder, await self._prober.verdict(encoder)) for encoder in self._encoders]
         return pb.ListEncodersResponse(encoders=[mapping.candidate(*each) for each in verdicts])
+
+    async def RequestKeyFrame(  # noqa: N802  # the schema names it
+        self, request: pb.RequestKeyFrameRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.RequestKeyFrameResponse:
+        """Requests a key frame; returns without waiting for it."""
+        newest_pts = request.newest_pts if request.HasField("newest_pts") else None
+        return pb.RequestKeyFrameResponse(forced=self._supervisor.request_key_frame(newest_pts))
+
+    async def ReportPictureAge(  # noqa: N802  # the schema names it
+        self, request: pb.ReportPictureAgeRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.ReportPictureAgeResponse:
+        """Hands the age to the adaptive bit rate."""
+        self._supervisor.take_picture_age(request.age_ms)
+        return pb.ReportPictureAgeResponse()

@@ -48,6 +48,7 @@ NEEDS_NO_AGE = {
     "WatchSystemStatusResponse.monotonic_ns": _ITSELF,
     "SetPreviewModeResponse.accepted": _ITSELF,
     "SetPreviewModeResponse.message": _ITSELF,
+    "RequestKeyFrameResponse": _SERVICE,
 }
 
 

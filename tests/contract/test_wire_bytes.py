@@ -385,7 +385,8 @@ ADDITIONS = [
         + uint(6, 2)
         + uint(7, 1)
         + text(8, "secret")
-        + uint(9, 1),
+        + uint(9, 1)
+        + uint(10, -3_600_000_000_000),
         {
             "transport": 1,
             "host": "10.0.0.5",
@@ -396,6 +397,7 @@ ADDITIONS = [
             "container": 1,
             "passphrase": "secret",
             "encrypted": True,
+            "capture_offset_ns": -3_600_000_000_000,
         },
     ),
     Case(
@@ -424,7 +426,9 @@ ADDITIONS = [
         + uint(6, 3)
         + uint(7, 12)
         + flt(8, 4.5)
-        + flt(9, 0.25),
+        + flt(9, 0.25)
+        + uint(10, 140)
+        + uint(11, 2),
         {
             "available": True,
             "stale": True,
@@ -435,6 +439,8 @@ ADDITIONS = [
             "last_frame_age_ms": 12,
             "worst_rtt_ms": 4.5,
             "worst_loss_percent": 0.25,
+            "worst_picture_age_ms": 140,
+            "reporting_viewer_count": 2,
         },
     ),
     Case(
@@ -569,6 +575,30 @@ ADDITIONS = [
         {"monotonic_ns": 1 << 41, "wall_clock_unix_ns": 1 << 60, "boot_id": "boot"},
     ),
     Case(robot_gateway_pb2.PingRequest, b"", {}),
+    Case(robot_gateway_pb2.RequestKeyFrameRequest, uint(1, 1 << 32), {"newest_pts": 1 << 32}),
+    Case(robot_gateway_pb2.RequestKeyFrameResponse, uint(1, 1), {"forced": True}),
+    Case(
+        robot_gateway_pb2.ReportPictureRequest,
+        text(1, "left screen")
+        + uint(2, 140)
+        + uint(3, 2)
+        + uint(4, 21)
+        + flt(5, 2.5)
+        + uint(6, 300)
+        + uint(7, 4)
+        + uint(8, 1),
+        {
+            "viewer_id": "left screen",
+            "picture_age_ms": 140,
+            "picture_age_error_ms": 2,
+            "rtt_ms": 21,
+            "loss_percent": 2.5,
+            "packets_held": 300,
+            "packets_given_up": 4,
+            "delivery": preview_pb2.PICTURE_DELIVERY_DIRECT,
+        },
+    ),
+    Case(robot_gateway_pb2.ReportPictureResponse, b"", {}),
     Case(robot_gateway_pb2.GetGatewayInfoRequest, b"", {}),
     Case(
         robot_gateway_pb2.GetGatewayInfoResponse,

@@ -131,6 +131,12 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     def SubscribeEvents(self, _request: Any, context: Any) -> Any:  # noqa: N802
         _not_offered(context)
 
+    def RequestKeyFrame(self, _request: Any, context: Any) -> Any:  # noqa: N802
+        _not_offered(context)
+
+    def ReportPicture(self, _request: Any, context: Any) -> Any:  # noqa: N802
+        _not_offered(context)
+
     def preview_service_dies(self) -> None:
         """From now on nobody makes video; what is wanted stays wanted."""
         preview = self.status.preview
@@ -186,7 +192,17 @@ def _not_offered(context: grpc.ServicerContext) -> Never:
 
 
 class StreamingGatewayDouble(GatewayDouble):
-    """A present gateway: it streams its status with detections, and answers pings."""
+    """A present gateway: it streams its status with detections, and answers pings and viewers.
+
+    Attributes:
+        key_frames_requested: every request for one.
+        pictures: every report of a viewer.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.key_frames_requested: list[robot_gateway_pb2.RequestKeyFrameRequest] = []
+        self.pictures: list[robot_gateway_pb2.ReportPictureRequest] = []
 
     def WatchSystemStatus(  # noqa: N802
         self, request: robot_gateway_pb2.WatchSystemStatusRequest, context: Any
@@ -210,6 +226,16 @@ class StreamingGatewayDouble(GatewayDouble):
         return robot_gateway_pb2.PingResponse(
             monotonic_ns=time.monotonic_ns(), wall_clock_unix_ns=time.time_ns(), boot_id="double"
         )
+
+    def RequestKeyFrame(self, request: Any, context: Any) -> Any:  # noqa: N802
+        self._begin("RequestKeyFrame", context)
+        self.key_frames_requested.append(request)
+        return robot_gateway_pb2.RequestKeyFrameResponse(forced=True)
+
+    def ReportPicture(self, request: Any, context: Any) -> Any:  # noqa: N802
+        self._begin("ReportPicture", context)
+        self.pictures.append(request)
+        return robot_gateway_pb2.ReportPictureResponse()
 
 
 def _describe_stream(preview: preview_pb2.PreviewStatus) -> None:

@@ -51,6 +51,8 @@ class PipelineDouble:
         self.plan = plan
         self.measurement: Measurement | None = None
         self.stopped = False
+        self.key_frames_requested: list[int | None] = []
+        self.picture_ages_ms: list[int] = []
         self._events = events
         self._script = script or _script_of(plan)
         self._serving: asyncio.Task[None] | None = None
@@ -71,6 +73,13 @@ class PipelineDouble:
         self.plan = replace(self.plan, profile=profile)
         if self._script.fault_in_switch:
             self._fail(self._script.fault_in_switch)
+
+    def request_key_frame(self, newest_pts: int | None) -> bool:
+        self.key_frames_requested.append(newest_pts)
+        return len(self.key_frames_requested) == 1
+
+    def take_picture_age(self, age_ms: int) -> None:
+        self.picture_ages_ms.append(age_ms)
 
     async def stop(self) -> "asyncio.Task[bool]":
         if self._script.fault_in_stop:

@@ -52,12 +52,16 @@ class PreviewDouble(PreviewServiceServicer):
     Attributes:
         applied: every desired state that it was sent.
         thawed: while it is not set, no call is answered, though connections are accepted.
+        key_frames_requested: every request for one.
+        picture_ages_ms: every age that it was sent.
         reports_end: has the next stream of reports end after its first message.
     """
 
     def __init__(self, behaviour: Behaviour = Behaviour.WORKS) -> None:
         self.behaviour = behaviour
         self.applied: list[pb.DesiredState] = []
+        self.key_frames_requested: list[pb.RequestKeyFrameRequest] = []
+        self.picture_ages_ms: list[int] = []
         self.thawed = asyncio.Event()
         self.thawed.set()
         self.reports_end = False
@@ -65,7 +69,9 @@ class PreviewDouble(PreviewServiceServicer):
         self.actual = pb.ActualState(
             instance_id=uuid.uuid4().hex,
             state=pb.LIFECYCLE_STATE_DISABLED,
-            listener=pb.Listener(port=7100, latency_ms=125, address="127.0.0.1"),
+            listener=pb.Listener(
+                port=7100, latency_ms=125, address="127.0.0.1", capture_offset_ns=-3_600_000_000_000
+            ),
         )
         if behaviour is Behaviour.REPORTS_AN_UNKNOWN_STATE:
             self.actual.state = 42  # type: ignore[assignment]  # the point of it
@@ -108,6 +114,18 @@ class PreviewDouble(PreviewServiceServicer):
                     await self._changed.wait()
             except TimeoutError:
                 pass  # time for a heartbeat
+
+    async def RequestKeyFrame(self, request: pb.RequestKeyFrameRequest, context: Any) -> Any:  # noqa: N802
+        await self.thawed.wait()
+        if self.actual.state != pb.LIFECYCLE_STATE_RUNNING:
+            await context.abort(grpc.StatusCode.FAILED_PRECONDITION, "the double makes no video")
+        self.key_frames_requested.append(request)
+        return pb.RequestKeyFrameResponse(forced=len(self.key_frames_requested) == 1)
+
+    async def ReportPictureAge(self, request: pb.ReportPictureAgeRequest, _context: Any) -> Any:  # noqa: N802
+        await self.thawed.wait()
+        self.picture_ages_ms.append(request.age_ms)
+        return pb.ReportPictureAgeResponse()
 
     async def ListEncoders(self, _request: Any, _context: Any) -> Any:  # noqa: N802  # grpc's name
         return pb.ListEncodersResponse()

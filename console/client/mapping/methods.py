@@ -1,7 +1,7 @@
 """The contract's methods: the bytes of their requests, and results from the bytes of their answers."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, Final, Generic, TypeVar
 
@@ -11,7 +11,7 @@ from console.client import results
 from console.client.mapping import enums
 from console.client.mapping.events import event_item
 from console.client.mapping.reader import read
-from console.client.results import EventPosition, FaultSeverity, PreviewProfile
+from console.client.results import EventPosition, FaultSeverity, PictureReport, PreviewProfile
 from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2
 from omniseer.gateway.v1 import robot_gateway_pb2 as wire
 
@@ -67,6 +67,22 @@ def preview_request(desired: DesiredPreview) -> bytes:
     return wire.SetPreviewModeRequest(enabled=desired.enabled, profile=profile).SerializeToString()
 
 
+def key_frame_request(newest_pts: int | None) -> bytes:
+    """Returns the request of RequestKeyFrame.
+
+    Args:
+        newest_pts: Of the newest picture of which anything was received; None leaves it open.
+    """
+    return wire.RequestKeyFrameRequest(newest_pts=newest_pts).SerializeToString()
+
+
+def picture_request(report: PictureReport) -> bytes:
+    """Returns the request of ReportPicture."""
+    values = {each.name: getattr(report, each.name) for each in fields(report)}
+    values["delivery"] = enums.number(report.delivery, preview_pb2.PictureDelivery.DESCRIPTOR)
+    return wire.ReportPictureRequest(**values).SerializeToString()
+
+
 def watch_request(min_interval_s: float, *, include_detections: bool) -> bytes:
     """Returns the request of WatchSystemStatus.
 
@@ -96,10 +112,22 @@ GET_SYSTEM_STATUS: Final = Method("GetSystemStatus", partial(read, results.Syste
 SET_PREVIEW_MODE: Final = Method("SetPreviewMode", partial(read, results.PreviewChange))
 GET_OVERLAY_SNAPSHOT: Final = Method("GetOverlaySnapshot", partial(read, results.OverlaySnapshot))
 GET_GATEWAY_INFO: Final = Method("GetGatewayInfo", partial(read, results.GatewayInfo))
+# A retry would come too late: the caller requests again while its picture is torn.
+REQUEST_KEY_FRAME: Final = Method("RequestKeyFrame", partial(read, results.KeyFrameAnswer), idempotent=False)
+# The next report is newer than a retry.
+REPORT_PICTURE: Final[Method[None]] = Method("ReportPicture", lambda _: None, idempotent=False)
 PING: Final = Method("Ping", partial(read, results.RobotTime))
 WATCH_SYSTEM_STATUS: Final = Method("WatchSystemStatus", partial(read, results.WatchedStatus))
 SUBSCRIBE_EVENTS: Final = Method("SubscribeEvents", event_item)
-METHODS: Final = (GET_SYSTEM_STATUS, SET_PREVIEW_MODE, GET_OVERLAY_SNAPSHOT, GET_GATEWAY_INFO, PING)
+METHODS: Final = (
+    GET_SYSTEM_STATUS,
+    SET_PREVIEW_MODE,
+    GET_OVERLAY_SNAPSHOT,
+    GET_GATEWAY_INFO,
+    PING,
+    REQUEST_KEY_FRAME,
+    REPORT_PICTURE,
+)
 """The unary methods."""
 STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS)
 """The server-streaming methods. A test compares both lists with the schema."""

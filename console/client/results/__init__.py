@@ -27,6 +27,9 @@ from console.client.results.overlay import (
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
     Encoder,
+    KeyFrameAnswer,
+    PictureDelivery,
+    PictureReport,
     PreviewChange,
     PreviewCounters,
     PreviewMeasurement,

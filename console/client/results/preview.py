@@ -2,8 +2,14 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Final
 
 from console.client.results.sample import Sample
+
+_NS_NUMERATOR: Final = 100_000
+_NS_DENOMINATOR: Final = 9
+"""Nanoseconds in a tick of 90 kHz, as a fraction."""
+_WRAP_NS: Final = (1 << 33) * _NS_NUMERATOR // _NS_DENOMINATOR
 
 
 class PreviewState(Enum):
@@ -42,6 +48,16 @@ class VideoCodec(Enum):
     H265 = "h265"
 
 
+class PictureDelivery(Enum):
+    """How a viewer takes the stream."""
+
+    UNKNOWN = "unknown"
+    DIRECT = "direct"
+    """Packets count as they arrive; only missing ones are waited for."""
+    SRT_LATENCY = "srt-latency"
+    """Every packet waits for the SRT latency."""
+
+
 class StreamTransport(Enum):
     """Transport of the stream."""
 
@@ -73,6 +89,23 @@ class StreamEndpoint:
     encrypted: bool
     passphrase: str = field(repr=False)
     """The SRT passphrase. Empty when not encrypted or not for this client. Never logged."""
+    capture_offset_ns: int | None = None
+    """Capture time on the robot's monotonic clock minus PTS. None where PTS does not say."""
+
+    def captured_ns(self, pts: int, robot_now_ns: int) -> int | None:
+        """Returns when a picture was captured, in ns on the robot's monotonic clock.
+
+        Args:
+            pts: Its PTS in the transport stream, in ticks of 90 kHz; 33 bits, so that it wraps every 26.5 h.
+            robot_now_ns: The present time on that clock (`Clock`); half a wrap of error does no harm.
+
+        Returns:
+            None where PTS does not say.
+        """
+        if self.capture_offset_ns is None:
+            return None
+        ahead = (pts * _NS_NUMERATOR // _NS_DENOMINATOR + self.capture_offset_ns - robot_now_ns) % _WRAP_NS
+        return robot_now_ns + ahead - (_WRAP_NS if ahead > _WRAP_NS // 2 else 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +142,10 @@ class PreviewMeasurement(Sample):
     """Longest round trip of any viewer. None without viewers."""
     worst_loss_percent: float | None
     """Largest packet loss of any viewer, before retransmission. None without viewers."""
+    worst_picture_age_ms: int | None
+    """Largest age, from capture to the screen, that any viewer reports of its picture. None if none does."""
+    reporting_viewer_count: int | None
+    """Viewers that report the picture they show."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,3 +195,32 @@ class PreviewChange:
     message: str
     preview: PreviewStatus
     """The preview after the request."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyFrameAnswer:
+    """Answer to a request for a key frame."""
+
+    forced: bool
+    """Whether one is forced for this request. False: one that is on its way serves it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureReport:
+    """The picture that a viewer shows at this moment, as it reports it to the robot."""
+
+    viewer_id: str = ""
+    """The viewer among those of this caller, up to 64 printable ASCII characters. Empty for the only one."""
+    picture_age_ms: int
+    """From capture to now, at most a minute."""
+    picture_age_error_ms: int = 0
+    """Bound of that age's error."""
+    rtt_ms: int | None = None
+    """Round-trip time of the stream's connection. None if unknown; the same for `loss_percent`."""
+    loss_percent: float | None = None
+    """Share of packets lost lately, before retransmission."""
+    packets_held: int = 0
+    """Packets that waited for a missing one before them, since the viewer connected."""
+    packets_given_up: int = 0
+    """Packets that were given up, since the viewer connected."""
+    delivery: PictureDelivery = PictureDelivery.UNKNOWN

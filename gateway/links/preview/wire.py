@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 ValueT = TypeVar("ValueT", Listener, Stream, Encoder, Measurement, Counters)
 
+_FEEDBACK_DEADLINE_S: Final = 0.5
+"""Of what viewers have passed on: later it is of no use."""
 STATES: Final = {pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}"): state for state in PreviewState}
 PROFILES: Final = {profile: pb.Profile.Value(f"PROFILE_{profile.name}") for profile in Profile}
 CODECS: Final = {pb.Codec.Value(f"CODEC_{codec.name}"): codec for codec in Codec}
@@ -75,6 +77,23 @@ class PreviewClient:
         except grpc.aio.AioRpcError as error:
             raise failed(error) from None
         return from_wire(reply.actual)
+
+    async def request_key_frame(self, newest_pts: int | None) -> bool:
+        """Calls RequestKeyFrame; returns whether a key frame is forced for it."""
+        request = pb.RequestKeyFrameRequest(newest_pts=newest_pts)
+        try:
+            reply = await self._stub.RequestKeyFrame(request, timeout=_FEEDBACK_DEADLINE_S)
+        except grpc.aio.AioRpcError as error:
+            raise failed(error) from None
+        return reply.forced
+
+    async def report_picture_age(self, age_ms: int) -> None:
+        """Calls ReportPictureAge."""
+        request = pb.ReportPictureAgeRequest(age_ms=age_ms)
+        try:
+            await self._stub.ReportPictureAge(request, timeout=_FEEDBACK_DEADLINE_S)
+        except grpc.aio.AioRpcError as error:
+            raise failed(error) from None
 
 
 def to_wire(desired: Desired[PreviewSpec]) -> pb.ApplyDesiredStateRequest:

@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from gateway.status.event import ControlAction, Event
+from gateway.status.pictures import PictureReport, Pictures
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Snapshot
 
@@ -20,6 +21,13 @@ class StatusSource(SnapshotSource, Protocol):
     @property
     def preview(self) -> PreviewView:
         """The preview at this instant; a new object whenever it changed."""
+
+
+class PictureSink(Protocol):
+    """Where viewers' reports go."""
+
+    def take_picture(self, caller: str, viewer_id: str, report: PictureReport) -> Pictures:
+        """Takes a report of this instant; returns what all say that count now."""
 
 
 class EventSink(Protocol):

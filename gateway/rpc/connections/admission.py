@@ -7,8 +7,8 @@ settings: strangers can't take those of operators. Pending connections are few a
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from common.errors import TooMuchError
@@ -31,6 +31,9 @@ SPARED_S: Final = 1.0
 room for all."""
 PENDING_STREAMS: Final = 4
 """Of one pending connection, of which the health service is all that it can use."""
+METHOD_RATES: Final[Mapping[str, float]] = {"RequestKeyFrame": 3.0, "ReportPicture": 8.0}
+"""Calls a second of methods that reach further than their caller: what one viewer causes, all viewers see.
+The schema documents them."""
 _REDUCED_BURST_S: Final = 0.01
 """The reduced bucket holds what is refilled in this time."""
 _RETRY_AFTER_S: Final = 1.0
@@ -45,6 +48,7 @@ class _Connection:
     admitted: bool = False
     streams: int = 0
     refused_s: float = -math.inf
+    method_buckets: dict[str, TokenBucket] = field(default_factory=dict)
 
 
 class Admission:
@@ -71,11 +75,11 @@ class Admission:
         self._places: Counter[str] = Counter()
         """Taken, by address prefix."""
 
-    def take_token(self, peer: Peer) -> None:
-        """Takes one token out of the connection's bucket.
+    def take_token(self, peer: Peer, method: str = "") -> None:
+        """Takes one token out of the connection's bucket, and of the method's if it has a rate of its own.
 
         Raises:
-            TooMuchError: the bucket is empty.
+            TooMuchError: a bucket is empty.
         """
         if peer.ip is None:
             return
@@ -86,6 +90,8 @@ class Admission:
         self._connections[peer.address] = connection
         bucket, capacity = connection.bucket, self._capacity(connection, now_s)
         if bucket.take(now_s, capacity=capacity, refill_per_s=limits.requests_per_s):
+            if rate := METHOD_RATES.get(method):
+                self._take_method_token(connection, method, rate, now_s)
             return
         connection.refused_s = now_s
         raise TooMuchError(
@@ -93,6 +99,17 @@ class Admission:
             Reason.TOO_MANY_REQUESTS,
             (1 - bucket.tokens) / limits.requests_per_s,
         )
+
+    def _take_method_token(
+        self, connection: _Connection, method: str, rate_per_s: float, now_s: float
+    ) -> None:
+        bucket = connection.method_buckets.setdefault(method, TokenBucket(rate_per_s, now_s))
+        if not bucket.take(now_s, capacity=rate_per_s, refill_per_s=rate_per_s):
+            raise TooMuchError(
+                f"this connection calls {method} more than {rate_per_s:g} times a second; call it less often",
+                Reason.TOO_MANY_REQUESTS,
+                (1 - bucket.tokens) / rate_per_s,
+            )
 
     def open_stream(self, peer: Peer) -> None:
         """Counts one more stream of the connection, after `take_token`.

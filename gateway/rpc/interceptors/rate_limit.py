@@ -33,7 +33,7 @@ class RateLimit(Interceptor[CallContext]):
             TooMuchError: there is none left; from the awaitable, after a delay.
         """
         try:
-            self._admission.take_token(call.peer)
+            self._admission.take_token(call.peer, call.method.name)
             if self._admits:
                 self._admission.admit(call.peer)
             if call.method.streaming:

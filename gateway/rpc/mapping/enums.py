@@ -9,6 +9,7 @@ from gateway.status.event import ControlResult
 from gateway.status.event_log import GapReason
 from gateway.status.fault import Severity
 from gateway.status.health import HealthState
+from gateway.status.pictures import Delivery
 from gateway.status.preview import Codec, PreviewState, Profile
 from gateway.status.source_view import SourceState
 from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2
@@ -28,18 +29,29 @@ PROFILES: Final[Mapping[Profile | None, Any]] = {None: preview_pb2.PREVIEW_PROFI
 CODECS: Final[Mapping[Codec | None, Any]] = {None: preview_pb2.VIDEO_CODEC_UNSPECIFIED} | _by_name(
     Codec, preview_pb2.VideoCodec, "VIDEO_CODEC"
 )
+DELIVERIES: Final[Mapping[Delivery | None, Any]] = {
+    None: preview_pb2.PICTURE_DELIVERY_UNSPECIFIED
+} | _by_name(Delivery, preview_pb2.PictureDelivery, "PICTURE_DELIVERY")
 HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")
 SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
 SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
 CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
 GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
+_DELIVERY_OF: Final[Mapping[int, Delivery | None]] = {
+    number: delivery for delivery, number in DELIVERIES.items()
+}
 _SEVERITY_OF: Final[Mapping[int, Severity]] = {number: severity for severity, number in SEVERITIES.items()}
 
 
 def least_severity_from(number: int) -> Severity:
     """Returns the minimum severity that a client requests; the schema's rules reject unknown numbers."""
     return _SEVERITY_OF.get(number, Severity.INFO)
+
+
+def delivery_from(number: int) -> Delivery | None:
+    """Returns how a viewer takes the stream; the schema's rules reject unknown numbers."""
+    return _DELIVERY_OF.get(number)
 
 
 def profile_from(number: int) -> Profile | None:

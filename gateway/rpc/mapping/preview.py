@@ -4,15 +4,17 @@ from dataclasses import asdict
 
 from common.bind import bracketed
 from gateway.rpc.calls.recipient import Recipient
-from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES
+from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES, delivery_from
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
+from gateway.status.pictures import PictureReport, Pictures
 from gateway.status.preview import Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
+from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest
 
 
 def preview_status(
-    preview: PreviewView, measured: Sample[Measurement], recipient: Recipient
+    preview: PreviewView, measured: Sample[Measurement], pictures: Pictures, recipient: Recipient
 ) -> pb.PreviewStatus:
     """Returns the preview; the passphrase only if the recipient may see it."""
     stream, encoder = preview.stream, preview.encoder
@@ -28,7 +30,7 @@ def preview_status(
         if stream
         else None,
         target_bitrate_kbps=stream.target_bitrate_kbps if stream else 0,
-        measured=_measured(measured.value, measured) if measured.value else None,
+        measured=_measured(measured.value, measured, pictures) if measured.value else None,
         counters=pb.PreviewCounters(**asdict(preview.counters)),
         service_reachable=preview.service_reachable,
         bitrate_reason=stream.bitrate_reason if stream else "",
@@ -50,6 +52,7 @@ def _endpoint(
         container=pb.STREAM_CONTAINER_MPEG_TS,
         passphrase=passphrase if recipient.sees_passphrase else "",
         encrypted=encrypted,
+        capture_offset_ns=listener.capture_offset_ns,
     )
 
 
@@ -63,7 +66,22 @@ def _encoder(encoder: Encoder, stream: Stream | None) -> pb.EncoderStatus:
     )
 
 
-def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.StreamMeasurement:
+def picture_report(request: ReportPictureRequest) -> PictureReport:
+    """Returns a viewer's report."""
+    return PictureReport(
+        age_ms=request.picture_age_ms,
+        error_ms=request.picture_age_error_ms,
+        rtt_ms=request.rtt_ms if request.HasField("rtt_ms") else None,
+        loss_percent=request.loss_percent if request.HasField("loss_percent") else None,
+        packets_held=request.packets_held,
+        packets_given_up=request.packets_given_up,
+        delivery=delivery_from(request.delivery),
+    )
+
+
+def _measured(
+    measurement: Measurement, sample: Sample[Measurement], pictures: Pictures
+) -> pb.StreamMeasurement:
     return pb.StreamMeasurement(
         **freshness_fields(sample.freshness),
         fps=measurement.fps,
@@ -72,4 +90,6 @@ def _measured(measurement: Measurement, sample: Sample[Measurement]) -> pb.Strea
         last_frame_age_ms=measurement.last_frame_age_ms + sample.freshness.age_ms,
         worst_rtt_ms=measurement.worst_rtt_ms,
         worst_loss_percent=measurement.worst_loss_percent,
+        worst_picture_age_ms=pictures.worst_age_ms,
+        reporting_viewer_count=pictures.viewer_count,
     )

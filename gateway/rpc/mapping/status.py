@@ -42,7 +42,7 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
     status = system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
         gateway_version=snapshot.identity.version,
-        preview=preview_status(snapshot.preview, snapshot.preview_measured, recipient),
+        preview=preview_status(snapshot.preview, snapshot.preview_measured, snapshot.pictures, recipient),
         vision=_vision(snapshot[VISION]),
         health=_health(snapshot),
         platform=platform_status(snapshot),

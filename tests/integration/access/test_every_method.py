@@ -33,6 +33,14 @@ PATHS = {
     for method in SERVICE.methods
 } | {REFLECTION: (Role.VIEWER, True)}
 """Every method that needs a role: which, and whether it streams."""
+ANSWERS = dict.fromkeys(PATHS, (OK, "")) | {
+    # There is no preview.
+    f"/{SERVICE.full_name}/RequestKeyFrame": (
+        grpc.StatusCode.FAILED_PRECONDITION,
+        Reason.PREVIEW_NOT_RUNNING,
+    )
+}
+"""What an empty request leads to, where the role suffices."""
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +89,7 @@ async def all_called(robot: Robot, login: Login) -> dict[str, tuple[grpc.StatusC
 
 def expected_for(role: Role) -> dict[str, tuple[grpc.StatusCode, str]]:
     return {
-        path: (OK, "") if role.may(needed) else (DENIED, Reason.ROLE_TOO_LOW)
+        path: ANSWERS[path] if role.may(needed) else (DENIED, Reason.ROLE_TOO_LOW)
         for path, (needed, _) in PATHS.items()
     }
 

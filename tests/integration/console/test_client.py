@@ -29,10 +29,13 @@ from console.client import (
     GatewayError,
     GatewayFailed,
     Overloaded,
+    PictureDelivery,
+    PictureReport,
     PreviewProfile,
     PreviewState,
     Refused,
     Unreachable,
+    Unsupported,
 )
 from console.client.error_table import ERRORS
 from console.client.mapping.methods import GET_SYSTEM_STATUS
@@ -42,7 +45,13 @@ from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.bad_links import Relay, black_hole
 from tests.support.clients import FACES, Blocking, Face
 from tests.support.free import free_tcp_port
-from tests.support.gateway_double import STREAM_URI, GatewayDouble, serving, serving_handlers
+from tests.support.gateway_double import (
+    STREAM_URI,
+    GatewayDouble,
+    StreamingGatewayDouble,
+    serving,
+    serving_handlers,
+)
 from tests.support.waiting import wait_until
 
 UNAVAILABLE = (grpc.StatusCode.UNAVAILABLE, "the robot is starting")
@@ -520,3 +529,20 @@ def test_closing_one_client_does_not_hurt_another(face: type[Face], port: int, d
         assert stays.status().gateway_name == "lab-1"
         assert stays.retries == 0
     assert double.calls == ["GetSystemStatus"] * 3
+
+
+def test_what_a_viewer_requests_and_reports_reaches_the_robot(face: type[Face]) -> None:
+    double = StreamingGatewayDouble()
+    report = PictureReport(viewer_id="left", picture_age_ms=140, delivery=PictureDelivery.DIRECT)
+    with serving(double) as port, face(f"127.0.0.1:{port}") as robot:
+        assert robot.request_key_frame(1 << 32).forced
+        assert robot.report_picture(report) is None
+    assert [each.newest_pts for each in double.key_frames_requested] == [1 << 32]
+    assert [(each.viewer_id, each.picture_age_ms) for each in double.pictures] == [("left", 140)]
+
+
+def test_a_gateway_that_knows_neither_is_unsupported(face: type[Face], port: int) -> None:
+    with face(f"127.0.0.1:{port}") as robot:
+        for call in (robot.request_key_frame, lambda: robot.report_picture(PictureReport(picture_age_ms=1))):
+            with pytest.raises(Unsupported):
+                call()

@@ -13,8 +13,7 @@ from grpc_health.v1.health_pb2_grpc import HealthStub
 from gateway.app import running
 from gateway.assembly import ThisRobot, build
 from gateway.config import GatewaySettings
-from gateway.links.link import Connector
-from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.preview.feedback import PreviewServiceConnector
 from gateway.rpc.server import SERVICE
 from gateway.status.board import Board
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
@@ -35,7 +34,7 @@ class StalledRobot:
         board.ros_passed_s = time.monotonic() - 10
         yield
 
-    def preview_connector(self) -> Connector[PreviewSpec, PreviewReport]:
+    def preview_connector(self) -> PreviewServiceConnector:
         return self._real.preview_connector()
 
 

@@ -1,11 +1,18 @@
 """The real pipeline passes the tests that its double passes."""
 
+import asyncio
+from dataclasses import replace
+
 import pytest
 
+from preview.config import AdaptiveSettings
+from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
 from preview.pipeline.events import PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
-from tests.support.pipeline_contract import PipelineContract
+from tests.support.eventually import eventually
+from tests.support.pipeline_contract import LIVE, Events, PipelineContract, plan_of
+from tests.support.recording import record
 
 pytestmark = pytest.mark.gst
 
@@ -13,3 +20,33 @@ pytestmark = pytest.mark.gst
 class TestRunner(PipelineContract):
     def build(self, plan: Plan, events: PipelineEvents) -> Runner:
         return Runner(plan, events)
+
+
+async def test_the_age_that_viewers_report_reaches_the_adaptive_bit_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen: list[float | None] = []
+
+    def decide(self: BitrateController, link: LinkReport | None, now: float) -> Decision:
+        seen.extend([link.age_ms] if link else [])
+        return original(self, link, now)
+
+    original = BitrateController.decide
+    monkeypatch.setattr(BitrateController, "decide", decide)
+    plan = plan_of(LIVE)
+    settings = plan.settings.model_copy(update={"adaptive": AdaptiveSettings(enabled=True)})
+    plan, events = replace(plan, settings=settings), Events()
+    runner = Runner(plan, events)
+    await runner.start()
+    await events.wait_for("first_frame")
+
+    async def windows() -> list[float | None]:
+        return seen
+
+    viewer = asyncio.create_task(asyncio.to_thread(record, plan.srt.port, 2.5))
+    await eventually(windows, bool, "a window with a viewer")
+    runner.take_picture_age(140)
+    await eventually(windows, lambda ages: ages[-1] == 140, "the age")
+    assert seen[0] is None
+    await viewer
+    assert await (await runner.stop())

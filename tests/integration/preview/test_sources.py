@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from common.gst import Gst
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.film import clip
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
 from tests.support.waiting import wait_until
@@ -31,23 +31,6 @@ def footage() -> Path:
 
 def description(text: str) -> dict[str, object]:
     return {"source": {"kind": "gst", "description": text}}
-
-
-def clip(seconds: float, path: Path, container: str = "matroskamux") -> Path:
-    """A short film of a moving ball, compressed."""
-    pipeline = Gst.parse_launch(
-        f"videotestsrc num-buffers={round(seconds * 25)} pattern=ball"
-        " ! video/x-raw,format=I420,width=320,height=240,framerate=25/1"
-        f" ! x264enc speed-preset=ultrafast key-int-max=25 ! h264parse ! {container} ! filesink name=out"
-    )
-    pipeline.get_by_name("out").set_property("location", str(path))
-    pipeline.set_state(Gst.State.PLAYING)
-    message = pipeline.get_bus().timed_pop_filtered(
-        20 * Gst.SECOND, Gst.MessageType.EOS | Gst.MessageType.ERROR
-    )
-    pipeline.set_state(Gst.State.NULL)
-    assert message.type == Gst.MessageType.EOS
-    return path
 
 
 @contextmanager

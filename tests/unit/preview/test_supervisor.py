@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import pytest
 
+from common.errors import NotRunningError
 from preview import supervisor
 from preview.config import FileSource, PreviewSettings, TestSource, TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE, Encoder
@@ -628,3 +629,25 @@ async def test_at_the_end_no_pipeline_is_left(tmp_path: Path) -> None:
     assert preview.pipelines.built[0].stopped
     assert preview.supervisor.actual().state is State.DISABLED
     assert preview.marker.encoder == ""
+
+
+@in_virtual_time
+async def test_viewers_requests_reach_the_running_pipeline(tmp_path: Path) -> None:
+    preview = Preview(tmp_path)
+    async with preview.serving():
+        with pytest.raises(NotRunningError, match="the preview is disabled"):
+            preview.supervisor.request_key_frame(None)
+        preview.supervisor.take_picture_age(140)
+        preview.supervisor.apply(ON)
+        with pytest.raises(NotRunningError, match="the preview is starting"):
+            preview.supervisor.request_key_frame(None)
+        await preview.reaches(State.RUNNING)
+        assert preview.supervisor.request_key_frame(7)
+        assert not preview.supervisor.request_key_frame(None)
+        preview.supervisor.take_picture_age(160)
+        (pipeline,) = preview.pipelines.built
+        assert pipeline.key_frames_requested == [7, None]
+        assert pipeline.picture_ages_ms == [160]
+        preview.supervisor.apply(OFF)
+        with pytest.raises(NotRunningError, match="the preview is stopping"):
+            preview.supervisor.request_key_frame(None)

@@ -82,9 +82,14 @@ class FieldRules(_message.Message):
 
     DESCRIPTOR: _descriptor.Descriptor
 
+    FLOAT_FIELD_NUMBER: _builtins.int
     UINT32_FIELD_NUMBER: _builtins.int
     STRING_FIELD_NUMBER: _builtins.int
     ENUM_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def float(self) -> Global___FloatRules:
+        """Of a float."""
+
     @_builtins.property
     def uint32(self) -> Global___UInt32Rules:
         """Of a uint32."""
@@ -100,19 +105,53 @@ class FieldRules(_message.Message):
     def __init__(
         self,
         *,
+        float: Global___FloatRules | None = ...,
         uint32: Global___UInt32Rules | None = ...,
         string: Global___StringRules | None = ...,
         enum: Global___EnumRules | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_type: _TypeAlias = _typing.Literal["uint32", "string", "enum"]  # noqa: Y015
+    _WhichOneofReturnType_type: _TypeAlias = _typing.Literal["float", "uint32", "string", "enum"]  # noqa: Y015
     _WhichOneofArgType_type: _TypeAlias = _typing.Literal["type", b"type"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_type) -> _WhichOneofReturnType_type | None: ...
 
 Global___FieldRules: _TypeAlias = FieldRules  # noqa: Y015
+
+@_typing.final
+class FloatRules(_message.Message):
+    """Of a float."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LTE_FIELD_NUMBER: _builtins.int
+    GTE_FIELD_NUMBER: _builtins.int
+    lte: _builtins.float
+    """At most this."""
+    gte: _builtins.float
+    """At least this."""
+    def __init__(
+        self,
+        *,
+        lte: _builtins.float | None = ...,
+        gte: _builtins.float | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["greater_than", b"greater_than", "gte", b"gte", "less_than", b"less_than", "lte", b"lte"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["greater_than", b"greater_than", "gte", b"gte", "less_than", b"less_than", "lte", b"lte"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType_greater_than: _TypeAlias = _typing.Literal["gte"]  # noqa: Y015
+    _WhichOneofArgType_greater_than: _TypeAlias = _typing.Literal["greater_than", b"greater_than"]  # noqa: Y015
+    _WhichOneofReturnType_less_than: _TypeAlias = _typing.Literal["lte"]  # noqa: Y015
+    _WhichOneofArgType_less_than: _TypeAlias = _typing.Literal["less_than", b"less_than"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType_greater_than) -> _WhichOneofReturnType_greater_than | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType_less_than) -> _WhichOneofReturnType_less_than | None: ...
+
+Global___FloatRules: _TypeAlias = FloatRules  # noqa: Y015
 
 @_typing.final
 class UInt32Rules(_message.Message):
@@ -145,16 +184,20 @@ class StringRules(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     MAX_LEN_FIELD_NUMBER: _builtins.int
+    PATTERN_FIELD_NUMBER: _builtins.int
     max_len: _builtins.int
     """At most so many characters."""
+    pattern: _builtins.str
+    """Matches this regular expression, in RE2's syntax."""
     def __init__(
         self,
         *,
         max_len: _builtins.int | None = ...,
+        pattern: _builtins.str | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "pattern", b"pattern"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "pattern", b"pattern"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

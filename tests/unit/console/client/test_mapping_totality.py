@@ -4,7 +4,7 @@ The tables below say where: a field goes to the attribute of its own name unless
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -25,10 +25,20 @@ from console.client.mapping.methods import (
     DesiredPreview,
     Method,
     events_request,
+    key_frame_request,
+    picture_request,
     preview_request,
     watch_request,
 )
-from console.client.results import Event, EventKind, EventPosition, FaultSeverity, PreviewProfile
+from console.client.results import (
+    Event,
+    EventKind,
+    EventPosition,
+    FaultSeverity,
+    PictureDelivery,
+    PictureReport,
+    PreviewProfile,
+)
 from omniseer.gateway.v1 import (
     event_pb2,
     fault_pb2,
@@ -71,6 +81,7 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.HealthState, states_pb2.RobotHealthState),
         (results.TeleopState, states_pb2.TeleopState),
         (results.PreviewProfile, preview_pb2.PreviewProfile),
+        (results.PictureDelivery, preview_pb2.PictureDelivery),
         (results.VideoCodec, preview_pb2.VideoCodec),
         (results.StreamTransport, preview_pb2.StreamTransport),
         (results.StreamContainer, preview_pb2.StreamContainer),
@@ -200,10 +211,14 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
         "last_frame_age_ms",
         "worst_rtt_ms",
         "worst_loss_percent",
+        "worst_picture_age_ms",
+        "reporting_viewer_count",
     ),
     "StreamMeasurement.last_frame_age_ms": ("last_frame_age_ms",),
     "StreamMeasurement.worst_rtt_ms": ("worst_rtt_ms",),
     "StreamMeasurement.worst_loss_percent": ("worst_loss_percent",),
+    "StreamMeasurement.worst_picture_age_ms": ("worst_picture_age_ms",),
+    "StreamEndpoint.capture_offset_ns": ("capture_offset_ns",),
     "Fault.cleared_age_ms": ("cleared_age_ms",),
     "PreviewStatus.endpoint": ("endpoint",),
     "PreviewStatus.encoder": ("encoder",),
@@ -390,9 +405,12 @@ def mismatches(wanted: Flat, found: Flat) -> Iterator[str]:
 
 
 CASES: Final = [
-    (method.name, members) for method in SERVICE.methods for members in alternatives(method.output_type)
+    (method.name, members)
+    for method in SERVICE.methods
+    if method.output_type.fields
+    for members in alternatives(method.output_type)
 ]
-"""Every method, with every choice of members of the oneofs of its answer."""
+"""Every method with fields in its answer, with every choice of members of the oneofs of its answer."""
 
 
 def case_id(method: str, members: tuple[str, ...]) -> str:
@@ -455,6 +473,11 @@ def answer_messages() -> set[str]:
     return {name.rpartition(".")[0] for name in answer_fields()}
 
 
+def test_an_answer_without_fields_has_no_result() -> None:
+    without = [method.name for method in SERVICE.methods if not method.output_type.fields]
+    assert {name: DECODERS[name](b"") for name in without} == {"ReportPicture": None}
+
+
 def test_every_field_of_an_answer_is_filled_in_a_case() -> None:
     """A member of a oneof that no case fills would escape the test above."""
     declared = {
@@ -504,6 +527,36 @@ def test_every_field_of_a_watch_is_set() -> None:
     assert request.min_interval_ms == 250
     assert request.include_detections
     assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
+
+
+def test_every_field_of_a_key_frame_request_is_set() -> None:
+    request = robot_gateway_pb2.RequestKeyFrameRequest.FromString(key_frame_request(7))
+    assert request.newest_pts == 7
+    assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
+    unknown = robot_gateway_pb2.RequestKeyFrameRequest.FromString(key_frame_request(None))
+    assert not unknown.HasField("newest_pts")
+
+
+def test_every_field_of_a_picture_report_is_set() -> None:
+    report = PictureReport(
+        viewer_id="left",
+        picture_age_ms=140,
+        picture_age_error_ms=2,
+        rtt_ms=21,
+        loss_percent=2.5,
+        packets_held=300,
+        packets_given_up=4,
+        delivery=PictureDelivery.DIRECT,
+    )
+    request = robot_gateway_pb2.ReportPictureRequest.FromString(picture_request(report))
+    found = {field.name: value for field, value in request.ListFields()}
+    expected = asdict(report) | {"delivery": preview_pb2.PICTURE_DELIVERY_DIRECT}
+    assert found == expected
+    assert set(found) == set(request.DESCRIPTOR.fields_by_name)
+    short = robot_gateway_pb2.ReportPictureRequest.FromString(
+        picture_request(PictureReport(picture_age_ms=9))
+    )
+    assert {field.name for field, _ in short.ListFields()} == {"picture_age_ms"}
 
 
 def test_every_kind_of_event_has_a_word() -> None:

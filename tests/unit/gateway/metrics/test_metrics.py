@@ -21,6 +21,7 @@ from gateway.rpc.interceptors.stats import MethodStats, Stats
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -64,6 +65,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
         now_s=NOW_S,
         faults=(Fault(FAULT, 1.0, 2.0, None, 1), Fault(FAULT, 1.0, 2.0, 3.0, 1)),
         gateway=Runtime("abc", "boot", 61_500, 3, 10, 1),
+        pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
     )
 
 
@@ -186,6 +188,8 @@ def test_the_running_preview() -> None:
     assert shown["robot_gateway_preview_frame_age_seconds", ""] == 0.012
     assert shown["robot_gateway_preview_worst_rtt_seconds", ""] == 0.18
     assert shown["robot_gateway_preview_worst_loss_percent", ""] == 6
+    assert shown["robot_gateway_preview_reporting_viewers", ""] == 2
+    assert shown["robot_gateway_preview_picture_age_seconds", ""] == 0.14
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ FULL = ActualState(
     address="10.0.0.5",
     port=7100,
     latency_ms=125,
+    capture_offset_ns=-36,
     stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
     encoder=EncoderChoice("va-h265", hardware=True, wanted="mpp-h265", fallback_reason="why"),
     measurement=Measurement(59.5, 4400.0, 21, 12, 30.5, 1.5),
@@ -64,7 +65,7 @@ def test_every_value_arrives_at_its_place() -> None:
         profile=pb.PROFILE_HIGH_QUALITY,
         last_error="something",
         counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
-        listener=pb.Listener(port=7100, latency_ms=125, address="10.0.0.5"),
+        listener=pb.Listener(port=7100, latency_ms=125, address="10.0.0.5", capture_offset_ns=-36),
         stream=pb.Stream(
             width_px=1280,
             height_px=720,
@@ -87,7 +88,7 @@ def test_every_value_arrives_at_its_place() -> None:
 
 
 def test_an_empty_status_leaves_out_what_is_not_there() -> None:
-    empty = ActualState("abc", 0, State.DISABLED, Profile.BALANCED, "", Counters(), "::", 7100, 125)
+    empty = ActualState("abc", 0, State.DISABLED, Profile.BALANCED, "", Counters(), "::", 7100, 125, -36)
     actual = mapping.actual_state(empty)
     assert not any(actual.HasField(name) for name in ("stream", "encoder", "measurement"))
 

@@ -112,6 +112,30 @@ STREAM_CONTAINER_MPEG_TS: StreamContainer.ValueType  # 1
 """MPEG transport stream, one program, one video stream, one PES packet per frame."""
 Global___StreamContainer: _TypeAlias = StreamContainer  # noqa: Y015
 
+class _PictureDelivery:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _PictureDeliveryEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_PictureDelivery.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    PICTURE_DELIVERY_UNSPECIFIED: _PictureDelivery.ValueType  # 0
+    """Not known."""
+    PICTURE_DELIVERY_DIRECT: _PictureDelivery.ValueType  # 1
+    """Packets count as they arrive, and the viewer waits for none but those that are missing."""
+    PICTURE_DELIVERY_SRT_LATENCY: _PictureDelivery.ValueType  # 2
+    """Every packet waits for the SRT latency, lost or not."""
+
+class PictureDelivery(_PictureDelivery, metaclass=_PictureDeliveryEnumTypeWrapper):
+    """How a viewer takes the stream."""
+
+PICTURE_DELIVERY_UNSPECIFIED: PictureDelivery.ValueType  # 0
+"""Not known."""
+PICTURE_DELIVERY_DIRECT: PictureDelivery.ValueType  # 1
+"""Packets count as they arrive, and the viewer waits for none but those that are missing."""
+PICTURE_DELIVERY_SRT_LATENCY: PictureDelivery.ValueType  # 2
+"""Every packet waits for the SRT latency, lost or not."""
+Global___PictureDelivery: _TypeAlias = PictureDelivery  # noqa: Y015
+
 @_typing.final
 class PreviewStatus(_message.Message):
     """The live preview as the gateway knows it. Answered from memory."""
@@ -205,6 +229,7 @@ class StreamEndpoint(_message.Message):
     CONTAINER_FIELD_NUMBER: _builtins.int
     PASSPHRASE_FIELD_NUMBER: _builtins.int
     ENCRYPTED_FIELD_NUMBER: _builtins.int
+    CAPTURE_OFFSET_NS_FIELD_NUMBER: _builtins.int
     transport: Global___StreamTransport.ValueType
     """How the stream is carried."""
     host: _builtins.str
@@ -233,6 +258,16 @@ class StreamEndpoint(_message.Message):
     """Whether the stream is encrypted (AES). When true and passphrase is empty, this client has no
     right to watch.
     """
+    capture_offset_ns: _builtins.int
+    """The time at which a picture was captured, on the monotonic clock of Ping, is in ns
+      PTS * 100000 / 9 + capture_offset_ns,
+    where PTS is the presentation_time_stamp of its PES packet (ISO/IEC 13818-1 2.4.3.7), in ticks of
+    90 kHz. PTS has 33 bits and wraps every 95443.7 s (26.5 h), so the result is one of many that are
+    2^33 * 100000 / 9 ns apart: the right one is the nearest to the clock's present value. The offset
+    is the same for every stream of the robot: neither another profile, encoder or source nor a restart
+    of its programs changes it. A file's picture counts as captured when it is due.
+    Unset: PTS says nothing of the capture time (robots older than this field).
+    """
     def __init__(
         self,
         *,
@@ -245,12 +280,15 @@ class StreamEndpoint(_message.Message):
         container: Global___StreamContainer.ValueType = ...,
         passphrase: _builtins.str = ...,
         encrypted: _builtins.bool = ...,
+        capture_offset_ns: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns", "capture_offset_ns", b"capture_offset_ns"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["codec", b"codec", "container", b"container", "encrypted", b"encrypted", "host", b"host", "latency_ms", b"latency_ms", "passphrase", b"passphrase", "port", b"port", "transport", b"transport", "uri", b"uri"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns", "capture_offset_ns", b"capture_offset_ns", "codec", b"codec", "container", b"container", "encrypted", b"encrypted", "host", b"host", "latency_ms", b"latency_ms", "passphrase", b"passphrase", "port", b"port", "transport", b"transport", "uri", b"uri"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__capture_offset_ns: _TypeAlias = _typing.Literal["capture_offset_ns"]  # noqa: Y015
+    _WhichOneofArgType__capture_offset_ns: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__capture_offset_ns) -> _WhichOneofReturnType__capture_offset_ns | None: ...
 
 Global___StreamEndpoint: _TypeAlias = StreamEndpoint  # noqa: Y015
 
@@ -339,6 +377,8 @@ class StreamMeasurement(_message.Message):
     LAST_FRAME_AGE_MS_FIELD_NUMBER: _builtins.int
     WORST_RTT_MS_FIELD_NUMBER: _builtins.int
     WORST_LOSS_PERCENT_FIELD_NUMBER: _builtins.int
+    WORST_PICTURE_AGE_MS_FIELD_NUMBER: _builtins.int
+    REPORTING_VIEWER_COUNT_FIELD_NUMBER: _builtins.int
     available: _builtins.bool
     """Whether a figure has been taken in this run."""
     stale: _builtins.bool
@@ -361,6 +401,12 @@ class StreamMeasurement(_message.Message):
     """The largest share of packets that any viewer reported lost in the window, in percent (0-100),
     before retransmission. Unset without viewers.
     """
+    worst_picture_age_ms: _builtins.int
+    """The largest age that any viewer has reported of the picture it shows (ReportPicture), in ms: from
+    capture to the screen. A report counts for 3 s. Unset while none does, and without viewers.
+    """
+    reporting_viewer_count: _builtins.int
+    """Viewers of which a report counts. Viewers that don't report are in viewer_count alone."""
     def __init__(
         self,
         *,
@@ -373,21 +419,27 @@ class StreamMeasurement(_message.Message):
         last_frame_age_ms: _builtins.int | None = ...,
         worst_rtt_ms: _builtins.float | None = ...,
         worst_loss_percent: _builtins.float | None = ...,
+        worst_picture_age_ms: _builtins.int | None = ...,
+        reporting_viewer_count: _builtins.int = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_rtt_ms", b"_worst_rtt_ms", "last_frame_age_ms", b"last_frame_age_ms", "worst_loss_percent", b"worst_loss_percent", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "last_frame_age_ms", b"last_frame_age_ms", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_rtt_ms", b"_worst_rtt_ms", "age_ms", b"age_ms", "available", b"available", "bitrate_kbps", b"bitrate_kbps", "fps", b"fps", "last_frame_age_ms", b"last_frame_age_ms", "stale", b"stale", "viewer_count", b"viewer_count", "worst_loss_percent", b"worst_loss_percent", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms", "_worst_loss_percent", b"_worst_loss_percent", "_worst_picture_age_ms", b"_worst_picture_age_ms", "_worst_rtt_ms", b"_worst_rtt_ms", "age_ms", b"age_ms", "available", b"available", "bitrate_kbps", b"bitrate_kbps", "fps", b"fps", "last_frame_age_ms", b"last_frame_age_ms", "reporting_viewer_count", b"reporting_viewer_count", "stale", b"stale", "viewer_count", b"viewer_count", "worst_loss_percent", b"worst_loss_percent", "worst_picture_age_ms", b"worst_picture_age_ms", "worst_rtt_ms", b"worst_rtt_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__last_frame_age_ms: _TypeAlias = _typing.Literal["last_frame_age_ms"]  # noqa: Y015
     _WhichOneofArgType__last_frame_age_ms: _TypeAlias = _typing.Literal["_last_frame_age_ms", b"_last_frame_age_ms"]  # noqa: Y015
     _WhichOneofReturnType__worst_loss_percent: _TypeAlias = _typing.Literal["worst_loss_percent"]  # noqa: Y015
     _WhichOneofArgType__worst_loss_percent: _TypeAlias = _typing.Literal["_worst_loss_percent", b"_worst_loss_percent"]  # noqa: Y015
+    _WhichOneofReturnType__worst_picture_age_ms: _TypeAlias = _typing.Literal["worst_picture_age_ms"]  # noqa: Y015
+    _WhichOneofArgType__worst_picture_age_ms: _TypeAlias = _typing.Literal["_worst_picture_age_ms", b"_worst_picture_age_ms"]  # noqa: Y015
     _WhichOneofReturnType__worst_rtt_ms: _TypeAlias = _typing.Literal["worst_rtt_ms"]  # noqa: Y015
     _WhichOneofArgType__worst_rtt_ms: _TypeAlias = _typing.Literal["_worst_rtt_ms", b"_worst_rtt_ms"]  # noqa: Y015
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__last_frame_age_ms) -> _WhichOneofReturnType__last_frame_age_ms | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__worst_loss_percent) -> _WhichOneofReturnType__worst_loss_percent | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__worst_picture_age_ms) -> _WhichOneofReturnType__worst_picture_age_ms | None: ...
     @_typing.overload
     def WhichOneof(self, oneof_group: _WhichOneofArgType__worst_rtt_ms) -> _WhichOneofReturnType__worst_rtt_ms | None: ...
 

@@ -369,3 +369,131 @@ class PingResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___PingResponse: _TypeAlias = PingResponse  # noqa: Y015
+
+@_typing.final
+class RequestKeyFrameRequest(_message.Message):
+    """Requests a key frame."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NEWEST_PTS_FIELD_NUMBER: _builtins.int
+    newest_pts: _builtins.int
+    """PTS of the newest picture of which the caller has received anything, in ticks of 90 kHz (33 bits).
+    A key frame after it that has already been made serves the request: none is forced. When that one
+    is lost as well, the caller requests again, with a newer PTS. Unset: only a key frame that is still
+    to come serves it.
+    """
+    def __init__(
+        self,
+        *,
+        newest_pts: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts", "newest_pts", b"newest_pts"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts", "newest_pts", b"newest_pts"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__newest_pts: _TypeAlias = _typing.Literal["newest_pts"]  # noqa: Y015
+    _WhichOneofArgType__newest_pts: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__newest_pts) -> _WhichOneofReturnType__newest_pts | None: ...
+
+Global___RequestKeyFrameRequest: _TypeAlias = RequestKeyFrameRequest  # noqa: Y015
+
+@_typing.final
+class RequestKeyFrameResponse(_message.Message):
+    """The robot's answer."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    FORCED_FIELD_NUMBER: _builtins.int
+    forced: _builtins.bool
+    """Whether a key frame is forced for this request. False: one that is on its way serves it."""
+    def __init__(
+        self,
+        *,
+        forced: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["forced", b"forced"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RequestKeyFrameResponse: _TypeAlias = RequestKeyFrameResponse  # noqa: Y015
+
+@_typing.final
+class ReportPictureRequest(_message.Message):
+    """The picture that a viewer shows at this moment."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    VIEWER_ID_FIELD_NUMBER: _builtins.int
+    PICTURE_AGE_MS_FIELD_NUMBER: _builtins.int
+    PICTURE_AGE_ERROR_MS_FIELD_NUMBER: _builtins.int
+    RTT_MS_FIELD_NUMBER: _builtins.int
+    LOSS_PERCENT_FIELD_NUMBER: _builtins.int
+    PACKETS_HELD_FIELD_NUMBER: _builtins.int
+    PACKETS_GIVEN_UP_FIELD_NUMBER: _builtins.int
+    DELIVERY_FIELD_NUMBER: _builtins.int
+    viewer_id: _builtins.str
+    """Names the viewer among those of the same caller; printable ASCII characters, chosen by the client.
+    Empty for a caller with one viewer.
+    """
+    picture_age_ms: _builtins.int
+    """Age of the picture on the screen, from its capture to now, in ms. At most a minute."""
+    picture_age_error_ms: _builtins.int
+    """Bound of that age's error, as it follows from Ping, in ms."""
+    rtt_ms: _builtins.int
+    """Round-trip time of the stream's connection, in ms. Unset where it is not known."""
+    loss_percent: _builtins.float
+    """Share of the stream's packets that were lost lately, before retransmission, in percent (0-100).
+    Unset where it is not known.
+    """
+    packets_held: _builtins.int
+    """Packets that waited for a missing one before them, since the viewer connected."""
+    packets_given_up: _builtins.int
+    """Packets that were given up, since the viewer connected."""
+    delivery: _preview_pb2.PictureDelivery.ValueType
+    """How the viewer takes the stream."""
+    def __init__(
+        self,
+        *,
+        viewer_id: _builtins.str = ...,
+        picture_age_ms: _builtins.int = ...,
+        picture_age_error_ms: _builtins.int = ...,
+        rtt_ms: _builtins.int | None = ...,
+        loss_percent: _builtins.float | None = ...,
+        packets_held: _builtins.int = ...,
+        packets_given_up: _builtins.int = ...,
+        delivery: _preview_pb2.PictureDelivery.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "loss_percent", b"loss_percent", "rtt_ms", b"rtt_ms"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent", "_rtt_ms", b"_rtt_ms", "delivery", b"delivery", "loss_percent", b"loss_percent", "packets_given_up", b"packets_given_up", "packets_held", b"packets_held", "picture_age_error_ms", b"picture_age_error_ms", "picture_age_ms", b"picture_age_ms", "rtt_ms", b"rtt_ms", "viewer_id", b"viewer_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__loss_percent: _TypeAlias = _typing.Literal["loss_percent"]  # noqa: Y015
+    _WhichOneofArgType__loss_percent: _TypeAlias = _typing.Literal["_loss_percent", b"_loss_percent"]  # noqa: Y015
+    _WhichOneofReturnType__rtt_ms: _TypeAlias = _typing.Literal["rtt_ms"]  # noqa: Y015
+    _WhichOneofArgType__rtt_ms: _TypeAlias = _typing.Literal["_rtt_ms", b"_rtt_ms"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__loss_percent) -> _WhichOneofReturnType__loss_percent | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__rtt_ms) -> _WhichOneofReturnType__rtt_ms | None: ...
+
+Global___ReportPictureRequest: _TypeAlias = ReportPictureRequest  # noqa: Y015
+
+@_typing.final
+class ReportPictureResponse(_message.Message):
+    """The robot's answer."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ReportPictureResponse: _TypeAlias = ReportPictureResponse  # noqa: Y015

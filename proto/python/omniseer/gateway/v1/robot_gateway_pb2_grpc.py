@@ -72,6 +72,16 @@ class RobotGatewayStub:
                 request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.SerializeToString,
                 response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.FromString,
                 _registered_method=True)
+        self.RequestKeyFrame = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/RequestKeyFrame',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameResponse.FromString,
+                _registered_method=True)
+        self.ReportPicture = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/ReportPicture',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.FromString,
+                _registered_method=True)
 
 
 class RobotGatewayServicer:
@@ -142,6 +152,31 @@ class RobotGatewayServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def RequestKeyFrame(self, request, context):
+        """Requests a key frame of the running preview, for a viewer whose picture is torn because packets are
+        lost for good. Without one it would stay torn until the next regular key frame. Requests of several
+        viewers share key frames. Returns at once, before the key frame leaves.
+
+        A connection may call it 3 times a second; all viewers together get 5 key frames a second, and up to
+        3 without waiting for the next fifth of a second.
+        FAILED_PRECONDITION: the preview is not running; there is no picture to repair.
+        RESOURCE_EXHAUSTED: called too often.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ReportPicture(self, request, context):
+        """Reports the picture that a viewer shows at this moment, so that the robot knows how old a picture it
+        is driven by: StreamMeasurement.worst_picture_age_ms. The newest report of each viewer counts, for
+        3 s; one to four a second are enough. A connection may call it 8 times a second.
+        INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
+        RESOURCE_EXHAUSTED: called too often.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RobotGatewayServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -179,6 +214,16 @@ def add_RobotGatewayServicer_to_server(servicer, server):
                     servicer.Ping,
                     request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.FromString,
                     response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.SerializeToString,
+            ),
+            'RequestKeyFrame': grpc.unary_unary_rpc_method_handler(
+                    servicer.RequestKeyFrame,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameResponse.SerializeToString,
+            ),
+            'ReportPicture': grpc.unary_unary_rpc_method_handler(
+                    servicer.ReportPicture,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -371,6 +416,60 @@ class RobotGateway:
             '/omniseer.gateway.v1.RobotGateway/Ping',
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingRequest.SerializeToString,
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.PingResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def RequestKeyFrame(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/RequestKeyFrame',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.RequestKeyFrameResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ReportPicture(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/ReportPicture',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -69,6 +69,23 @@ class RobotGatewayStub:
     """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
     their round-trip times a bound on its error.
     """
+    RequestKeyFrame: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.RequestKeyFrameRequest, _robot_gateway_pb2.RequestKeyFrameResponse]
+    """Requests a key frame of the running preview, for a viewer whose picture is torn because packets are
+    lost for good. Without one it would stay torn until the next regular key frame. Requests of several
+    viewers share key frames. Returns at once, before the key frame leaves.
+
+    A connection may call it 3 times a second; all viewers together get 5 key frames a second, and up to
+    3 without waiting for the next fifth of a second.
+    FAILED_PRECONDITION: the preview is not running; there is no picture to repair.
+    RESOURCE_EXHAUSTED: called too often.
+    """
+    ReportPicture: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.ReportPictureRequest, _robot_gateway_pb2.ReportPictureResponse]
+    """Reports the picture that a viewer shows at this moment, so that the robot knows how old a picture it
+    is driven by: StreamMeasurement.worst_picture_age_ms. The newest report of each viewer counts, for
+    3 s; one to four a second are enough. A connection may call it 8 times a second.
+    INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
+    RESOURCE_EXHAUSTED: called too often.
+    """
 
 @_typing.type_check_only
 class RobotGatewayAsyncStub(RobotGatewayStub):
@@ -108,6 +125,23 @@ class RobotGatewayAsyncStub(RobotGatewayStub):
     Ping: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.PingRequest, _robot_gateway_pb2.PingResponse]  # type: ignore[assignment]
     """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
     their round-trip times a bound on its error.
+    """
+    RequestKeyFrame: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.RequestKeyFrameRequest, _robot_gateway_pb2.RequestKeyFrameResponse]  # type: ignore[assignment]
+    """Requests a key frame of the running preview, for a viewer whose picture is torn because packets are
+    lost for good. Without one it would stay torn until the next regular key frame. Requests of several
+    viewers share key frames. Returns at once, before the key frame leaves.
+
+    A connection may call it 3 times a second; all viewers together get 5 key frames a second, and up to
+    3 without waiting for the next fifth of a second.
+    FAILED_PRECONDITION: the preview is not running; there is no picture to repair.
+    RESOURCE_EXHAUSTED: called too often.
+    """
+    ReportPicture: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.ReportPictureRequest, _robot_gateway_pb2.ReportPictureResponse]  # type: ignore[assignment]
+    """Reports the picture that a viewer shows at this moment, so that the robot knows how old a picture it
+    is driven by: StreamMeasurement.worst_picture_age_ms. The newest report of each viewer counts, for
+    3 s; one to four a second are enough. A connection may call it 8 times a second.
+    INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
+    RESOURCE_EXHAUSTED: called too often.
     """
 
 class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
@@ -187,6 +221,35 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_robot_gateway_pb2.PingResponse, _abc.Awaitable[_robot_gateway_pb2.PingResponse]]:
         """The robot's clocks. From a few calls a client computes the offset of its own clock, and from
         their round-trip times a bound on its error.
+        """
+
+    @_abc_1.abstractmethod
+    def RequestKeyFrame(
+        self,
+        request: _robot_gateway_pb2.RequestKeyFrameRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.RequestKeyFrameResponse, _abc.Awaitable[_robot_gateway_pb2.RequestKeyFrameResponse]]:
+        """Requests a key frame of the running preview, for a viewer whose picture is torn because packets are
+        lost for good. Without one it would stay torn until the next regular key frame. Requests of several
+        viewers share key frames. Returns at once, before the key frame leaves.
+
+        A connection may call it 3 times a second; all viewers together get 5 key frames a second, and up to
+        3 without waiting for the next fifth of a second.
+        FAILED_PRECONDITION: the preview is not running; there is no picture to repair.
+        RESOURCE_EXHAUSTED: called too often.
+        """
+
+    @_abc_1.abstractmethod
+    def ReportPicture(
+        self,
+        request: _robot_gateway_pb2.ReportPictureRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.ReportPictureResponse, _abc.Awaitable[_robot_gateway_pb2.ReportPictureResponse]]:
+        """Reports the picture that a viewer shows at this moment, so that the robot knows how old a picture it
+        is driven by: StreamMeasurement.worst_picture_age_ms. The newest report of each viewer counts, for
+        3 s; one to four a second are enough. A connection may call it 8 times a second.
+        INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
+        RESOURCE_EXHAUSTED: called too often.
         """
 
 def add_RobotGatewayServicer_to_server(servicer: RobotGatewayServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

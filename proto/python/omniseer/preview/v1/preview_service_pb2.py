@@ -24,47 +24,55 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n)omniseer/preview/v1/preview_service.proto\x12\x13omniseer.preview.v1\"t\n\x0c\x44\x65siredState\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x0f\n\x07\x65nabled\x18\x02 \x01(\x08\x12-\n\x07profile\x18\x03 \x01(\x0e\x32\x1c.omniseer.preview.v1.Profile\x12\x12\n\npassphrase\x18\x04 \x01(\t\"\xa8\x03\n\x0b\x41\x63tualState\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x18\n\x10\x61pplied_revision\x18\x02 \x01(\x04\x12\x32\n\x05state\x18\x03 \x01(\x0e\x32#.omniseer.preview.v1.LifecycleState\x12-\n\x07profile\x18\x04 \x01(\x0e\x32\x1c.omniseer.preview.v1.Profile\x12\x12\n\nlast_error\x18\x05 \x01(\t\x12+\n\x06stream\x18\x06 \x01(\x0b\x32\x1b.omniseer.preview.v1.Stream\x12-\n\x07\x65ncoder\x18\x07 \x01(\x0b\x32\x1c.omniseer.preview.v1.Encoder\x12\x35\n\x0bmeasurement\x18\x08 \x01(\x0b\x32 .omniseer.preview.v1.Measurement\x12/\n\x08\x63ounters\x18\t \x01(\x0b\x32\x1d.omniseer.preview.v1.Counters\x12/\n\x08listener\x18\n \x01(\x0b\x32\x1d.omniseer.preview.v1.Listener\"=\n\x08Listener\x12\x0c\n\x04port\x18\x01 \x01(\r\x12\x12\n\nlatency_ms\x18\x02 \x01(\r\x12\x0f\n\x07\x61\x64\x64ress\x18\x03 \x01(\t\"\xad\x01\n\x06Stream\x12\x10\n\x08width_px\x18\x01 \x01(\r\x12\x11\n\theight_px\x18\x02 \x01(\r\x12\x0b\n\x03\x66ps\x18\x03 \x01(\x02\x12\x1b\n\x13target_bitrate_kbps\x18\x04 \x01(\r\x12)\n\x05\x63odec\x18\x05 \x01(\x0e\x32\x1a.omniseer.preview.v1.Codec\x12\x11\n\tencrypted\x18\x06 \x01(\x08\x12\x16\n\x0e\x62itrate_reason\x18\x07 \x01(\t\"R\n\x07\x45ncoder\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08hardware\x18\x02 \x01(\x08\x12\x0e\n\x06wanted\x18\x03 \x01(\t\x12\x17\n\x0f\x66\x61llback_reason\x18\x04 \x01(\t\"\xc5\x01\n\x0bMeasurement\x12\x0b\n\x03\x66ps\x18\x01 \x01(\x02\x12\x14\n\x0c\x62itrate_kbps\x18\x02 \x01(\x02\x12\x14\n\x0cviewer_count\x18\x03 \x01(\r\x12\x19\n\x11last_frame_age_ms\x18\x04 \x01(\x04\x12\x19\n\x0cworst_rtt_ms\x18\x05 \x01(\x02H\x00\x88\x01\x01\x12\x1f\n\x12worst_loss_percent\x18\x06 \x01(\x02H\x01\x88\x01\x01\x42\x0f\n\r_worst_rtt_msB\x15\n\x13_worst_loss_percent\"h\n\x08\x43ounters\x12\x0e\n\x06starts\x18\x01 \x01(\x04\x12\x10\n\x08restarts\x18\x02 \x01(\x04\x12\x0e\n\x06\x66\x61ults\x18\x03 \x01(\x04\x12\x11\n\tfallbacks\x18\x04 \x01(\x04\x12\x17\n\x0fviewers_refused\x18\x05 \x01(\x04\"\xdd\x01\n\x10\x45ncoderCandidate\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0e\n\x06\x66\x61mily\x18\x02 \x01(\t\x12\x0f\n\x07\x65lement\x18\x03 \x01(\t\x12)\n\x05\x63odec\x18\x04 \x01(\x0e\x32\x1a.omniseer.preview.v1.Codec\x12\x10\n\x08hardware\x18\x05 \x01(\x08\x12\x0f\n\x07present\x18\x06 \x01(\x08\x12\x0e\n\x06proven\x18\x07 \x01(\x08\x12\x0e\n\x06reason\x18\x08 \x01(\t\x12\x1a\n\rfirst_byte_ms\x18\t \x01(\x02H\x00\x88\x01\x01\x42\x10\n\x0e_first_byte_ms\"N\n\x18\x41pplyDesiredStateRequest\x12\x32\n\x07\x64\x65sired\x18\x01 \x01(\x0b\x32!.omniseer.preview.v1.DesiredState\"M\n\x19\x41pplyDesiredStateResponse\x12\x30\n\x06\x61\x63tual\x18\x01 \x01(\x0b\x32 .omniseer.preview.v1.ActualState\"\x19\n\x17WatchActualStateRequest\"L\n\x18WatchActualStateResponse\x12\x30\n\x06\x61\x63tual\x18\x01 \x01(\x0b\x32 .omniseer.preview.v1.ActualState\"\x15\n\x13ListEncodersRequest\"O\n\x14ListEncodersResponse\x12\x37\n\x08\x65ncoders\x18\x01 \x03(\x0b\x32%.omniseer.preview.v1.EncoderCandidate*\xc5\x01\n\x0eLifecycleState\x12\x1f\n\x1bLIFECYCLE_STATE_UNSPECIFIED\x10\x00\x12\x1c\n\x18LIFECYCLE_STATE_DISABLED\x10\x01\x12\x1c\n\x18LIFECYCLE_STATE_STARTING\x10\x02\x12\x1b\n\x17LIFECYCLE_STATE_RUNNING\x10\x03\x12\x1c\n\x18LIFECYCLE_STATE_STOPPING\x10\x04\x12\x1b\n\x17LIFECYCLE_STATE_FAULTED\x10\x05*f\n\x07Profile\x12\x17\n\x13PROFILE_UNSPECIFIED\x10\x00\x12\x12\n\x0ePROFILE_LOW_BW\x10\x01\x12\x14\n\x10PROFILE_BALANCED\x10\x02\x12\x18\n\x14PROFILE_HIGH_QUALITY\x10\x03*>\n\x05\x43odec\x12\x15\n\x11\x43ODEC_UNSPECIFIED\x10\x00\x12\x0e\n\nCODEC_H264\x10\x01\x12\x0e\n\nCODEC_H265\x10\x02\x32\xdc\x02\n\x0ePreviewService\x12r\n\x11\x41pplyDesiredState\x12-.omniseer.preview.v1.ApplyDesiredStateRequest\x1a..omniseer.preview.v1.ApplyDesiredStateResponse\x12q\n\x10WatchActualState\x12,.omniseer.preview.v1.WatchActualStateRequest\x1a-.omniseer.preview.v1.WatchActualStateResponse0\x01\x12\x63\n\x0cListEncoders\x12(.omniseer.preview.v1.ListEncodersRequest\x1a).omniseer.preview.v1.ListEncodersResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n)omniseer/preview/v1/preview_service.proto\x12\x13omniseer.preview.v1\"t\n\x0c\x44\x65siredState\x12\x10\n\x08revision\x18\x01 \x01(\x04\x12\x0f\n\x07\x65nabled\x18\x02 \x01(\x08\x12-\n\x07profile\x18\x03 \x01(\x0e\x32\x1c.omniseer.preview.v1.Profile\x12\x12\n\npassphrase\x18\x04 \x01(\t\"\xa8\x03\n\x0b\x41\x63tualState\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x18\n\x10\x61pplied_revision\x18\x02 \x01(\x04\x12\x32\n\x05state\x18\x03 \x01(\x0e\x32#.omniseer.preview.v1.LifecycleState\x12-\n\x07profile\x18\x04 \x01(\x0e\x32\x1c.omniseer.preview.v1.Profile\x12\x12\n\nlast_error\x18\x05 \x01(\t\x12+\n\x06stream\x18\x06 \x01(\x0b\x32\x1b.omniseer.preview.v1.Stream\x12-\n\x07\x65ncoder\x18\x07 \x01(\x0b\x32\x1c.omniseer.preview.v1.Encoder\x12\x35\n\x0bmeasurement\x18\x08 \x01(\x0b\x32 .omniseer.preview.v1.Measurement\x12/\n\x08\x63ounters\x18\t \x01(\x0b\x32\x1d.omniseer.preview.v1.Counters\x12/\n\x08listener\x18\n \x01(\x0b\x32\x1d.omniseer.preview.v1.Listener\"s\n\x08Listener\x12\x0c\n\x04port\x18\x01 \x01(\r\x12\x12\n\nlatency_ms\x18\x02 \x01(\r\x12\x0f\n\x07\x61\x64\x64ress\x18\x03 \x01(\t\x12\x1e\n\x11\x63\x61pture_offset_ns\x18\x04 \x01(\x03H\x00\x88\x01\x01\x42\x14\n\x12_capture_offset_ns\"\xad\x01\n\x06Stream\x12\x10\n\x08width_px\x18\x01 \x01(\r\x12\x11\n\theight_px\x18\x02 \x01(\r\x12\x0b\n\x03\x66ps\x18\x03 \x01(\x02\x12\x1b\n\x13target_bitrate_kbps\x18\x04 \x01(\r\x12)\n\x05\x63odec\x18\x05 \x01(\x0e\x32\x1a.omniseer.preview.v1.Codec\x12\x11\n\tencrypted\x18\x06 \x01(\x08\x12\x16\n\x0e\x62itrate_reason\x18\x07 \x01(\t\"R\n\x07\x45ncoder\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08hardware\x18\x02 \x01(\x08\x12\x0e\n\x06wanted\x18\x03 \x01(\t\x12\x17\n\x0f\x66\x61llback_reason\x18\x04 \x01(\t\"\xc5\x01\n\x0bMeasurement\x12\x0b\n\x03\x66ps\x18\x01 \x01(\x02\x12\x14\n\x0c\x62itrate_kbps\x18\x02 \x01(\x02\x12\x14\n\x0cviewer_count\x18\x03 \x01(\r\x12\x19\n\x11last_frame_age_ms\x18\x04 \x01(\x04\x12\x19\n\x0cworst_rtt_ms\x18\x05 \x01(\x02H\x00\x88\x01\x01\x12\x1f\n\x12worst_loss_percent\x18\x06 \x01(\x02H\x01\x88\x01\x01\x42\x0f\n\r_worst_rtt_msB\x15\n\x13_worst_loss_percent\"h\n\x08\x43ounters\x12\x0e\n\x06starts\x18\x01 \x01(\x04\x12\x10\n\x08restarts\x18\x02 \x01(\x04\x12\x0e\n\x06\x66\x61ults\x18\x03 \x01(\x04\x12\x11\n\tfallbacks\x18\x04 \x01(\x04\x12\x17\n\x0fviewers_refused\x18\x05 \x01(\x04\"\xdd\x01\n\x10\x45ncoderCandidate\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0e\n\x06\x66\x61mily\x18\x02 \x01(\t\x12\x0f\n\x07\x65lement\x18\x03 \x01(\t\x12)\n\x05\x63odec\x18\x04 \x01(\x0e\x32\x1a.omniseer.preview.v1.Codec\x12\x10\n\x08hardware\x18\x05 \x01(\x08\x12\x0f\n\x07present\x18\x06 \x01(\x08\x12\x0e\n\x06proven\x18\x07 \x01(\x08\x12\x0e\n\x06reason\x18\x08 \x01(\t\x12\x1a\n\rfirst_byte_ms\x18\t \x01(\x02H\x00\x88\x01\x01\x42\x10\n\x0e_first_byte_ms\"N\n\x18\x41pplyDesiredStateRequest\x12\x32\n\x07\x64\x65sired\x18\x01 \x01(\x0b\x32!.omniseer.preview.v1.DesiredState\"M\n\x19\x41pplyDesiredStateResponse\x12\x30\n\x06\x61\x63tual\x18\x01 \x01(\x0b\x32 .omniseer.preview.v1.ActualState\"\x19\n\x17WatchActualStateRequest\"L\n\x18WatchActualStateResponse\x12\x30\n\x06\x61\x63tual\x18\x01 \x01(\x0b\x32 .omniseer.preview.v1.ActualState\"\x15\n\x13ListEncodersRequest\"O\n\x14ListEncodersResponse\x12\x37\n\x08\x65ncoders\x18\x01 \x03(\x0b\x32%.omniseer.preview.v1.EncoderCandidate\"@\n\x16RequestKeyFrameRequest\x12\x17\n\nnewest_pts\x18\x01 \x01(\x04H\x00\x88\x01\x01\x42\r\n\x0b_newest_pts\")\n\x17RequestKeyFrameResponse\x12\x0e\n\x06\x66orced\x18\x01 \x01(\x08\")\n\x17ReportPictureAgeRequest\x12\x0e\n\x06\x61ge_ms\x18\x01 \x01(\r\"\x1a\n\x18ReportPictureAgeResponse*\xc5\x01\n\x0eLifecycleState\x12\x1f\n\x1bLIFECYCLE_STATE_UNSPECIFIED\x10\x00\x12\x1c\n\x18LIFECYCLE_STATE_DISABLED\x10\x01\x12\x1c\n\x18LIFECYCLE_STATE_STARTING\x10\x02\x12\x1b\n\x17LIFECYCLE_STATE_RUNNING\x10\x03\x12\x1c\n\x18LIFECYCLE_STATE_STOPPING\x10\x04\x12\x1b\n\x17LIFECYCLE_STATE_FAULTED\x10\x05*f\n\x07Profile\x12\x17\n\x13PROFILE_UNSPECIFIED\x10\x00\x12\x12\n\x0ePROFILE_LOW_BW\x10\x01\x12\x14\n\x10PROFILE_BALANCED\x10\x02\x12\x18\n\x14PROFILE_HIGH_QUALITY\x10\x03*>\n\x05\x43odec\x12\x15\n\x11\x43ODEC_UNSPECIFIED\x10\x00\x12\x0e\n\nCODEC_H264\x10\x01\x12\x0e\n\nCODEC_H265\x10\x02\x32\xbb\x04\n\x0ePreviewService\x12r\n\x11\x41pplyDesiredState\x12-.omniseer.preview.v1.ApplyDesiredStateRequest\x1a..omniseer.preview.v1.ApplyDesiredStateResponse\x12q\n\x10WatchActualState\x12,.omniseer.preview.v1.WatchActualStateRequest\x1a-.omniseer.preview.v1.WatchActualStateResponse0\x01\x12\x63\n\x0cListEncoders\x12(.omniseer.preview.v1.ListEncodersRequest\x1a).omniseer.preview.v1.ListEncodersResponse\x12l\n\x0fRequestKeyFrame\x12+.omniseer.preview.v1.RequestKeyFrameRequest\x1a,.omniseer.preview.v1.RequestKeyFrameResponse\x12o\n\x10ReportPictureAge\x12,.omniseer.preview.v1.ReportPictureAgeRequest\x1a-.omniseer.preview.v1.ReportPictureAgeResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.preview.v1.preview_service_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_LIFECYCLESTATE']._serialized_start=1833
-  _globals['_LIFECYCLESTATE']._serialized_end=2030
-  _globals['_PROFILE']._serialized_start=2032
-  _globals['_PROFILE']._serialized_end=2134
-  _globals['_CODEC']._serialized_start=2136
-  _globals['_CODEC']._serialized_end=2198
+  _globals['_LIFECYCLESTATE']._serialized_start=2067
+  _globals['_LIFECYCLESTATE']._serialized_end=2264
+  _globals['_PROFILE']._serialized_start=2266
+  _globals['_PROFILE']._serialized_end=2368
+  _globals['_CODEC']._serialized_start=2370
+  _globals['_CODEC']._serialized_end=2432
   _globals['_DESIREDSTATE']._serialized_start=66
   _globals['_DESIREDSTATE']._serialized_end=182
   _globals['_ACTUALSTATE']._serialized_start=185
   _globals['_ACTUALSTATE']._serialized_end=609
   _globals['_LISTENER']._serialized_start=611
-  _globals['_LISTENER']._serialized_end=672
-  _globals['_STREAM']._serialized_start=675
-  _globals['_STREAM']._serialized_end=848
-  _globals['_ENCODER']._serialized_start=850
-  _globals['_ENCODER']._serialized_end=932
-  _globals['_MEASUREMENT']._serialized_start=935
-  _globals['_MEASUREMENT']._serialized_end=1132
-  _globals['_COUNTERS']._serialized_start=1134
-  _globals['_COUNTERS']._serialized_end=1238
-  _globals['_ENCODERCANDIDATE']._serialized_start=1241
-  _globals['_ENCODERCANDIDATE']._serialized_end=1462
-  _globals['_APPLYDESIREDSTATEREQUEST']._serialized_start=1464
-  _globals['_APPLYDESIREDSTATEREQUEST']._serialized_end=1542
-  _globals['_APPLYDESIREDSTATERESPONSE']._serialized_start=1544
-  _globals['_APPLYDESIREDSTATERESPONSE']._serialized_end=1621
-  _globals['_WATCHACTUALSTATEREQUEST']._serialized_start=1623
-  _globals['_WATCHACTUALSTATEREQUEST']._serialized_end=1648
-  _globals['_WATCHACTUALSTATERESPONSE']._serialized_start=1650
-  _globals['_WATCHACTUALSTATERESPONSE']._serialized_end=1726
-  _globals['_LISTENCODERSREQUEST']._serialized_start=1728
-  _globals['_LISTENCODERSREQUEST']._serialized_end=1749
-  _globals['_LISTENCODERSRESPONSE']._serialized_start=1751
-  _globals['_LISTENCODERSRESPONSE']._serialized_end=1830
-  _globals['_PREVIEWSERVICE']._serialized_start=2201
-  _globals['_PREVIEWSERVICE']._serialized_end=2549
+  _globals['_LISTENER']._serialized_end=726
+  _globals['_STREAM']._serialized_start=729
+  _globals['_STREAM']._serialized_end=902
+  _globals['_ENCODER']._serialized_start=904
+  _globals['_ENCODER']._serialized_end=986
+  _globals['_MEASUREMENT']._serialized_start=989
+  _globals['_MEASUREMENT']._serialized_end=1186
+  _globals['_COUNTERS']._serialized_start=1188
+  _globals['_COUNTERS']._serialized_end=1292
+  _globals['_ENCODERCANDIDATE']._serialized_start=1295
+  _globals['_ENCODERCANDIDATE']._serialized_end=1516
+  _globals['_APPLYDESIREDSTATEREQUEST']._serialized_start=1518
+  _globals['_APPLYDESIREDSTATEREQUEST']._serialized_end=1596
+  _globals['_APPLYDESIREDSTATERESPONSE']._serialized_start=1598
+  _globals['_APPLYDESIREDSTATERESPONSE']._serialized_end=1675
+  _globals['_WATCHACTUALSTATEREQUEST']._serialized_start=1677
+  _globals['_WATCHACTUALSTATEREQUEST']._serialized_end=1702
+  _globals['_WATCHACTUALSTATERESPONSE']._serialized_start=1704
+  _globals['_WATCHACTUALSTATERESPONSE']._serialized_end=1780
+  _globals['_LISTENCODERSREQUEST']._serialized_start=1782
+  _globals['_LISTENCODERSREQUEST']._serialized_end=1803
+  _globals['_LISTENCODERSRESPONSE']._serialized_start=1805
+  _globals['_LISTENCODERSRESPONSE']._serialized_end=1884
+  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_start=1886
+  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_end=1950
+  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_start=1952
+  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_end=1993
+  _globals['_REPORTPICTUREAGEREQUEST']._serialized_start=1995
+  _globals['_REPORTPICTUREAGEREQUEST']._serialized_end=2036
+  _globals['_REPORTPICTUREAGERESPONSE']._serialized_start=2038
+  _globals['_REPORTPICTUREAGERESPONSE']._serialized_end=2064
+  _globals['_PREVIEWSERVICE']._serialized_start=2435
+  _globals['_PREVIEWSERVICE']._serialized_end=3006
 # @@protoc_insertion_point(module_scope)

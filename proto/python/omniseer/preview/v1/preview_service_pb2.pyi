@@ -220,6 +220,7 @@ class Listener(_message.Message):
     PORT_FIELD_NUMBER: _builtins.int
     LATENCY_MS_FIELD_NUMBER: _builtins.int
     ADDRESS_FIELD_NUMBER: _builtins.int
+    CAPTURE_OFFSET_NS_FIELD_NUMBER: _builtins.int
     port: _builtins.int
     """UDP port."""
     latency_ms: _builtins.int
@@ -228,18 +229,25 @@ class Listener(_message.Message):
     """Address on which viewers reach it: where it is bound, or where the port of its container is
     published. The gateway encrypts by default unless this is loopback; empty counts as any address.
     """
+    capture_offset_ns: _builtins.int
+    """As StreamEndpoint.capture_offset_ns of the operators' contract; the same for every stream of this
+    service.
+    """
     def __init__(
         self,
         *,
         port: _builtins.int = ...,
         latency_ms: _builtins.int = ...,
         address: _builtins.str = ...,
+        capture_offset_ns: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns", "capture_offset_ns", b"capture_offset_ns"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["address", b"address", "latency_ms", b"latency_ms", "port", b"port"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns", "address", b"address", "capture_offset_ns", b"capture_offset_ns", "latency_ms", b"latency_ms", "port", b"port"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__capture_offset_ns: _TypeAlias = _typing.Literal["capture_offset_ns"]  # noqa: Y015
+    _WhichOneofArgType__capture_offset_ns: _TypeAlias = _typing.Literal["_capture_offset_ns", b"_capture_offset_ns"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__capture_offset_ns) -> _WhichOneofReturnType__capture_offset_ns | None: ...
 
 Global___Listener: _TypeAlias = Listener  # noqa: Y015
 
@@ -597,3 +605,88 @@ class ListEncodersResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___ListEncodersResponse: _TypeAlias = ListEncodersResponse  # noqa: Y015
+
+@_typing.final
+class RequestKeyFrameRequest(_message.Message):
+    """Request of RequestKeyFrame."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NEWEST_PTS_FIELD_NUMBER: _builtins.int
+    newest_pts: _builtins.int
+    """As in the operators' contract."""
+    def __init__(
+        self,
+        *,
+        newest_pts: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts", "newest_pts", b"newest_pts"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts", "newest_pts", b"newest_pts"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__newest_pts: _TypeAlias = _typing.Literal["newest_pts"]  # noqa: Y015
+    _WhichOneofArgType__newest_pts: _TypeAlias = _typing.Literal["_newest_pts", b"_newest_pts"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__newest_pts) -> _WhichOneofReturnType__newest_pts | None: ...
+
+Global___RequestKeyFrameRequest: _TypeAlias = RequestKeyFrameRequest  # noqa: Y015
+
+@_typing.final
+class RequestKeyFrameResponse(_message.Message):
+    """Response of RequestKeyFrame."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    FORCED_FIELD_NUMBER: _builtins.int
+    forced: _builtins.bool
+    """As in the operators' contract."""
+    def __init__(
+        self,
+        *,
+        forced: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["forced", b"forced"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RequestKeyFrameResponse: _TypeAlias = RequestKeyFrameResponse  # noqa: Y015
+
+@_typing.final
+class ReportPictureAgeRequest(_message.Message):
+    """Request of ReportPictureAge."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    AGE_MS_FIELD_NUMBER: _builtins.int
+    age_ms: _builtins.int
+    """Age in ms of the oldest picture that any viewer shows, less the bound of its error."""
+    def __init__(
+        self,
+        *,
+        age_ms: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["age_ms", b"age_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ReportPictureAgeRequest: _TypeAlias = ReportPictureAgeRequest  # noqa: Y015
+
+@_typing.final
+class ReportPictureAgeResponse(_message.Message):
+    """Response of ReportPictureAge."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ReportPictureAgeResponse: _TypeAlias = ReportPictureAgeResponse  # noqa: Y015

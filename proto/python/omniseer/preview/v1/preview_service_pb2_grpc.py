@@ -55,6 +55,16 @@ class PreviewServiceStub:
                 request_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersRequest.SerializeToString,
                 response_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersResponse.FromString,
                 _registered_method=True)
+        self.RequestKeyFrame = channel.unary_unary(
+                '/omniseer.preview.v1.PreviewService/RequestKeyFrame',
+                request_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameRequest.SerializeToString,
+                response_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameResponse.FromString,
+                _registered_method=True)
+        self.ReportPictureAge = channel.unary_unary(
+                '/omniseer.preview.v1.PreviewService/ReportPictureAge',
+                request_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeRequest.SerializeToString,
+                response_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeResponse.FromString,
+                _registered_method=True)
 
 
 class PreviewServiceServicer:
@@ -93,6 +103,23 @@ class PreviewServiceServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def RequestKeyFrame(self, request, context):
+        """Requests a key frame of the encoder, for a viewer that has lost a picture. Returns without waiting
+        for it.
+        FAILED_PRECONDITION: no encoded frames reach the listener at present.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ReportPictureAge(self, request, context):
+        """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
+        report counts, for 3 s, and only while a viewer is connected.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_PreviewServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -110,6 +137,16 @@ def add_PreviewServiceServicer_to_server(servicer, server):
                     servicer.ListEncoders,
                     request_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersRequest.FromString,
                     response_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersResponse.SerializeToString,
+            ),
+            'RequestKeyFrame': grpc.unary_unary_rpc_method_handler(
+                    servicer.RequestKeyFrame,
+                    request_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameRequest.FromString,
+                    response_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameResponse.SerializeToString,
+            ),
+            'ReportPictureAge': grpc.unary_unary_rpc_method_handler(
+                    servicer.ReportPictureAge,
+                    request_deserializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeRequest.FromString,
+                    response_serializer=omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -199,6 +236,60 @@ class PreviewService:
             '/omniseer.preview.v1.PreviewService/ListEncoders',
             omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersRequest.SerializeToString,
             omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ListEncodersResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def RequestKeyFrame(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.preview.v1.PreviewService/RequestKeyFrame',
+            omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameRequest.SerializeToString,
+            omniseer_dot_preview_dot_v1_dot_preview__service__pb2.RequestKeyFrameResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ReportPictureAge(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.preview.v1.PreviewService/ReportPictureAge',
+            omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeRequest.SerializeToString,
+            omniseer_dot_preview_dot_v1_dot_preview__service__pb2.ReportPictureAgeResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -54,6 +54,15 @@ class PreviewServiceStub:
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
     later ones return what is known by then.
     """
+    RequestKeyFrame: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.RequestKeyFrameRequest, _preview_service_pb2.RequestKeyFrameResponse]
+    """Requests a key frame of the encoder, for a viewer that has lost a picture. Returns without waiting
+    for it.
+    FAILED_PRECONDITION: no encoded frames reach the listener at present.
+    """
+    ReportPictureAge: _grpc.UnaryUnaryMultiCallable[_preview_service_pb2.ReportPictureAgeRequest, _preview_service_pb2.ReportPictureAgeResponse]
+    """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
+    report counts, for 3 s, and only while a viewer is connected.
+    """
 
 @_typing.type_check_only
 class PreviewServiceAsyncStub(PreviewServiceStub):
@@ -80,6 +89,15 @@ class PreviewServiceAsyncStub(PreviewServiceStub):
     ListEncoders: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ListEncodersRequest, _preview_service_pb2.ListEncodersResponse]  # type: ignore[assignment]
     """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
     later ones return what is known by then.
+    """
+    RequestKeyFrame: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.RequestKeyFrameRequest, _preview_service_pb2.RequestKeyFrameResponse]  # type: ignore[assignment]
+    """Requests a key frame of the encoder, for a viewer that has lost a picture. Returns without waiting
+    for it.
+    FAILED_PRECONDITION: no encoded frames reach the listener at present.
+    """
+    ReportPictureAge: _aio.UnaryUnaryMultiCallable[_preview_service_pb2.ReportPictureAgeRequest, _preview_service_pb2.ReportPictureAgeResponse]  # type: ignore[assignment]
+    """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
+    report counts, for 3 s, and only while a viewer is connected.
     """
 
 class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -122,6 +140,27 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_preview_service_pb2.ListEncodersResponse, _abc.Awaitable[_preview_service_pb2.ListEncodersResponse]]:
         """Every encoder of the catalogue and the result of its trial. The first call may take some seconds,
         later ones return what is known by then.
+        """
+
+    @_abc_1.abstractmethod
+    def RequestKeyFrame(
+        self,
+        request: _preview_service_pb2.RequestKeyFrameRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_preview_service_pb2.RequestKeyFrameResponse, _abc.Awaitable[_preview_service_pb2.RequestKeyFrameResponse]]:
+        """Requests a key frame of the encoder, for a viewer that has lost a picture. Returns without waiting
+        for it.
+        FAILED_PRECONDITION: no encoded frames reach the listener at present.
+        """
+
+    @_abc_1.abstractmethod
+    def ReportPictureAge(
+        self,
+        request: _preview_service_pb2.ReportPictureAgeRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_preview_service_pb2.ReportPictureAgeResponse, _abc.Awaitable[_preview_service_pb2.ReportPictureAgeResponse]]:
+        """Reports the age of the oldest picture that a viewer shows, for the adaptive bit rate. The newest
+        report counts, for 3 s, and only while a viewer is connected.
         """
 
 def add_PreviewServiceServicer_to_server(servicer: PreviewServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -35,7 +35,7 @@ def test_a_full_report() -> None:
         state=pb.LIFECYCLE_STATE_FAULTED,
         profile=pb.PROFILE_HIGH_QUALITY,
         last_error="no camera",
-        listener=pb.Listener(port=7100, latency_ms=125, address="10.0.0.5"),
+        listener=pb.Listener(port=7100, latency_ms=125, address="10.0.0.5", capture_offset_ns=-36),
         stream=pb.Stream(
             width_px=1280,
             height_px=720,
@@ -63,7 +63,7 @@ def test_a_full_report() -> None:
         state=PreviewState.FAULTED,
         profile=Profile.HIGH_QUALITY,
         last_error="no camera",
-        listener=Listener(port=7100, latency_ms=125, address="10.0.0.5"),
+        listener=Listener(port=7100, latency_ms=125, address="10.0.0.5", capture_offset_ns=-36),
         stream=Stream(1280, 720, 30.0, 2500, Codec.H265, True, "6 % loss"),
         encoder=Encoder(name="x264", hardware=True, wanted="mpp-h265", fallback_reason="absent"),
         measurement=Measurement(29.5, 2400.0, 2, 12, worst_rtt_ms=0.0, worst_loss_percent=1.5),

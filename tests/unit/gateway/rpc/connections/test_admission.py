@@ -6,7 +6,15 @@ from common.errors import TooMuchError
 from common.reasons import Reason
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import peer_of
-from gateway.rpc.connections.admission import PENDING_S, PENDING_STREAMS, QUIET_AFTER_S, SPARED_S, Admission
+from gateway.rpc.calls.methods import CONTRACT
+from gateway.rpc.connections.admission import (
+    METHOD_RATES,
+    PENDING_S,
+    PENDING_STREAMS,
+    QUIET_AFTER_S,
+    SPARED_S,
+    Admission,
+)
 from tests.support.clock import Clock
 
 PLACES, PER_ADDRESS = 40, 20
@@ -200,3 +208,23 @@ def test_a_unix_socket_is_not_limited(clock: Clock) -> None:
     for _ in range(10):
         admission.close_stream(peer)
     assert admission.surplus(["10.0.0.5:1"]) == []
+
+
+def test_a_method_may_have_a_rate_of_its_own(admission: Admission, clock: Clock) -> None:
+    peer, other = peer_of("ipv4:10.0.0.5:1"), peer_of("ipv4:10.0.0.5:2")
+    rate = METHOD_RATES["RequestKeyFrame"]
+    for _ in range(int(rate)):
+        admission.take_token(peer, "RequestKeyFrame")
+    with pytest.raises(TooMuchError, match="calls RequestKeyFrame more than 3 times a second") as caught:
+        admission.take_token(peer, "RequestKeyFrame")
+    assert caught.value.reason is Reason.TOO_MANY_REQUESTS
+    assert caught.value.retry_after_s == pytest.approx(1 / rate)
+    admission.take_token(peer, "ReportPicture")
+    admission.take_token(peer, "GetSystemStatus")
+    admission.take_token(other, "RequestKeyFrame")
+    clock.now_s += 1.1 / rate
+    admission.take_token(peer, "RequestKeyFrame")
+
+
+def test_every_method_with_a_rate_is_one_of_the_contract() -> None:
+    assert set(METHOD_RATES) <= set(CONTRACT.methods_by_name)

@@ -18,6 +18,7 @@ from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
 from gateway.status.board import Board
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -86,7 +87,7 @@ PREVIEW = PreviewView(
     profile=Profile.HIGH_QUALITY,
     last_error="an error",
     service_reachable=True,
-    listener=Listener(7101, 126, "10.0.0.9"),
+    listener=Listener(7101, 126, "10.0.0.9", -37),
     stream=Stream(1282, 722, 15.25, 1001, Codec.H265, True, "a reason for the rate"),
     encoder=ENCODER,
     measured=Received(Measurement(14.75, 990.5, 91, 12, 180.5, 6.5), NOW_S - 0.5625),
@@ -117,6 +118,7 @@ def snapshot(
             Fault(conditions[1], NOW_S - 209, NOW_S - 210, NOW_S - 210, 211),
         ),
         now_s=now_s,
+        pictures=Pictures(viewer_count=82, worst_age_ms=141, link_age_ms=139),
     )
 
 
@@ -220,6 +222,7 @@ PLACES: dict[str, Any] = {
     "preview.endpoint.container": preview_pb2.STREAM_CONTAINER_MPEG_TS,
     "preview.endpoint.passphrase": "a passphrase",
     "preview.endpoint.encrypted": True,
+    "preview.endpoint.capture_offset_ns": -37,
     "preview.encoder.name": "an encoder",
     "preview.encoder.hardware": True,
     "preview.encoder.wanted": "a wanted encoder",
@@ -236,6 +239,8 @@ PLACES: dict[str, Any] = {
     "preview.measured.last_frame_age_ms": 12 + 562,
     "preview.measured.worst_rtt_ms": 180.5,
     "preview.measured.worst_loss_percent": 6.5,
+    "preview.measured.worst_picture_age_ms": 141,
+    "preview.measured.reporting_viewer_count": 82,
     "preview.counters.starts": 92,
     "preview.counters.restarts": 93,
     "preview.counters.faults": 94,

@@ -21,6 +21,7 @@ from gateway.status.board import Board
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
+from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -129,7 +130,7 @@ def everything() -> Snapshot:
         profile=Profile.LOW_BW,
         last_error="what went wrong",
         service_reachable=True,
-        listener=Listener(7100, 125, "127.0.0.1"),
+        listener=Listener(7100, 125, "127.0.0.1", -36),
         stream=Stream(1280, 720, 15.0, 1000, Codec.H265, True, "RTT 180 ms"),
         encoder=Encoder("x264", True, "mpp-h265", "no such element"),
         measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),
@@ -160,6 +161,7 @@ def everything() -> Snapshot:
         gateway=Runtime("f" * 40, "boot", 1000, 3, 20, 2, "run"),
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
+        pictures=Pictures(1, 140, 138),
     )
 
 

@@ -1,0 +1,91 @@
+"""What viewers report of the pictures that they show: how old a picture the robot is driven by. Pure.
+
+Reports are claims of viewers that nothing proves, so little follows from them, and each only for a while.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+REPORT_COUNTS_S: Final = 3.0
+"""How long a report counts."""
+MAX_VIEWERS: Final = 64
+"""Viewers whose reports are kept; beyond it the one that reported longest ago is dropped. A viewer that goes
+on reporting is back with its next report, so a flood of names displaces none for long."""
+LONGEST_OF_LINK_MS: Final = 5_000
+"""An older picture is frozen or made up: a lower bit rate would not make it younger."""
+
+
+class Delivery(Enum):
+    """How a viewer takes the stream: as packets arrive, or after the SRT latency."""
+
+    DIRECT = "direct"
+    SRT_LATENCY = "SRT latency"
+
+
+@dataclass(frozen=True, slots=True)
+class PictureReport:
+    """The picture that a viewer shows; counts are since it connected. None where the viewer does not know.
+
+    Attributes:
+        age_ms: from capture to now.
+        error_ms: bound of the error of `age_ms`.
+        packets_held: that waited for a missing one before them.
+        packets_given_up: that never came.
+    """
+
+    age_ms: int
+    error_ms: int
+    rtt_ms: int | None
+    loss_percent: float | None
+    packets_held: int
+    packets_given_up: int
+    delivery: Delivery | None
+
+
+@dataclass(frozen=True, slots=True)
+class Pictures:
+    """All reports that count, together.
+
+    Attributes:
+        viewer_count: viewers that have one.
+        worst_age_ms: the largest age; None without reports.
+        link_age_ms: the same as far as it is beyond the viewers' doubt and may be caused by the link: for the
+            adaptive bit rate. None if no report is of that kind.
+    """
+
+    viewer_count: int = 0
+    worst_age_ms: int | None = None
+    link_age_ms: int | None = None
+
+
+NO_PICTURES: Final = Pictures()
+
+
+class PictureReports:
+    """The newest report of each viewer. Used on one event loop."""
+
+    def __init__(self) -> None:
+        self._reports: dict[tuple[str, str], tuple[float, PictureReport]] = {}
+        """By caller and viewer: when it came, monotonic seconds, and the report; the newest at the end."""
+
+    def take(self, caller: str, viewer_id: str, report: PictureReport, now_s: float) -> None:
+        """Takes a report; it replaces the viewer's last one."""
+        self._reports.pop((caller, viewer_id), None)
+        self._reports[caller, viewer_id] = now_s, report
+        if len(self._reports) > MAX_VIEWERS:
+            del self._reports[next(iter(self._reports))]
+
+    def counting(self, now_s: float) -> Pictures:
+        """Returns what the reports say that count at `now_s`; forgets the others."""
+        while self._reports and now_s - next(iter(self._reports.values()))[0] > REPORT_COUNTS_S:
+            del self._reports[next(iter(self._reports))]
+        if not self._reports:
+            return NO_PICTURES
+        reports = [report for _, report in self._reports.values()]
+        of_link = [r for r in reports if r.age_ms <= LONGEST_OF_LINK_MS]
+        return Pictures(
+            viewer_count=len(reports),
+            worst_age_ms=max(report.age_ms for report in reports),
+            link_age_ms=max((max(0, r.age_ms - r.error_ms) for r in of_link), default=None),
+        )

@@ -1,0 +1,168 @@
+"""What viewers request and report, through a gateway to the preview service."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+
+from common.reasons import Reason
+from console.client.refusal import refusal_in
+from gateway.rpc.connections.admission import METHOD_RATES
+from omniseer.gateway.v1.preview_pb2 import PICTURE_DELIVERY_DIRECT
+from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest, RequestKeyFrameRequest
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.eventually import eventually
+from tests.support.preview_double import PreviewDouble, serve_double
+from tests.support.running_gateway import Operator, running_gateway
+
+FAST_ENOUGH_S = 5.0
+
+
+@asynccontextmanager
+async def robot(socket: Path, double: PreviewDouble) -> AsyncIterator[Operator]:
+    server = await serve_double(socket, double)
+    try:
+        async with running_gateway(socket) as operator:
+            yield operator
+    finally:
+        await server.stop(None)
+
+
+async def turned_on(operator: Operator, double: PreviewDouble, viewers: int = 1) -> None:
+    """Enables the preview; so many viewers are on its stream."""
+    double.actual.measurement.CopyFrom(pb.Measurement(fps=30, viewer_count=viewers))
+    await operator.switch(True)
+    await eventually(
+        operator.status, lambda status: status.preview.measured.available, "the stream is measured"
+    )
+
+
+async def report(operator: Operator, **fields: Any) -> None:
+    await operator.stub.ReportPicture(ReportPictureRequest(**fields), timeout=FAST_ENOUGH_S)
+
+
+async def refused(call: Any) -> tuple[grpc.StatusCode, str, str]:
+    """The code, reason and text that a call is refused with."""
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await call
+    error = caught.value
+    return error.code(), refusal_in(error.trailing_metadata()).reason, error.details() or ""
+
+
+def key_frame(operator: Operator, newest_pts: int | None = None) -> Any:
+    return operator.stub.RequestKeyFrame(RequestKeyFrameRequest(newest_pts=newest_pts), timeout=FAST_ENOUGH_S)
+
+
+async def test_a_request_for_a_key_frame_reaches_the_preview(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double)
+        assert (await key_frame(operator, 1 << 32)).forced
+        assert not (await key_frame(operator)).forced, "another request's serves it"
+        first, second = double.key_frames_requested
+        assert first.newest_pts == 1 << 32
+        assert not second.HasField("newest_pts")
+
+
+async def test_without_video_a_request_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        code, reason, text = await refused(key_frame(operator))
+        assert (code, reason) == (grpc.StatusCode.FAILED_PRECONDITION, Reason.PREVIEW_NOT_RUNNING)
+        assert text == "the preview is off; turn it on first"
+        await turned_on(operator, double)
+        # The gateway has yet to learn of it.
+        double.actual.state = pb.LIFECYCLE_STATE_STOPPING
+        code, reason, text = await refused(key_frame(operator))
+        assert (code, reason) == (grpc.StatusCode.FAILED_PRECONDITION, Reason.PREVIEW_NOT_RUNNING)
+        assert "the double makes no video" in text
+
+
+async def test_a_preview_service_that_hangs_does_not_keep_the_caller(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double)
+        double.thawed.clear()
+        async with asyncio.timeout(2):
+            code, reason, text = await refused(key_frame(operator))
+        assert (code, reason) == (grpc.StatusCode.FAILED_PRECONDITION, Reason.PREVIEW_NOT_RUNNING)
+        assert "does not answer" in text
+        double.thawed.set()
+
+
+async def test_the_worst_age_is_shown_and_passed_on(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double, viewers=2)
+        measured = (await operator.status()).preview.measured
+        assert (measured.HasField("worst_picture_age_ms"), measured.reporting_viewer_count) == (False, 0)
+        await report(operator, viewer_id="left", picture_age_ms=90, delivery=PICTURE_DELIVERY_DIRECT)
+        await report(operator, viewer_id="right", picture_age_ms=200, picture_age_error_ms=80)
+        measured = (
+            await eventually(
+                operator.status, lambda s: s.preview.measured.reporting_viewer_count == 2, "both count"
+            )
+        ).preview.measured
+        assert measured.worst_picture_age_ms == 200
+
+        async def passed_on() -> list[int]:
+            return double.picture_ages_ms
+
+        # The newest is always passed on; the first may have been replaced before it was.
+        await eventually(passed_on, lambda ages: ages[-1:] == [120], "the age less its error")
+
+
+async def test_without_a_viewer_on_the_stream_no_report_counts(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double, viewers=0)
+        await report(operator, picture_age_ms=900)
+        measured = (await operator.status()).preview.measured
+        assert (measured.HasField("worst_picture_age_ms"), measured.reporting_viewer_count) == (False, 0)
+        await turned_on(operator, double, viewers=1)
+        await eventually(operator.status, lambda s: s.preview.measured.viewer_count, "a viewer")
+        await report(operator, picture_age_ms=140)
+
+        async def passed_on() -> list[int]:
+            return double.picture_ages_ms
+
+        assert await eventually(passed_on, bool, "an age") == [140], "the earlier one was not passed on"
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"viewer_id": "x" * 65},
+        {"viewer_id": "a\x1b[2J"},
+        {"viewer_id": "\u202e"},
+        {"picture_age_ms": 60_001},
+        {"picture_age_error_ms": 60_001},
+        {"rtt_ms": 60_001},
+        {"loss_percent": -1.0},
+        {"loss_percent": 100.5},
+        {"loss_percent": float("nan")},
+        {"delivery": 99},
+    ],
+    ids=str,
+)
+async def test_a_report_out_of_its_bounds_is_refused(tmp_path: Path, fields: dict[str, Any]) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        code, reason, text = await refused(report(operator, **fields))
+        assert (code, reason) == (grpc.StatusCode.INVALID_ARGUMENT, Reason.INVALID_REQUEST)
+        assert text.startswith(next(iter(fields)))
+
+
+async def test_a_connection_that_floods_is_refused(tmp_path: Path) -> None:
+    double = PreviewDouble()
+    async with robot(tmp_path / "preview.sock", double) as operator:
+        await turned_on(operator, double)
+        calls = [key_frame(operator) for _ in range(int(METHOD_RATES["RequestKeyFrame"]) + 3)]
+        results = await asyncio.gather(*calls, return_exceptions=True)
+        codes = [each.code() for each in results if isinstance(each, grpc.aio.AioRpcError)]
+        assert codes == [grpc.StatusCode.RESOURCE_EXHAUSTED] * 3
+        assert (await operator.status()).preview.state, "other methods have buckets of their own"
