@@ -7,9 +7,9 @@ import typer
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
+from console.cli.error_report import error_as_json
 from console.cli.json_form import json_form
-from console.cli.options import with_session
-from console.cli.session import Session, error_as_json, print_json
+from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage

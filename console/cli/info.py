@@ -9,9 +9,18 @@ from rich.table import Table
 from rich.text import Text
 
 from console.cli.json_form import json_form
+from console.cli.session import Session, with_session
 from console.cli.tables import grid
 from console.client import GatewayInfo
 from console.presentation.formatting import UNKNOWN, age, wall_clock
+
+
+@with_session
+def info(session: Session) -> None:
+    """Show the gateway program: build, call counts, configuration."""
+    with session.connect() as gateway:
+        answer = gateway.info()
+    session.show(info_json(answer), info_view(answer, gateway.target))
 
 
 def info_json(info: GatewayInfo) -> dict[str, Any]:

@@ -7,8 +7,8 @@ import grpc
 
 from common.reasons import Reason
 from console.client import errors
-from console.client.printable import printable
 from console.client.refusal import refusal_in
+from console.printable import printable
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
     # An error with the code OK is a defect of the server.

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from console.client import DEFAULT_TARGET
 from console.robots.robots_file import Robot, RobotsFile, read_robots_file
+from console.target import DEFAULT_TARGET
 
 TARGET_VARIABLE: Final = "ROBOTCTL_TARGET"
 ROBOT_VARIABLE: Final = "ROBOTCTL_ROBOT"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from console.client import Credentials
+from console.credentials import Credentials
 from console.robots.robots_file import Robot
 
 _TOKEN_CHARACTERS: Final = frozenset(string.ascii_letters + string.digits + "-._~+/=")

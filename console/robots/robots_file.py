@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ExitCode, UserError
-from console.client import parse_target
+from console.target import parse_target
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _TOP_KEYS: Final = ("default", "robots")
