@@ -1,5 +1,6 @@
 """robotctl robots: lists, adds and removes robots known by name."""
 
+import sys
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -62,6 +63,8 @@ def remove(context: typer.Context, name: NameArgument, as_json: JsonOption = Fal
     known = drop_robot(name)
     forget_credentials(known.path, name)
     _show(context, known, as_json)
+    if known.robots and known.default is None:
+        print("No robot is the default now. Type: robotctl robots default NAME", file=sys.stderr)
 
 
 @robots_app.command("default")

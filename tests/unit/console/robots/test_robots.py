@@ -2,6 +2,7 @@
 
 import stat
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -144,6 +145,13 @@ def test_who_speaks_first(
 
 def test_without_anything_it_is_this_computer() -> None:
     assert choose(None, None, {}, lambda: RobotsFile(Path("/b"))) == (Robot(target="127.0.0.1:50051"), None)
+
+
+def test_robots_without_a_default_do_not_lead_to_this_computer() -> None:
+    known = replace(KNOWN, default=None)
+    with pytest.raises(UserError, match=r"none of one, two is the default.*robotctl robots default NAME"):
+        choose(None, None, {}, lambda: known)
+    assert choose(None, None, {"ROBOTCTL_ROBOT": "one"}, lambda: known)[1] == "one"
 
 
 def test_an_address_beside_a_name_replaces_the_address_alone() -> None:
