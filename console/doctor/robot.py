@@ -5,7 +5,7 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
-from console.client.results import FaultSeverity, SourceState
+from console.client.results import FaultSeverity, HealthState, SourceState
 
 LARGEST_SKEW_S: Final = 1.0
 
@@ -56,11 +56,12 @@ def clock_finding(robot_unix_s: float, own_unix_s: float, uncertainty_s: float) 
 def health_finding(status: SystemStatus) -> Finding:
     """Reports the robot's own verdict; as a note where an active fault is the reason."""
     health = status.health
-    if health.ready:
+    if health.ready and health.state is HealthState.OK:
         return good("health", health.summary)
+    why = "A part of the robot does not work" if health.ready else "The robot can't work"
     if any(fault.active and fault.severity is FaultSeverity.ERROR for fault in status.faults):
-        return note("health", health.summary, "The robot can't work", "See the faults below")
-    return wrong("health", health.summary, "The robot can't work", "See the findings below")
+        return note("health", health.summary, why, "See the faults below")
+    return wrong("health", health.summary, why, "See the findings below")
 
 
 def fault_findings(status: SystemStatus) -> Iterator[Finding]:

@@ -70,10 +70,16 @@ class SourceRule:
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """The expectations of all sources; `sources` holds the configured ones in the order they are shown."""
+    """The expectations of the robot.
+
+    Attributes:
+        sources: the configured ones, in the order they are shown.
+        ignored_by_health: fault ids, or their beginnings up to a dot, whose errors don't degrade the health.
+    """
 
     sources: Mapping[SourceSpec[Any], SourceRule]
     platform_stale_after_ms: int
+    ignored_by_health: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +141,13 @@ def take(
         health=NOT_READ
         if ros_stalled
         else assess(
-            (spec.health_name, samples[spec].freshness)
-            for spec in _HEALTH_SOURCES
-            if spec in configured and configured[spec].required
+            (
+                (spec.health_name, samples[spec].freshness)
+                for spec in _HEALTH_SOURCES
+                if spec in configured and configured[spec].required
+            ),
+            faults,
+            rules.ignored_by_health,
         ),
         samples=samples,
         command=_command(rules, board, now_s),

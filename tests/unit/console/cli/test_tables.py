@@ -168,3 +168,11 @@ def test_overlay_lists_objects_and_events() -> None:
         assert part in text
     assert "#4" in text
     assert "1 min 05 s ago" in text
+
+
+def test_health_counts_active_errors_and_warnings() -> None:
+    message = healthy_status()
+    for severity, active in (("ERROR", True), ("ERROR", True), ("WARNING", True), ("ERROR", False)):
+        message.faults.add(severity=f"FAULT_SEVERITY_{severity}", active=active, message="broken")
+    health = table_rows(View(decoded(message)))[0]
+    assert (health.label, health.text) == ("health", "robot healthy (2 errors, 1 warning)")
