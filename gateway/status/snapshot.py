@@ -17,7 +17,7 @@ from gateway.status.sources import (
     EFFECTIVE_COMMAND,
     MUX_INPUTS,
     PLATFORM_SOURCES,
-    SOURCES,
+    ROS_SOURCES,
     SourceSpec,
     ValueT,
 )
@@ -25,7 +25,6 @@ from gateway.status.sources import (
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
 ROS_STALLED_AFTER_S: Final = 2.0
 """Forty passes of the ROS sampler: it hangs in the middleware, or the computer is overloaded."""
-_HEALTH_SOURCES: Final = tuple(spec for spec in SOURCES if spec.health_name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +141,8 @@ def take(
         if ros_stalled
         else assess(
             (
-                (spec.health_name, samples[spec].freshness)
-                for spec in _HEALTH_SOURCES
+                (spec.health_name or spec.display_name, samples[spec].freshness)
+                for spec in ROS_SOURCES
                 if spec in configured and configured[spec].required
             ),
             faults,
