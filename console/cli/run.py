@@ -7,12 +7,14 @@ from typing import NoReturn
 import typer
 
 from common.errors import ExitCode, UserError
+from common.output import tolerate_encoding
 from console.cli.app import command_line
 from console.cli.error_report import report
 
 
 def run() -> NoReturn:
     """Runs the command line of this process and ends it."""
+    tolerate_encoding()
     sys.exit(exit_code())
 
 
