@@ -1,7 +1,7 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 from rich.text import Text
@@ -16,6 +16,9 @@ from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeveri
 from console.client.results import GapReason
 from console.presentation.formatting import plural, wall_clock
 from console.presentation.severity_style import FAULT_STYLES
+
+_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
+"""With the time zone, which the robot's log may not share."""
 
 
 @with_session
@@ -67,7 +70,7 @@ def _show(session: Session, item: Event | EventGap | Outage) -> None:
 def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
     match item:
         case Event():
-            yield Text(f"{wall_clock(item.wall_clock_unix_ms):19}", style="dim")
+            yield Text(f"{wall_clock(item.wall_clock_unix_ms, form=_CLOCK_FORM):24}", style="dim")
             loud = item.severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
             style = STYLES[FAULT_STYLES[item.severity]] if loud else ""
             yield Text(f"{item.severity.value:7}", style=style)

@@ -2,8 +2,9 @@
 
 import json
 from datetime import UTC
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -16,11 +17,17 @@ from console.presentation.formatting import UNKNOWN, age, wall_clock
 
 
 @with_session
-def info(session: Session) -> None:
+def info(
+    session: Session,
+    *,
+    full: Annotated[
+        bool, typer.Option("--full", help="Show the configuration, too.", show_default=False)
+    ] = False,
+) -> None:
     """Show the gateway program: build, call counts, configuration."""
     with session.connect() as gateway:
         answer = gateway.info()
-    session.show(info_json(answer), info_view(answer, gateway.target))
+    session.show(info_json(answer), info_view(answer, gateway.target, full=full))
 
 
 def info_json(info: GatewayInfo) -> dict[str, Any]:
@@ -30,8 +37,9 @@ def info_json(info: GatewayInfo) -> dict[str, Any]:
     return document | {"configuration": json.loads(text) if text else None}
 
 
-def info_view(info: GatewayInfo, target: str) -> RenderableType:
-    """Returns the view for people: build and uptime, call counts, configuration."""
+def info_view(info: GatewayInfo, target: str, *, full: bool = False) -> RenderableType:
+    """Returns the view for people: build and uptime, call counts; the full one with the configuration."""
+    configuration = info.configuration_json or UNKNOWN
     return Group(
         Text.assemble((info.gateway_name or "robot", "bold"), (f"  {target}", "dim")),
         Text(),
@@ -39,8 +47,8 @@ def info_view(info: GatewayInfo, target: str) -> RenderableType:
         Text(),
         _calls(info),
         Text(),
-        Text("configuration", style="dim"),
-        Text(info.configuration_json or UNKNOWN),
+        Text("configuration" if full else "configuration: robotctl info --full", style="dim"),
+        *([Text(configuration)] if full else []),
     )
 
 

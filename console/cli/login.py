@@ -1,5 +1,6 @@
 """robotctl login: stores a login for a robot, after the robot has accepted it."""
 
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from console.client import Credentials, GatewayClient, NotAllowed
 from console.robots import read_credentials, read_robots_file
 from console.robots.credentials import read_public
 from console.robots.login import keep_login, parse_login
-from console.robots.robots_file import check_name
+from console.robots.robots_file import FILE_KEYS, check_name
 from console.target import parse_target
 
 AnswerT = TypeVar("AnswerT")
@@ -39,6 +40,10 @@ def login(
     *,
     ca: Annotated[Path | None, typer.Option(help="Replace the robot's CA certificate only (PEM).")] = None,
     offline: Annotated[bool, typer.Option(help="Store it without contacting the robot.")] = False,
+    replacing: Annotated[
+        bool,
+        typer.Option("--replace", help="Store it over the robot's present login.", show_default=False),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Store a login issued by the robot's administrator, for all later commands.
@@ -47,6 +52,8 @@ def login(
     """
     check_name(name)
     target = parse_target(target)
+    if not (replacing or ca):
+        _check_free(name, target, file)
     user, credentials = _with_new_authority(name, ca) if ca else _read(file)
     gateway_name = ""
     if not offline:
@@ -83,6 +90,17 @@ def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time
             if error.reason != Reason.CREDENTIAL_UNKNOWN or pauses.failures == _RETRIES:
                 raise
         sleep(pauses.next_s())
+
+
+def _check_free(name: str, target: str, file: str) -> None:
+    known = read_robots_file().robots.get(name)
+    if known and any(getattr(known, key) for key in FILE_KEYS):
+        words = shlex.join(["robotctl", "login", name, target, *([] if file == _STANDARD_INPUT else [file])])
+        raise UserError(
+            f"'{name}' has a login already, at {known.target}",
+            f"Type: {words} --replace",
+            exit_code=ExitCode.USAGE,
+        )
 
 
 def _read(file: str) -> tuple[str, Credentials]:

@@ -17,7 +17,16 @@ from console.client.results import (
     SourceState,
     TeleopState,
 )
-from console.presentation.formatting import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
+from console.presentation.formatting import (
+    UNKNOWN,
+    age,
+    bit_rate,
+    gibibytes,
+    joined,
+    plural,
+    quantity,
+    signed,
+)
 from console.presentation.severity_style import (
     FAULT_STYLES,
     FRESHNESS_STYLES,
@@ -210,6 +219,13 @@ def _gateway(view: View) -> Iterator[Row]:
     yield Row(view.label("gateway"), "up", SeverityStyle.QUIET, text, view.age(gateway.uptime_ms))
 
 
+def _preview(view: View) -> Iterator[Row]:
+    # One warning is enough: the fault above says the same.
+    reported = any(fault.active and fault.id == "preview.fallback" for fault in view.status.faults)
+    rows = preview_rows(view.status.preview, view)
+    return (row for row in rows if not (reported and row.mark == "fallback"))
+
+
 def _teleop(view: View) -> Iterator[Row]:
     teleop = view.status.teleop
     if teleop.state is TeleopState.UNKNOWN:
@@ -294,7 +310,7 @@ def _network(network: results.Network, compact: bool) -> str:
 def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     return joined(
-        quantity(measured.bitrate_kbps, "kbit/s", 0) + ("" if compact else f" of {target_kbps}"),
+        bit_rate(measured.bitrate_kbps) + ("" if compact else f" of {bit_rate(target_kbps)}"),
         quantity(measured.fps, "fps"),
         plural(measured.viewer_count, "viewer"),
         "" if compact or rtt_ms is None else f"round trip {quantity(rtt_ms, 'ms')}",
@@ -358,7 +374,7 @@ TABLE: Final[tuple[Rows, ...]] = (
     _measured("motion", lambda status: status.odometry, _motion),
     _measured("vision", lambda status: status.vision, _vision),
     _objects,
-    _full(lambda view: preview_rows(view.status.preview, view)),
+    _full(_preview),
     _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
     _measured("command", lambda status: status.effective_command, _command, optional=True),
     _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),

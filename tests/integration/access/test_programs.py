@@ -150,6 +150,18 @@ def test_a_login_from_a_pipe_is_accepted_every_time(ground: Path) -> None:
         )
 
 
+def test_a_login_is_stored_over_another_only_on_request(ground: Path) -> None:
+    credentials(ground, "init")
+    login = ground / "anna.login"
+    credentials(ground, "add", "anna", "--role", "viewer", "--out", str(login))
+    words = ("login", "lab", "lab.local:1", str(login), "--offline")
+    assert operator(ground, *words).returncode == 0
+    again = operator(ground, *words)
+    assert again.returncode == 2
+    assert f"robotctl login lab lab.local:1 {login} --replace" in only_line(again.stderr)
+    assert operator(ground, *words, "--replace").returncode == 0
+
+
 def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:
     credentials(ground, "init")
     done = gateway(ground, "credentials", "rotate", "ca")

@@ -135,9 +135,9 @@ def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:
     measured.available, measured.fps, measured.bitrate_kbps, measured.viewer_count = True, 30, 2480, 1
     text = printed(status_view(decoded(message), "robot:50051"))
     assert "srt://10.0.0.7:7100" in text
-    assert "2480 kbit/s of 2500, 30.0 fps, 1 viewer" in text
+    assert "2.48 Mbit/s of 2.50 Mbit/s, 30.0 fps, 1 viewer" in text
     assert "round trip" not in text, "none was measured"
-    assert "preview running 30.0 fps 2480 kbit/s 1 viewer" in status_line(decoded(message))
+    assert "preview running 30.0 fps 2.48 Mbit/s 1 viewer" in status_line(decoded(message))
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])

@@ -167,6 +167,11 @@ def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
     assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read)[0] == Robot(target="typed:1")
 
 
+def test_a_name_with_a_slip() -> None:
+    with pytest.raises(UserError, match=r"known: one, two\)\. Did you mean 'two'\?"):
+        KNOWN.find("tow")
+
+
 def test_an_unknown_name() -> None:
     with pytest.raises(UserError, match=r"no robot is called 'three' in /b \(known: one, two\)") as seen:
         choose(None, "three", {}, lambda: KNOWN)
