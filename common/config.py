@@ -1,12 +1,14 @@
 """Loads and validates a program's YAML configuration file; environment variables override it."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
+from common.config_problems import first_problem
 from common.errors import ExitCode, UserError
 
 
@@ -47,46 +49,105 @@ def load(settings_type: type[SettingsT], path: Path | None) -> SettingsT:
     """Reads and validates a configuration file; without a path, defaults and environment apply alone.
 
     Raises:
-        UserError: the file can't be read, is not YAML, or has an unknown key or an invalid value. The text
-            names the file, the key, the value and the values allowed.
+        UserError: the file can't be read, is not YAML, or has an unknown key, a key twice or a wrong value.
+            The text names the file, the line, the key, the value and what is expected.
     """
-    values = _read(path) if path else {}
+    values, line_of = _read(path) if path else ({}, _no_line)
     try:
         return settings_type(**values)
     except ValidationError as error:
         prefix = settings_type.model_config.get("env_prefix", "")
+        problem = first_problem(error, settings_type)
         raise _error(
-            f"{path or 'from the environment'}: {_first_problem(error)}",
+            f"{path or 'from the environment'}{line_of(problem.location)}: {problem.text}",
             f"Correct it in the file or in the {prefix}* environment variable",
         ) from error
 
 
-def _read(path: Path) -> dict[str, Any]:
+def as_yaml(settings: Settings) -> str:
+    """Returns the settings as they are in effect, with all defaults and environment variables."""
+    return yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def json_schema(settings_type: type[Settings]) -> dict[str, Any]:
+    """Returns the JSON schema of a configuration file, for editors."""
+    # As a plain adapter: the schema of settings would be the same, but typed as an instance method.
+    return TypeAdapter(settings_type).json_schema()
+
+
+class _KeyTwiceError(yaml.MarkedYAMLError):
+    """A mapping has a key twice."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that stands twice in one mapping, of which YAML libraries take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: dict[str, yaml.Node] = {}
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and key.value != "<<":
+                if key.value in seen:
+                    first = seen[key.value].start_mark.line + 1
+                    what = f"key '{key.value}' is there twice, first in line {first}"
+                    raise _KeyTwiceError(None, None, what, key.start_mark)
+                seen[key.value] = key
+        return super().construct_mapping(node, deep)
+
+
+_LineOf = Callable[[tuple[int | str, ...]], str]
+
+
+def _read(path: Path) -> tuple[dict[str, Any], _LineOf]:
+    """Returns the file's content, and what finds the line of a key in it."""
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        loader = _Loader(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise _error(f"{path} can't be read: {error}", "Name a readable file with --config") from error
+    except yaml.YAMLError as error:
+        raise _not_yaml(path, error) from error
+    try:
+        node = loader.get_single_node()
+        values = loader.construct_document(node) if node else None
     # PyYAML raises ValueError for a date that does not exist and RecursionError for deep nesting.
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise _error(f"{path} is not YAML: {error}") from error
-    if values is None:
-        return {}
+        raise _not_yaml(path, error) from error
+    finally:
+        loader.dispose()
+    if node is None or values is None:
+        return {}, _no_line
     if not isinstance(values, dict):
         kind = type(values).__name__
         raise _error(f"{path} holds a {kind} at the top level", "Write keys and values, 'grpc:' for example")
     # YAML keys may be numbers or dates; as text, they are reported as unknown keys like any other.
-    return {str(key): value for key, value in values.items()}
+    return {str(key): value for key, value in values.items()}, lambda location: _line(node, location)
+
+
+def _not_yaml(path: Path, error: Exception) -> UserError:
+    mark = getattr(error, "problem_mark", None)
+    if mark is None:
+        return _error(f"{path} is not YAML: {error}")
+    verdict = "" if isinstance(error, _KeyTwiceError) else " is not YAML"
+    return _error(f"{path}, line {mark.line + 1}{verdict}: {getattr(error, 'problem', '')}")
+
+
+def _line(node: yaml.Node, location: tuple[int | str, ...]) -> str:
+    """Returns where the deepest part of a location stands, ", line 7"; empty where the file has none."""
+    line = None
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
+            if found is None:
+                continue  # A part that pydantic adds, such as the kind of a union's member.
+            line, node = found[0].start_mark.line, found[1]
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line
+    return "" if line is None else f", line {line + 1}"
+
+
+def _no_line(_location: tuple[int | str, ...]) -> str:
+    return ""
 
 
 def _error(problem: str, remedy: str = "") -> UserError:
     return UserError(f"configuration {problem}", remedy, exit_code=ExitCode.USAGE)
-
-
-def _first_problem(error: ValidationError) -> str:
-    problems = error.errors(include_url=False)
-    first = problems[0]
-    key = ".".join(str(part) for part in first["loc"]) or "(top)"
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    if first["type"] == "extra_forbidden":
-        return f"unknown key '{key}'{more}"
-    return f"key '{key}' is {first['input']!r}: {first['msg']}{more}"

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar
 
 from common.reasons import Reason
 
@@ -26,6 +27,9 @@ class UserError(Exception):
         remedy: what to do or to type. Empty only where `what` implies it.
         exit_code: of the program.
     """
+
+    kind: ClassVar[str] = ""
+    """Stable identifier for programs; empty where the exit code is the only one."""
 
     def __init__(self, what: str, remedy: str = "", *, exit_code: ExitCode = ExitCode.FAILED) -> None:
         super().__init__(what)

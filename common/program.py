@@ -13,6 +13,7 @@ import uvloop
 
 from common import heartbeat
 from common.errors import UserError
+from common.output import tolerate_encoding
 
 _DESCRIPTORS: Final = 65_536
 """More than any program of the project can use."""
@@ -23,6 +24,7 @@ _ARENAS: Final = 2
 
 def run_to_exit(work: Callable[[], None]) -> None:
     """Calls `work`; if it raises a `UserError`, prints it as one line and exits with its exit code."""
+    tolerate_encoding()
     try:
         work()
     except UserError as error:

@@ -84,6 +84,7 @@ COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 # Volumes take over whose these are; so does a tmpfs on /tmp, whatever mode it is given, before runc 1.1.8.
 RUN install -d -m 0700 -o 10001 -g 10000 /tmp /var/lib/robot-gateway/credentials /var/lib/robot-gateway/audit
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    ROBOT_GATEWAY_CONFIG=/etc/robot-gateway/gateway.yaml \
     GATEWAY__LOG_FORMAT=json \
     GRPC_VERBOSITY=ERROR \
     PYTHONDONTWRITEBYTECODE=1 \

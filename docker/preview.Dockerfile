@@ -49,6 +49,7 @@ COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
 RUN install -d -m 0700 -o 10002 -g 10000 /tmp
 # The registry is made anew by every container: one made where the encoder's device was missing keeps hiding it.
 ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    ROBOT_PREVIEW_CONFIG=/etc/robot-gateway/preview.yaml \
     PREVIEW__LOG_FORMAT=json \
     PYTHONDONTWRITEBYTECODE=1 \
     HOME=/tmp \

@@ -18,7 +18,7 @@ from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
 from console.client.mapping.methods import METHODS
-from console.client.printable import escaped, printable, printable_lines
+from console.printable import escaped, printable, printable_lines
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission

@@ -26,6 +26,8 @@ _log = logging.getLogger(__name__)
 
 _KIB: Final = 1024
 _AUDIT_FILE: Final = "audit.jsonl"
+_MOST_NAMED: Final = 16
+"""Changed credentials that one record of the audit log names."""
 
 
 class AccessControl:
@@ -68,7 +70,8 @@ class AccessControl:
             return
         files, tls_files = access_files
         self._reloader = CredentialReloader(files, tls_files, self._use)
-        self._authenticator = Authenticator(self._reloader.loaded.store)
+        self._store = self._reloader.loaded.store
+        self._authenticator = Authenticator(self._store)
         certificates = tls_files is not None and tls_files.client_ca is not None
         self.auth = Auth(
             self._authenticator,
@@ -115,7 +118,11 @@ class AccessControl:
             self.auth.end_revoked()
         if self._tls and loaded.tls:
             self._tls.use(loaded.tls)
-        answer = f"{len(loaded.store.credentials)} credentials and the newest certificates are in force"
+        changes = list(loaded.store.changes_since(self._store)) or ["certificates were exchanged"]
+        self._store = loaded.store
+        if more := changes[_MOST_NAMED:]:
+            changes[_MOST_NAMED:] = [f"and {len(more)} more"]
+        answer = f"{', '.join(changes)}; {len(loaded.store.credentials)} credentials are listed"
         if loaded.problem:
             answer = f"no credential is accepted: {loaded.problem}"
             _log.error("access: %s", answer)

@@ -1,5 +1,6 @@
 """`robot-gateway`: serve, check the configuration, or find out what is wrong with this machine."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -7,13 +8,15 @@ import typer
 from rich.console import Console
 
 from common import logs
+from common.config import as_yaml, json_schema
 from common.findings import exit_code, print_findings
 from common.program import bound_arenas, run, run_to_exit
 from gateway.access.reloader import load_access
 from gateway.app import serve as serve_until
-from gateway.config import CONFIG_VARIABLE, load_settings
+from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
 from gateway.credentials_cli import app as credentials_app
 from gateway.doctor.examination import examine
+from gateway.ros.readers import reader_for
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 app.add_typer(credentials_app, name="credentials")
@@ -37,11 +40,30 @@ def serve(config: Config = None) -> None:
 
 
 @app.command()
-def check(config: Config = None) -> None:
-    """Say whether the configuration is good, and what it names to ask callers who they are, and end."""
+def check(
+    config: Config = None,
+    in_effect: Annotated[
+        bool, typer.Option("--print", help="Print the configuration in effect, with all defaults.")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
+    ] = False,
+) -> None:
+    """Check the configuration, and the credentials and certificates that it names, and end.
+
+    What passes is accepted by serve; a message type that is not installed shows only on the robot (doctor).
+    """
+    if schema:
+        typer.echo(json.dumps(json_schema(GatewaySettings), indent=2))
+        return
     settings = load_settings(config)
+    for source in settings.sources:
+        reader_for(source)
     if access_files := settings.security.access_files():
         load_access(*access_files)
+    if in_effect:
+        typer.echo(as_yaml(settings), nl=False)
+        return
     count = len(settings.sources)
     where = f"{settings.grpc.host}:{settings.grpc.port}"
     typer.echo(f"configuration good: '{settings.name}' serves at {where} and reads {count} sources")

@@ -146,7 +146,7 @@ def rotate(
             _say(f"revoked, as the old certificate authority signed it: {each.credential_id}, {each.name}")
         _say(
             "new certificate authority. Tokens remain valid. "
-            "On each laptop:  robotctl login NAME --ca FILE, with this:"
+            f"On each laptop:  robotctl login ROBOT HOST:{settings.grpc.port} --ca FILE, with this:"
         )
         typer.echo(files.ca.read().certificate.decode(), nl=False)
     else:

@@ -16,7 +16,11 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, help="Serves the r
 
 _Config = Annotated[
     Path | None,
-    typer.Option("--config", help="YAML file; default: built-in values and PREVIEW__... variables."),
+    typer.Option(
+        "--config",
+        envvar="ROBOT_PREVIEW_CONFIG",
+        help="YAML file; default: built-in values and PREVIEW__... variables.",
+    ),
 ]
 
 # GStreamer is imported late: without it, checking the configuration still works.
@@ -34,10 +38,24 @@ def serve(config_file: _Config = None) -> None:
 
 
 @app.command()
-def check(config_file: _Config = None) -> None:
+def check(
+    config_file: _Config = None,
+    in_effect: Annotated[
+        bool, typer.Option("--print", help="Print the configuration in effect, with all defaults.")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
+    ] = False,
+) -> None:
     """Checks the configuration and exits."""
-    config.load(PreviewSettings, config_file)
-    print(f"{config_file or 'the environment'}: ok")
+    if schema:
+        print(json.dumps(config.json_schema(PreviewSettings), indent=2))
+        return
+    settings = config.load(PreviewSettings, config_file)
+    if in_effect:
+        print(config.as_yaml(settings), end="")
+    else:
+        print(f"{config_file or 'the environment'}: ok")
 
 
 @app.command()

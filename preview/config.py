@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
@@ -177,10 +177,12 @@ class TimeoutSettings(Section):
     """Without a gateway watching the service, after which the preview stops by itself. 0: never."""
 
 
-def _default_runtime_dir() -> Path:
+def _default_runtime_dir(validated: Mapping[str, Any]) -> Path:
+    # Two services on one machine listen on two ports; each must find its own crash marker.
+    name = f"robot-preview-{validated['srt'].port}"
     if own := os.environ.get("XDG_RUNTIME_DIR"):
-        return Path(own) / "robot-preview"
-    return Path(tempfile.gettempdir()) / f"robot-preview-{os.getuid()}"
+        return Path(own) / name
+    return Path(tempfile.gettempdir()) / f"{name}-{os.getuid()}"
 
 
 class PreviewSettings(Settings):

@@ -100,6 +100,11 @@ def change(
 def _request(action: Action, arguments: list[str], path: Path) -> dict[str, Any]:
     if action is Action.SHOW:
         return {}
+    if not arguments:
+        what = (
+            "FIELD=VALUE" if action is Action.SET else f"TOPIC ({', '.join(topic.value for topic in Topic)})"
+        )
+        raise typer.BadParameter(f"'{action.value}' needs at least one {what}")
     if action is Action.SET:
         return _fields(arguments)
     silent = set(control_socket.ask(path, {})["silent"])

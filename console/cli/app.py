@@ -1,48 +1,66 @@
 """The command line of robotctl. Commands raise their errors; console.cli.run reports them."""
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Final, TypeVar
+from collections.abc import Mapping
+from typing import Annotated, Final
 
 import typer
-from rich.console import RenderableType
+from typer.core import TyperGroup
 
-from common.errors import ExitCode
-from common.findings import exit_code, print_findings
-from common.version import project_version
-from console.cli.events import events
-from console.cli.info import info_json, info_view
-from console.cli.json_form import json_form
-from console.cli.login import login
-from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, with_session
-from console.cli.preview import preview_app
-from console.cli.robots import robots_app
-from console.cli.session import Session
-from console.cli.tables import overlay_view, status_view
-from console.cli.watch import watch
-from console.cli.windows import monitor, view
-from console.client import GatewayClient, parse_target
-from console.doctor.examination import examine, reached
+from console.cli.lazy import LazyCommand, imported
+from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption
+from console.cli.values import read_plainly
 
-AnswerT = TypeVar("AnswerT")
+COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
+    "status": ("console.cli.status:status", "Show the status of the whole robot, once."),
+    "watch": ("console.cli.watch:watch", "Show the status whenever it changes, until Ctrl-C."),
+    "overlay": (
+        "console.cli.status:overlay",
+        "Show the robot's detections and the newest events, once.",
+    ),
+    "events": (
+        "console.cli.events:events",
+        "Show past events of the robot, as far back as the gateway keeps them.",
+    ),
+    "info": ("console.cli.info:info", "Show the gateway program: build, call counts, configuration."),
+    "doctor": (
+        "console.cli.doctor:doctor",
+        "Check name, network, login, gateway, clock and robot, and say what to do about each fault.",
+    ),
+    "login": (
+        "console.cli.login:login",
+        "Store a login issued by the robot's administrator, for all later commands.",
+    ),
+    "view": (
+        "console.cli.windows:view",
+        "Show the live preview with detections overlaid. The robot provides all settings.",
+    ),
+    "monitor": (
+        "console.cli.windows:monitor",
+        "Open a window: live video, status, faults, events, plots, preview controls.",
+    ),
+    "preview": ("console.cli.preview:preview_app", "Turn the live preview on or off."),
+    "robots": ("console.cli.robots:robots_app", "List the robots known by name, or change the list."),
+}
+"""Each command's function (or group of commands), and the first line of its own help."""
 
-app = typer.Typer(
+# Plain help: Rich, which would draw boxes around it, takes twice as long to import as everything else here.
+_app = typer.Typer(
     name="robotctl",
     help="Show a robot's status and control its preview.",
     epilog="Exit codes: 0 done, 1 refused or failed, 2 wrong command line, 3 no robot answers.",
-    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
 )
-app.add_typer(preview_app, name="preview")
-app.add_typer(robots_app, name="robots")
 
 
 def _print_version(requested: bool) -> None:
     if requested:
-        typer.echo(f"robotctl {project_version()}")
+        version = imported("common.version:project_version")()
+        typer.echo(f"robotctl {version}")
         raise typer.Exit
 
 
-@app.callback()
-def robotctl(
+@_app.callback()
+def _robotctl(
     context: typer.Context,
     target: TargetOption = None,
     robot: RobotOption = None,
@@ -55,57 +73,11 @@ def robotctl(
     context.obj = GlobalOptions(target, robot, as_json)
 
 
-def _query(
-    call: Callable[[GatewayClient], AnswerT],
-    document: Callable[[AnswerT], dict[str, Any]],
-    view: Callable[[AnswerT, str], RenderableType],
-    help_text: str,
-) -> Callable[..., None]:
-    """Returns the command that shows the answer of one call."""
-
-    def query(session: Session) -> None:
-        with session.connect() as gateway:
-            answer = call(gateway)
-        session.show(document(answer), view(answer, gateway.target))
-
-    query.__doc__ = help_text
-    return with_session(query)
-
-
-@with_session
-def doctor(session: Session) -> None:
-    """Check name, network, login, gateway, clock and robot, and say what to do about each fault.
-
-    Exit code 0 when nothing is wrong, 1 when something is, 3 when no gateway was reached.
-    """
-    findings = list(examine(parse_target(session.target), session.credentials()))
-    print_findings(findings, as_json=session.as_json, out=session.out)
-    code = exit_code(findings) if reached(findings) else ExitCode.UNREACHABLE
-    raise typer.Exit(int(code))
-
-
-COMMANDS: Final[Mapping[str, Callable[..., None]]] = {
-    "status": _query(
-        GatewayClient.status, json_form, status_view, "Show the status of the whole robot, once."
-    ),
-    "watch": watch,
-    "overlay": _query(
-        GatewayClient.overlay,
-        json_form,
-        overlay_view,
-        "Show the robot's detections and the newest events, once.",
-    ),
-    "events": events,
-    "info": _query(
-        GatewayClient.info,
-        info_json,
-        info_view,
-        "Show the gateway program: build, call counts, configuration.",
-    ),
-    "doctor": doctor,
-    "login": login,
-    "view": view,
-    "monitor": monitor,
-}
-for name, function in COMMANDS.items():
-    app.command(name)(function)
+def command_line() -> TyperGroup:
+    """Returns robotctl with all its commands, none of which is imported yet."""
+    group = typer.main.get_command(_app)
+    assert isinstance(group, TyperGroup), "it has a callback"  # noqa: S101  # Typer's rule
+    read_plainly(group)
+    for name, (place, summary) in COMMANDS.items():
+        group.add_command(LazyCommand(name, place, summary))
+    return group

@@ -1,21 +1,24 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
+from console.cli.error_report import error_as_json
 from console.cli.json_form import json_form
-from console.cli.options import with_session
-from console.cli.session import Session, error_as_json, print_json
+from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
 from console.client.results import GapReason
 from console.presentation.formatting import plural, wall_clock
 from console.presentation.severity_style import FAULT_STYLES
+
+_CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
+"""With the time zone, which the robot's log may not share."""
 
 
 @with_session
@@ -67,7 +70,7 @@ def _show(session: Session, item: Event | EventGap | Outage) -> None:
 def _columns(item: Event | EventGap | Outage) -> Iterator[Text]:
     match item:
         case Event():
-            yield Text(f"{wall_clock(item.wall_clock_unix_ms):19}", style="dim")
+            yield Text(f"{wall_clock(item.wall_clock_unix_ms, form=_CLOCK_FORM):24}", style="dim")
             loud = item.severity in (FaultSeverity.WARNING, FaultSeverity.ERROR)
             style = STYLES[FAULT_STYLES[item.severity]] if loud else ""
             yield Text(f"{item.severity.value:7}", style=style)

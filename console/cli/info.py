@@ -2,16 +2,32 @@
 
 import json
 from datetime import UTC
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from console.cli.json_form import json_form
+from console.cli.session import Session, with_session
 from console.cli.tables import grid
 from console.client import GatewayInfo
 from console.presentation.formatting import UNKNOWN, age, wall_clock
+
+
+@with_session
+def info(
+    session: Session,
+    *,
+    full: Annotated[
+        bool, typer.Option("--full", help="Show the configuration, too.", show_default=False)
+    ] = False,
+) -> None:
+    """Show the gateway program: build, call counts, configuration."""
+    with session.connect() as gateway:
+        answer = gateway.info()
+    session.show(info_json(answer), info_view(answer, gateway.target, full=full))
 
 
 def info_json(info: GatewayInfo) -> dict[str, Any]:
@@ -21,8 +37,9 @@ def info_json(info: GatewayInfo) -> dict[str, Any]:
     return document | {"configuration": json.loads(text) if text else None}
 
 
-def info_view(info: GatewayInfo, target: str) -> RenderableType:
-    """Returns the view for people: build and uptime, call counts, configuration."""
+def info_view(info: GatewayInfo, target: str, *, full: bool = False) -> RenderableType:
+    """Returns the view for people: build and uptime, call counts; the full one with the configuration."""
+    configuration = info.configuration_json or UNKNOWN
     return Group(
         Text.assemble((info.gateway_name or "robot", "bold"), (f"  {target}", "dim")),
         Text(),
@@ -30,8 +47,8 @@ def info_view(info: GatewayInfo, target: str) -> RenderableType:
         Text(),
         _calls(info),
         Text(),
-        Text("configuration", style="dim"),
-        Text(info.configuration_json or UNKNOWN),
+        Text("configuration" if full else "configuration: robotctl info --full", style="dim"),
+        *([Text(configuration)] if full else []),
     )
 
 

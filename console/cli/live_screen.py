@@ -73,7 +73,7 @@ def live_view(
         outage = Text.assemble((old, "bold red"), f" - {error.what}")
     return Fitted(
         Group(headline(status, target), outage, Text()),
-        rows_table(table_rows(View(status))),
+        rows_table(table_rows(View(status, silent_ms=silent_ms, outdated=error is not None))),
         Group(Text(message.text, style=STYLES[message.style]) if message else Text(), _help(keys)),
     )
 

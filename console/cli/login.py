@@ -1,22 +1,33 @@
 """robotctl login: stores a login for a robot, after the robot has accepted it."""
 
+import shlex
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final, TypeVar
 
 import typer
 
+from common.backoff import Backoff
 from common.errors import ExitCode, UserError
+from common.reasons import Reason
 from console.cli.options import JsonOption, json_requested
 from console.cli.session import print_json, standard_output
-from console.client import Credentials, GatewayClient, parse_target
+from console.client import Credentials, GatewayClient, NotAllowed
 from console.robots import read_credentials, read_robots_file
 from console.robots.credentials import read_public
 from console.robots.login import keep_login, parse_login
-from console.robots.robots_file import check_name
+from console.robots.robots_file import FILE_KEYS, check_name
+from console.target import parse_target
+
+AnswerT = TypeVar("AnswerT")
 
 _STANDARD_INPUT = "-"
+_FIRST_PAUSE_S: Final = 0.25
+_LONGEST_PAUSE_S: Final = 1.0
+_RETRIES: Final = 3
 
 
 def login(
@@ -29,6 +40,10 @@ def login(
     *,
     ca: Annotated[Path | None, typer.Option(help="Replace the robot's CA certificate only (PEM).")] = None,
     offline: Annotated[bool, typer.Option(help="Store it without contacting the robot.")] = False,
+    replacing: Annotated[
+        bool,
+        typer.Option("--replace", help="Store it over the robot's present login.", show_default=False),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Store a login issued by the robot's administrator, for all later commands.
@@ -37,11 +52,13 @@ def login(
     """
     check_name(name)
     target = parse_target(target)
+    if not (replacing or ca):
+        _check_free(name, target, file)
     user, credentials = _with_new_authority(name, ca) if ca else _read(file)
     gateway_name = ""
     if not offline:
         with GatewayClient(target, credentials=credentials) as gateway:
-            gateway_name = gateway.status().gateway_name
+            gateway_name = once_known(gateway.status).gateway_name
     known = keep_login(name, target, credentials)
     out = standard_output()
     if json_requested(context, as_json):
@@ -51,6 +68,39 @@ def login(
     as_user = f" as {user}" if user else ""
     out.print(f"{name} at {target}: {result}{as_user}. Stored in {known.path.parent}.")
     out.print(f"Type: robotctl --robot {name} status")
+
+
+def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time.sleep) -> AnswerT:
+    """Returns the answer to a new login, which the gateway may not have read from its list yet.
+
+    A login that the robot does not know is shown again within 2 s, less often than locks its address out.
+
+    Args:
+        ask: Any call.
+        sleep: Waits for so many seconds.
+
+    Raises:
+        GatewayError: Of the last call.
+    """
+    pauses = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+    while True:
+        try:
+            return ask()
+        except NotAllowed as error:
+            if error.reason != Reason.CREDENTIAL_UNKNOWN or pauses.failures == _RETRIES:
+                raise
+        sleep(pauses.next_s())
+
+
+def _check_free(name: str, target: str, file: str) -> None:
+    known = read_robots_file().robots.get(name)
+    if known and any(getattr(known, key) for key in FILE_KEYS):
+        words = shlex.join(["robotctl", "login", name, target, *([] if file == _STANDARD_INPUT else [file])])
+        raise UserError(
+            f"'{name}' has a login already, at {known.target}",
+            f"Type: {words} --replace",
+            exit_code=ExitCode.USAGE,
+        )
 
 
 def _read(file: str) -> tuple[str, Credentials]:

@@ -1,18 +1,13 @@
 """The options that every command has, before or after its name."""
 
-import functools
-import inspect
-import os
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias
 
 import typer
 
 from common.errors import UserError
-from console.cli.session import Session, standard_output
-from console.client import DEFAULT_TARGET
-from console.robots import choose, read_robots_file
+from console.robots import read_robots_file
+from console.target import DEFAULT_TARGET
 
 
 def robot_names(incomplete: str) -> list[tuple[str, str]]:
@@ -56,45 +51,6 @@ class GlobalOptions:
     target: str | None
     robot: str | None
     as_json: bool
-
-
-def session_of(
-    context: typer.Context, target: str | None = None, robot: str | None = None, as_json: bool = False
-) -> Session:
-    """Returns a session on standard output. An option after the command's name overrides one before it.
-
-    Raises:
-        UserError: No robot has this name, or the file of known robots is wrong.
-    """
-    before: GlobalOptions = context.obj
-    chosen, name = choose(target or before.target, robot or before.robot, os.environ)
-    return Session(chosen, json_requested(context, as_json), standard_output(), name)
-
-
-def with_session(function: Callable[..., None]) -> Callable[..., None]:
-    """Returns the command of a function: with --target, --robot and --json, which make its first argument.
-
-    Args:
-        function: Takes the `Session`, and the command's own arguments and options by name.
-    """
-
-    @functools.wraps(function, assigned=("__module__", "__name__", "__qualname__", "__doc__"))
-    def command(
-        context: typer.Context,
-        target: TargetOption = None,
-        robot: RobotOption = None,
-        as_json: JsonOption = False,
-        **own: Any,
-    ) -> None:
-        function(session_of(context, target, robot, as_json), **own)
-
-    _, *own = inspect.signature(function).parameters.values()
-    context, *shared, _ = inspect.signature(command, follow_wrapped=False).parameters.values()
-    parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in (context, *own, *shared)]
-    # Typer reads options from these two.
-    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # of any callable
-    command.__annotations__ = {each.name: each.annotation for each in parameters}
-    return command
 
 
 def json_requested(context: typer.Context, as_json: bool) -> bool:

@@ -6,13 +6,14 @@ import typer
 
 from common.errors import UserError
 from console.cli.json_form import json_form
-from console.cli.options import with_session
-from console.cli.session import Session, print_json
+from console.cli.session import Session, print_json, with_session
 from console.cli.tables import rows_table
 from console.client import PreviewChange, PreviewProfile, PreviewState
 from console.presentation.status_table import preview_rows
 
-preview_app = typer.Typer(help="Turn the live preview on or off.", pretty_exceptions_enable=False)
+preview_app = typer.Typer(
+    help="Turn the live preview on or off.", add_completion=False, rich_markup_mode=None
+)
 
 
 ProfileOption = Annotated[

@@ -1,5 +1,6 @@
 """robotctl robots: lists, adds and removes robots known by name."""
 
+import sys
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -11,14 +12,14 @@ from common.errors import UserError
 from console.cli.options import JsonOption, json_requested, robot_names
 from console.cli.session import print_json, standard_output
 from console.cli.tables import grid
-from console.client import parse_target
 from console.robots import Robot, RobotsFile, read_robots_file
 from console.robots.credentials import forget_credentials
 from console.robots.robots_file import FILE_KEYS
 from console.robots.robots_file_edit import drop_robot, put_robot, set_default
+from console.target import parse_target
 
 robots_app = typer.Typer(
-    help="List the robots known by name, or change the list.", pretty_exceptions_enable=False
+    help="List the robots known by name, or change the list.", add_completion=False, rich_markup_mode=None
 )
 
 NameArgument = Annotated[
@@ -62,6 +63,8 @@ def remove(context: typer.Context, name: NameArgument, as_json: JsonOption = Fal
     known = drop_robot(name)
     forget_credentials(known.path, name)
     _show(context, known, as_json)
+    if known.robots and known.default is None:
+        print("No robot is the default now. Type: robotctl robots default NAME", file=sys.stderr)
 
 
 @robots_app.command("default")

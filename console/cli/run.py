@@ -7,27 +7,29 @@ from typing import NoReturn
 import typer
 
 from common.errors import ExitCode, UserError
-from console.cli.app import app
-from console.cli.session import report
-
-_HELP = "Type: robotctl --help"
+from common.output import tolerate_encoding
+from console.cli.app import command_line
+from console.cli.error_report import report
 
 
 def run() -> NoReturn:
     """Runs the command line of this process and ends it."""
+    tolerate_encoding()
     sys.exit(exit_code())
 
 
 def exit_code() -> int:
     """Runs the command line of this process and returns its exit code."""
     try:
-        code = app(prog_name="robotctl", standalone_mode=False)
+        code = command_line()(prog_name="robotctl", standalone_mode=False)
     except UserError as error:
         return _failed(error)
     except typer.TyperException as error:
         # A wrong command line.
+        context = getattr(error, "ctx", None)
         message = error.format_message().removesuffix(".")
-        return _failed(UserError(message, _HELP, exit_code=ExitCode.USAGE))
+        remedy = f"Type: {context.command_path if context else 'robotctl'} --help"
+        return _failed(UserError(message, remedy, exit_code=ExitCode.USAGE))
     except OSError as error:
         # Connections raise GatewayErrors, so this is the output: a full disk, for example.
         _discard_output()

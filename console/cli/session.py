@@ -1,18 +1,23 @@
 """The robot and the output of one run of robotctl."""
 
+import functools
+import inspect
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import typer
 from rich.console import Console, RenderableType
 
-from common.errors import ExitCode, UserError
-from console.client import AsyncGatewayClient, Credentials, GatewayClient, GatewayError, parse_target
-from console.client.printable import escaped
-from console.robots import Robot, read_credentials, read_robots_file
+from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, json_requested
+from console.client import AsyncGatewayClient, GatewayClient
+from console.credentials import Credentials
+from console.printable import escaped
+from console.robots import Robot, choose, read_credentials, read_robots_file
+from console.target import parse_target
 
 # In a pipe or a file long lines are better than broken ones.
 _WIDTH_OF_A_FILE = 160
@@ -55,7 +60,7 @@ class Session:
         """
         credentials = read_credentials(read_robots_file().find(self.name) if self.name else self.robot)
         # A window would find that out in a thread of its own, too late for an error on one line.
-        credentials.channel_credentials(parse_target(self.target))
+        credentials.encrypts(parse_target(self.target))
         return credentials
 
     def show(self, document: Mapping[str, Any], view: RenderableType) -> None:
@@ -79,20 +84,40 @@ def print_json(out: Console, value: Mapping[str, Any], *, on_one_line: bool = Fa
     print(escaped(text), file=out.file, flush=True)
 
 
-def error_as_json(error: UserError) -> dict[str, Any]:
-    """Returns the JSON form of an error."""
-    own = "usage" if error.exit_code is ExitCode.USAGE else "failed"
-    return {
-        "kind": error.kind if isinstance(error, GatewayError) else own,
-        "what": " ".join(error.what.split()),
-        "remedy": error.remedy,
-        "exit_code": int(error.exit_code),
-    }
+def session_of(
+    context: typer.Context, target: str | None = None, robot: str | None = None, as_json: bool = False
+) -> Session:
+    """Returns a session on standard output. An option after the command's name overrides one before it.
+
+    Raises:
+        UserError: No robot has this name, or the file of known robots is wrong.
+    """
+    before: GlobalOptions = context.obj
+    chosen, name = choose(target or before.target, robot or before.robot, os.environ)
+    return Session(chosen, json_requested(context, as_json), standard_output(), name)
 
 
-def report(error: UserError) -> None:
-    """Prints an error on one line of standard error; as JSON where the command line has --json."""
-    if "--json" in sys.argv[1:]:
-        print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
-    else:
-        print(f"error: {error}", file=sys.stderr)
+def with_session(function: Callable[..., None]) -> Callable[..., None]:
+    """Returns the command of a function: with --target, --robot and --json, which make its first argument.
+
+    Args:
+        function: Takes the `Session`, and the command's own arguments and options by name.
+    """
+
+    @functools.wraps(function, assigned=("__module__", "__name__", "__qualname__", "__doc__"))
+    def command(
+        context: typer.Context,
+        target: TargetOption = None,
+        robot: RobotOption = None,
+        as_json: JsonOption = False,
+        **own: Any,
+    ) -> None:
+        function(session_of(context, target, robot, as_json), **own)
+
+    _, *own = inspect.signature(function).parameters.values()
+    context, *shared, _ = inspect.signature(command, follow_wrapped=False).parameters.values()
+    parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in (context, *own, *shared)]
+    # Typer reads options from these two.
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # of any callable
+    command.__annotations__ = {each.name: each.annotation for each in parameters}
+    return command

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
+from console.cli.error_report import error_as_json
 from console.cli.json_form import json_form
 from console.cli.live_watch import watch_on_a_terminal
-from console.cli.options import with_session
-from console.cli.session import Session, error_as_json, print_json
+from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.client import Outage, WatchedStatus
 from console.presentation.status_line import status_line

@@ -10,11 +10,11 @@ import typer
 
 from common.errors import ExitCode, UserError
 from console.cli.json_form import json_form
-from console.cli.options import RobotOption, TargetOption, session_of, with_session
-from console.cli.session import Session, print_json
+from console.cli.options import RobotOption, TargetOption
+from console.cli.session import Session, print_json, session_of, with_session
 from console.cli.stopping import until_stopped
-from console.client import parse_target
 from console.receiver.recording import Recording
+from console.target import parse_target
 from console.viewer.headless import watch_headless
 from console.viewer.summary import ViewSummary
 

@@ -13,7 +13,6 @@ value of `console.client.results` or raises a `GatewayError` that says what to d
 from console.client.aio import AsyncGatewayClient
 from console.client.blocking import GatewayClient
 from console.client.clock import Clock, Offset
-from console.client.credentials import Credentials
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -48,4 +47,5 @@ from console.client.results import (
     WatchedStatus,
 )
 from console.client.streams import Outage
-from console.client.target import DEFAULT_TARGET, parse_target
+from console.credentials import Credentials
+from console.target import DEFAULT_TARGET, parse_target

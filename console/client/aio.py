@@ -5,7 +5,6 @@ from typing import Self
 
 from console.client import results
 from console.client.clock import Clock, Offset
-from console.client.credentials import Credentials
 from console.client.event_feed import EventFeed
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
@@ -19,9 +18,10 @@ from console.client.mapping.methods import (
 )
 from console.client.options import ClientOptions
 from console.client.streams import Outage, Streams
-from console.client.target import DEFAULT_TARGET, parse_target
 from console.client.transport import GrpcTransport
 from console.client.unary import UnaryCalls
+from console.credentials import Credentials
+from console.target import DEFAULT_TARGET, parse_target
 
 
 class AsyncGatewayClient:

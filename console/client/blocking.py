@@ -7,11 +7,11 @@ from contextlib import suppress
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from console.client.aio import AsyncGatewayClient
-from console.client.credentials import Credentials
 from console.client.errors import Cancelled
 from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions
-from console.client.target import DEFAULT_TARGET
+from console.credentials import Credentials
+from console.target import DEFAULT_TARGET
 
 P = ParamSpec("P")
 ResultT = TypeVar("ResultT")

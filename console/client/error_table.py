@@ -7,8 +7,8 @@ import grpc
 
 from common.reasons import Reason
 from console.client import errors
-from console.client.printable import printable
 from console.client.refusal import refusal_in
+from console.printable import printable
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
     # An error with the code OK is a defect of the server.
@@ -55,18 +55,19 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.TOO_MANY_CONNECTIONS: "Close another program that is connected to this robot, or wait",
     Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
     Reason.CREDENTIAL_EXPIRED: (
-        "Ask this robot's administrator for a new login, then type: robotctl login NAME HOST:PORT FILE"
+        "Ask this robot's administrator for a new login, then type: "
+        "robotctl login NAME HOST:PORT FILE --replace"
     ),
     Reason.CREDENTIALS_UNREADABLE: (
         "Ask this robot's administrator to repair its list of credentials; no new login is needed"
     ),
     Reason.ROLE_TOO_LOW: (
         "Ask this robot's administrator for a login with that role, then type: "
-        "robotctl login NAME HOST:PORT FILE"
+        "robotctl login NAME HOST:PORT FILE --replace"
     ),
     Reason.LOCKED_OUT: (
         "Wait as long as it says; if the stored login is outdated, store the new one: "
-        "robotctl login NAME HOST:PORT FILE"
+        "robotctl login NAME HOST:PORT FILE --replace"
     ),
 }
 """Where a reason allows more specific advice than the class."""

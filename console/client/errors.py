@@ -41,7 +41,7 @@ class Unreachable(GatewayError):
 
     kind = "unreachable"
     ends_with = ExitCode.UNREACHABLE
-    advice = "Check the address (--target HOST:PORT), the network, and that robot-gateway runs on the robot"
+    advice = "Check the address, the network, and that robot-gateway runs on the robot"
 
 
 class DeadlineExceeded(GatewayError):

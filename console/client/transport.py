@@ -6,11 +6,11 @@ from typing import Any, Final, TypeVar
 import grpc
 from google.protobuf.message import DecodeError
 
-from console.client.credentials import Credentials
 from console.client.error_table import error_from
 from console.client.errors import Cancelled, DeadlineExceeded, GatewayError, GatewayFailed, Unreachable
 from console.client.mapping.methods import Method
 from console.client.options import ClientOptions
+from console.credentials import Credentials
 
 ResultT = TypeVar("ResultT")
 
@@ -33,11 +33,10 @@ class GrpcTransport:
     def __init__(self, target: str, options: ClientOptions, credentials: Credentials) -> None:
         self._target = target
         self._metadata = credentials.metadata()
-        encryption = credentials.channel_credentials(target)
         arguments = options.channel_options()
         self._channel = (
-            grpc.aio.secure_channel(target, encryption, options=arguments)
-            if encryption
+            grpc.aio.secure_channel(target, _tls(credentials), options=arguments)
+            if credentials.encrypts(target)
             else grpc.aio.insecure_channel(target, options=arguments)
         )
         self._closed = asyncio.Event()
@@ -177,3 +176,9 @@ class Responses:
             error = Cancelled("this client was closed")
         # Behind the items that wait to be read.
         await self._queue.put(error)
+
+
+def _tls(credentials: Credentials) -> grpc.ChannelCredentials:
+    return grpc.ssl_channel_credentials(
+        credentials.ca_certificate, credentials.client_key, credentials.client_certificate
+    )

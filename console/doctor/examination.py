@@ -68,7 +68,7 @@ def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:
     yield robot.health_finding(status)
     yield from robot.fault_findings(status)
     yield from robot.source_findings(status)
-    yield robot.encoder_finding(status)
+    yield from robot.encoder_findings(status)
     endpoint = status.preview.endpoint
     if status.preview.state is PreviewState.RUNNING and endpoint:
         yield network.stream_finding(endpoint.host, endpoint.port)

@@ -5,9 +5,11 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
-from console.client.results import FaultSeverity, SourceState
+from console.client.results import FaultSeverity, HealthState, SourceState
 
 LARGEST_SKEW_S: Final = 1.0
+_FALLBACK: Final = "preview.fallback"
+"""Another encoder than the first choice works as well, and on a machine without hardware it always is one."""
 
 
 def version_finding(gateway_version: str, own_version: str) -> Finding:
@@ -56,11 +58,12 @@ def clock_finding(robot_unix_s: float, own_unix_s: float, uncertainty_s: float) 
 def health_finding(status: SystemStatus) -> Finding:
     """Reports the robot's own verdict; as a note where an active fault is the reason."""
     health = status.health
-    if health.ready:
+    if health.ready and health.state is HealthState.OK:
         return good("health", health.summary)
+    why = "A part of the robot does not work" if health.ready else "The robot can't work"
     if any(fault.active and fault.severity is FaultSeverity.ERROR for fault in status.faults):
-        return note("health", health.summary, "The robot can't work", "See the faults below")
-    return wrong("health", health.summary, "The robot can't work", "See the findings below")
+        return note("health", health.summary, why, "See the faults below")
+    return wrong("health", health.summary, why, "See the findings below")
 
 
 def fault_findings(status: SystemStatus) -> Iterator[Finding]:
@@ -69,7 +72,7 @@ def fault_findings(status: SystemStatus) -> Iterator[Finding]:
         if not fault.active:
             continue
         check = f"fault.{fault.id}"
-        if fault.severity is FaultSeverity.INFO:
+        if fault.severity is FaultSeverity.INFO or fault.id == _FALLBACK:
             yield note(check, fault.message, remedy=fault.remedy)
         else:
             yield wrong(check, fault.message, f"{fault.severity.value} of {fault.component}", fault.remedy)
@@ -110,25 +113,19 @@ def source_findings(status: SystemStatus) -> Iterator[Finding]:
             yield note(check, source.detail or source.state.value, *_WHY[source.state])
 
 
-def encoder_finding(status: SystemStatus) -> Finding:
-    """Checks the encoder: one that runs has proved itself."""
+def encoder_findings(status: SystemStatus) -> Iterator[Finding]:
+    """Yields a finding on the encoder, which only a preview that runs or has failed proves."""
     preview = status.preview
     if preview.state is PreviewState.RUNNING and preview.encoder:
         kind = "hardware" if preview.encoder.hardware else "the robot's processor"
-        return good("encoder", f"{preview.encoder.name} ({kind}) delivers frames")
+        yield good("encoder", f"{preview.encoder.name} ({kind}) delivers frames")
     if preview.state is PreviewState.FAULTED:
-        return wrong(
+        yield wrong(
             "encoder",
             f"no video: {preview.last_error}",
             "The preview is enabled and does not work",
             "Type on the robot: robot-preview encoders",
         )
-    return note(
-        "encoder",
-        f"not tested: the preview is {preview.state.value}",
-        "An encoder is tested only by running it",
-        "Type: robotctl preview on; robotctl doctor",
-    )
 
 
 def access_finding(status: SystemStatus) -> Finding | None:

@@ -30,7 +30,9 @@ def component_rows(state: MonitorState, now_s: float) -> list[Row]:
 
 
 def _fault_row(fault: Fault, snapshot_age_ms: int) -> Row:
-    text = f"{fault.component}: {fault.message}" if fault.component else fault.message
+    # Of a diagnostic component the message begins with its name.
+    named = not fault.component or fault.message.startswith(f"{fault.component}:")
+    text = fault.message if named else f"{fault.component}: {fault.message}"
     if fault.active:
         since = f"for {age(fault.age_ms + snapshot_age_ms)}"
         return Row("", fault.severity.value, FAULT_STYLES[fault.severity], text, since, fault.remedy)

@@ -10,6 +10,7 @@ _CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S"
 _MINUTE_S: Final = 60
 _HOUR_S: Final = 3600
 _GIB: Final = 1 << 30
+_KBIT_PER_MBIT: Final = 1000
 
 
 def quantity(value: float | None, unit: str, digits: int = 1) -> str:
@@ -51,6 +52,13 @@ def wall_clock(unix_ms: int, zone: tzinfo | None = None, form: str = _CLOCK_FORM
 def gibibytes(count: int | None) -> str:
     """Returns a size of memory: 1.2 GiB."""
     return quantity(None if count is None else count / _GIB, "GiB")
+
+
+def bit_rate(kbps: float | None) -> str:
+    """Returns a bit rate: 850 kbit/s, 2.98 Mbit/s."""
+    if kbps is None or kbps < _KBIT_PER_MBIT:
+        return quantity(kbps, "kbit/s", 0)
+    return quantity(kbps / _KBIT_PER_MBIT, "Mbit/s", 2)
 
 
 def plural(count: int | None, noun: str) -> str:

@@ -1,7 +1,7 @@
 """A status on one line, for logs and pipes."""
 
 from console.client.results import Freshness, PreviewState, PreviewStatus, Sample, SystemStatus
-from console.presentation.formatting import age, plural, quantity, signed
+from console.presentation.formatting import age, bit_rate, plural, quantity, signed
 
 
 def status_line(status: SystemStatus) -> str:
@@ -36,6 +36,6 @@ def _preview(preview: PreviewStatus) -> str:
         return f"{text} ({preview.last_error})"
     if preview.state is PreviewState.RUNNING and preview.measured.available:
         measured = preview.measured
-        fps, bitrate = quantity(measured.fps, "fps"), quantity(measured.bitrate_kbps, "kbit/s", 0)
+        fps, bitrate = quantity(measured.fps, "fps"), bit_rate(measured.bitrate_kbps)
         return f"{text} {fps} {bitrate} {plural(measured.viewer_count, 'viewer')}"
     return text

@@ -9,8 +9,24 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from console.client import results
-from console.client.results import Freshness, PreviewProfile, PreviewState, SourceState, TeleopState
-from console.presentation.formatting import UNKNOWN, age, gibibytes, joined, plural, quantity, signed
+from console.client.results import (
+    FaultSeverity,
+    Freshness,
+    PreviewProfile,
+    PreviewState,
+    SourceState,
+    TeleopState,
+)
+from console.presentation.formatting import (
+    UNKNOWN,
+    age,
+    bit_rate,
+    gibibytes,
+    joined,
+    plural,
+    quantity,
+    signed,
+)
 from console.presentation.severity_style import (
     FAULT_STYLES,
     FRESHNESS_STYLES,
@@ -42,21 +58,17 @@ class Row:
     """What to do about a fault, where the text does not say it."""
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """A status, and how it is looked at.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """How a part of a status is looked at.
 
     Args:
-        status: The newest one.
-        detections: The newest ones; None where the view has none.
         compact: Whether texts must be short.
         silent_ms: Time since the status was received; ages count on by it.
         outdated: Whether that is so long that fresh values count as stale.
     """
 
-    status: results.SystemStatus
     compact: bool = False
-    detections: results.Detections | None = None
     silent_ms: int = 0
     outdated: bool = False
 
@@ -69,6 +81,13 @@ class View:
     def label(self, label: str) -> str:
         """Returns the label as the density writes it."""
         return label.capitalize() if self.compact else label
+
+    def state(self, label: str, state: str, style: SeverityStyle, text: str) -> Row:
+        """Returns the row of a state, which reads "last known" once the status is outdated."""
+        if self.outdated:
+            last = joined(f"last known: {state.upper()}", text)
+            return Row(label, _MARKS[Freshness.STALE], SeverityStyle.WARNING, last)
+        return Row(label, state.upper(), style, text)
 
     def measured(self, label: str, sample: results.Sample, text: str) -> Row:
         """Returns the row of a measured part: marked by its freshness, empty while it is missing."""
@@ -85,16 +104,31 @@ class View:
         )
 
 
+_NOW: Final = Look()
+
+
+@dataclass(frozen=True, slots=True)
+class View(Look):
+    """A whole status, and how it is looked at.
+
+    Args:
+        status: The newest one.
+        detections: The newest ones; None where the view has none.
+    """
+
+    status: results.SystemStatus
+    detections: results.Detections | None = None
+
+
 def table_rows(view: View) -> list[Row]:
     """Returns the rows of the table, the most important first."""
     return [row for rows in TABLE for row in rows(view)]
 
 
-def preview_rows(preview: results.PreviewStatus) -> Iterator[Row]:
+def preview_rows(preview: results.PreviewStatus, look: Look = _NOW) -> Iterator[Row]:
     """Yields the preview's state, then its error, fallback, figures and address as far as there are any."""
-    yield Row(
-        "preview", preview.state.value.upper(), PREVIEW_STYLES[preview.state], _preview_summary(preview)
-    )
+    summary = _preview_summary(preview)
+    yield look.state("preview", preview.state.value, PREVIEW_STYLES[preview.state], summary)
     if preview.last_error:
         yield Row("", "error", SeverityStyle.BAD, preview.last_error)
     if preview.encoder and preview.encoder.fallback_reason:
@@ -103,19 +137,30 @@ def preview_rows(preview: results.PreviewStatus) -> Iterator[Row]:
     if preview.bitrate_reason:
         yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
     if preview.measured.available:
-        freshness = preview.measured.freshness
         text = _video(preview.measured, False, preview.target_bitrate_kbps)
-        stream_age = age(preview.measured.age_ms)
-        yield Row("stream", _MARKS[freshness], FRESHNESS_STYLES[freshness], text, stream_age)
+        yield look.measured("stream", preview.measured, text)
     if preview.endpoint and preview.state is PreviewState.RUNNING:
         encryption = "encrypted" if preview.endpoint.encrypted else ""
         latency = f"latency {preview.endpoint.latency_ms} ms"
         yield Row("", "watch", SeverityStyle.QUIET, joined(preview.endpoint.uri, latency, encryption))
 
 
+def health_summary(status: results.SystemStatus) -> str:
+    """Returns the reason of the health, and how many errors and warnings are active."""
+    severities = [fault.severity for fault in status.faults if fault.active]
+    counts = joined(
+        *(
+            plural(number, severity.value)
+            for severity in (FaultSeverity.ERROR, FaultSeverity.WARNING)
+            if (number := severities.count(severity))
+        )
+    )
+    return status.health.summary + (f" ({counts})" if counts else "")
+
+
 def _health(view: View) -> Iterator[Row]:
     health = view.status.health
-    yield Row("health", health.state.value.upper(), HEALTH_STYLES[health.state], health.summary)
+    yield view.state("health", health.state.value, HEALTH_STYLES[health.state], health_summary(view.status))
 
 
 def _faults(view: View) -> Iterator[Row]:
@@ -172,6 +217,13 @@ def _gateway(view: View) -> Iterator[Row]:
             f"revision {gateway.revision[:12]}" if gateway.revision else "",
         )
     yield Row(view.label("gateway"), "up", SeverityStyle.QUIET, text, view.age(gateway.uptime_ms))
+
+
+def _preview(view: View) -> Iterator[Row]:
+    # One warning is enough: the fault above says the same.
+    reported = any(fault.active and fault.id == "preview.fallback" for fault in view.status.faults)
+    rows = preview_rows(view.status.preview, view)
+    return (row for row in rows if not (reported and row.mark == "fallback"))
 
 
 def _teleop(view: View) -> Iterator[Row]:
@@ -259,7 +311,7 @@ def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     picture_age_ms = measured.worst_picture_age_ms
     return joined(
-        quantity(measured.bitrate_kbps, "kbit/s", 0) + ("" if compact else f" of {target_kbps}"),
+        bit_rate(measured.bitrate_kbps) + ("" if compact else f" of {bit_rate(target_kbps)}"),
         quantity(measured.fps, "fps"),
         plural(measured.viewer_count, "viewer"),
         "" if compact or rtt_ms is None else f"round trip {quantity(rtt_ms, 'ms')}",
@@ -324,7 +376,7 @@ TABLE: Final[tuple[Rows, ...]] = (
     _measured("motion", lambda status: status.odometry, _motion),
     _measured("vision", lambda status: status.vision, _vision),
     _objects,
-    _full(lambda view: preview_rows(view.status.preview)),
+    _full(_preview),
     _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
     _measured("command", lambda status: status.effective_command, _command, optional=True),
     _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),

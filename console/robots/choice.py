@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from console.client import DEFAULT_TARGET
+from common.errors import ExitCode, UserError
 from console.robots.robots_file import Robot, RobotsFile, read_robots_file
+from console.target import DEFAULT_TARGET
 
 TARGET_VARIABLE: Final = "ROBOTCTL_TARGET"
 ROBOT_VARIABLE: Final = "ROBOTCTL_ROBOT"
@@ -19,9 +20,9 @@ def choose(
 ) -> tuple[Robot, str | None]:
     """Returns the robot of --target, --robot, the environment (address, then name), the file, or localhost.
 
-    The first of these decides. An address beside a name replaces the address alone: the credentials stay
-    those of the named robot, as needed behind a tunnel. An address on its own uses nothing from the file,
-    which then is not even read.
+    The first of these decides, localhost only where no robot is known. An address beside a name replaces the
+    address alone: the credentials stay those of the named robot, as needed behind a tunnel. An address on its
+    own uses nothing from the file, which then is not even read.
 
     Args:
         target: Value of --target.
@@ -30,7 +31,7 @@ def choose(
         read: Reads the file.
 
     Raises:
-        UserError: No robot has this name, or the file is wrong.
+        UserError: No robot has this name, the file is wrong, or it has robots but no default.
     """
     if name:
         robot = read().find(name)
@@ -40,4 +41,11 @@ def choose(
     known = read()
     if chosen := environment.get(ROBOT_VARIABLE) or known.default:
         return known.find(chosen), chosen
+    if known.robots:
+        # Localhost would be another robot than any of these.
+        raise UserError(
+            f"no robot is chosen, and none of {', '.join(known.robots)} is the default",
+            "Add --robot NAME, or type: robotctl robots default NAME",
+            exit_code=ExitCode.USAGE,
+        )
     return Robot(target=DEFAULT_TARGET), None

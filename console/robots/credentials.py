@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from console.client import Credentials
+from console.credentials import Credentials
 from console.robots.robots_file import Robot
 
 _TOKEN_CHARACTERS: Final = frozenset(string.ascii_letters + string.digits + "-._~+/=")
 """b64token of RFC 6750 2.1."""
-_LOGIN: Final = "Store the robot's login again: robotctl login NAME HOST:PORT FILE"
+_LOGIN: Final = "Store the robot's login again: robotctl login NAME HOST:PORT FILE --replace"
 _LARGEST_BYTES: Final = 1 << 20
 _FOR_OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 

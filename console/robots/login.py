@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ExitCode, UserError
-from console.client import Credentials
-from console.client.printable import printable
+from console.credentials import Credentials
+from console.printable import printable
 from console.robots.credentials import credentials_directory
 from console.robots.robots_file import Robot, RobotsFile, robots_file_path
 from console.robots.robots_file_edit import put_robot

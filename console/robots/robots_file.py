@@ -15,11 +15,12 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ExitCode, UserError
-from console.client import parse_target
+from console.target import parse_target
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _TOP_KEYS: Final = ("default", "robots")
@@ -73,9 +74,10 @@ class RobotsFile:
             return self.robots[name]
         except KeyError:
             known = ", ".join(self.robots) or "none"
+            meant = get_close_matches(name, self.robots, n=1)
             raise UserError(
                 f"no robot is called '{name}' in {self.path} (known: {known})",
-                f"Type: robotctl robots add {name} HOST:PORT",
+                f"Did you mean '{meant[0]}'?" if meant else f"Type: robotctl robots add {name} HOST:PORT",
                 exit_code=ExitCode.USAGE,
             ) from None
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from common.errors import UserError
 from common.private_files import directory_lock, write_private
-from console.client import parse_target
 from console.robots.robots_file import (
     FILE_KEYS,
     Robot,
@@ -18,6 +17,7 @@ from console.robots.robots_file import (
     read_text,
     robots_file_path,
 )
+from console.target import parse_target
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument

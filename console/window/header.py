@@ -7,6 +7,7 @@ from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN, joined
 from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
+from console.presentation.status_table import health_summary
 from console.window.labels import (
     ElidedLabel,
     PlainLabel,
@@ -43,13 +44,14 @@ class Header(QWidget):
             self.health.show_word(SeverityStyle.QUIET, "not known", "")
             return
         status, health = state.snapshot.status, state.snapshot.status.health
+        summary = health_summary(status)
         set_text(self.name, status.gateway_name or "robot")
         set_tool_tip(self.target, f"Gateway {status.gateway_version or UNKNOWN}")
         if state.outdated(now_s):
-            last = joined(f"last known: {health.state.value.upper()}", health.summary)
+            last = joined(f"last known: {health.state.value.upper()}", summary)
             self.health.show_word(SeverityStyle.QUIET, "not known", last)
         else:
-            self.health.show_word(HEALTH_STYLES[health.state], health.state.value.upper(), health.summary)
+            self.health.show_word(HEALTH_STYLES[health.state], health.state.value.upper(), summary)
 
 
 class MarkedWord(QWidget):

@@ -47,6 +47,10 @@ class Credential:
     ends_s: int | None = None
     revoked_s: int | None = None
 
+    def __str__(self) -> str:
+        """Returns what logs name: the owner, the role and the ID, nothing secret."""
+        return f"{self.name} ({self.role.value}, {self.credential_id})"
+
     def validity(self, now_s: float) -> Validity:
         """Returns the validity at `now_s`; revocation takes precedence."""
         if self.revoked_s is not None:

@@ -1,7 +1,7 @@
 """The list of credentials as an immutable value, and its JSON encoding. Knows no file."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Annotated, Final, Literal, TypeAlias
@@ -71,6 +71,19 @@ class Store:
             replace(each, ends_s=ends_s if each.ends_s is None else min(ends_s, each.ends_s))
             for each in which
         )
+
+    def changes_since(self, before: "Store") -> Iterator[str]:
+        """Yields one phrase per credential that was added, changed, revoked or dropped, without secrets."""
+        for credential_id, each in self.credentials.items():
+            known = before.credentials.get(credential_id)
+            if each == known:
+                continue
+            verb = "added" if known is None else "changed"
+            if each.revoked_s is not None and (known is None or known.revoked_s is None):
+                verb = "revoked"
+            yield f"{verb} {each}"
+        for credential_id in before.credentials.keys() - self.credentials.keys():
+            yield f"dropped {before.credentials[credential_id]}"
 
     def _changed(self, changed: Iterable[Credential]) -> "Store":
         return Store(MappingProxyType({**self.credentials, **{each.credential_id: each for each in changed}}))

@@ -1,12 +1,14 @@
 """`faults`: the thresholds that the robot's owner tunes."""
 
 from dataclasses import fields
-from typing import Self
+from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
 from common.config import Section
 from gateway.status.faults.platform import Limit, PlatformLimits
+
+_FAULT_ID: Final = r"^[a-z0-9_]+(\.[a-z0-9_]+)*$"
 
 
 class _LimitSettings(Section):
@@ -48,6 +50,8 @@ class FaultSettings(Section):
     """How long a condition must be absent before its fault is cleared."""
     keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
     """How long a cleared fault stays in the status."""
+    ignored_by_health: tuple[Annotated[str, Field(pattern=_FAULT_ID)], ...] = ("preview",)
+    """Errors that don't degrade the robot's health: fault ids, or their beginnings up to a dot."""
     temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
     memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)
     disk_percent: UpperLimit = UpperLimit(raise_at=95, clear_at=93)

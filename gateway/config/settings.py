@@ -82,7 +82,7 @@ class GatewaySettings(Settings):
         """Returns what the status expects of each source; the mux inputs are shown last."""
         shown = sorted(self.sources, key=lambda source: source.label is not None)
         rules = {source.spec: SourceRule(source.stale_after_ms, source.required) for source in shown}
-        return Rules(rules, self.platform.stale_after_ms)
+        return Rules(rules, self.platform.stale_after_ms, self.faults.ignored_by_health)
 
 
 def load_settings(path: Path | None) -> GatewaySettings:

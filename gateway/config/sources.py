@@ -1,9 +1,9 @@
 """`sources`: the ROS 2 topics that the gateway reads."""
 
+import re
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
 
 from common.config import Section
 from gateway.status.sources import ROS_SOURCES, SourceSpec
@@ -15,12 +15,29 @@ _SPECS: Final = {(spec.kind, spec.label): spec for spec in ROS_SOURCES}
 _STALE_AFTER_MS: Final = {spec.kind: spec.stale_after_ms for spec in ROS_SOURCES}
 
 
+_TOPIC: Final = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+"""A topic name as rcl_validate_topic_name accepts it, without substitutions."""
+_LONGEST_TOPIC: Final = 247
+"""RMW_TOPIC_MAX_NAME_LENGTH."""
+_TYPE: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*")
+
+
 def _known_kind(kind: str) -> str:
     if kind not in KINDS:
-        # The words of pydantic's own error for an enumeration.
-        *others, last = (f"'{known}'" for known in KINDS)
-        raise PydanticCustomError("kind", f"Input should be {', '.join(others)} or {last}")
+        raise ValueError(f"one of {', '.join(KINDS)}")
     return kind
+
+
+def _topic_name(topic: str) -> str:
+    if not _TOPIC.fullmatch(topic) or len(topic) > _LONGEST_TOPIC:
+        raise ValueError("a topic name of letters, digits, _ and /, /odometry/filtered for example")
+    return topic
+
+
+def _type_name(name: str) -> str:
+    if not _TYPE.fullmatch(name):
+        raise ValueError("a message type, nav_msgs/msg/Odometry for example")
+    return name
 
 
 class SourceSettings(Section):
@@ -29,14 +46,14 @@ class SourceSettings(Section):
     kind: Annotated[str, AfterValidator(_known_kind)]
     label: CommandSource | None = None
     """The input of the command mux (required for mux_input, invalid for other kinds)."""
-    topic: str = Field(min_length=1)
-    type: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")
+    topic: Annotated[str, AfterValidator(_topic_name)]
+    type: Annotated[str, AfterValidator(_type_name)]
     reliability: Literal["best_effort", "reliable"] = "best_effort"
     durability: Literal["volatile", "transient_local"] = "volatile"
     stale_after_ms: int = Field(default_factory=lambda validated: _STALE_AFTER_MS[validated["kind"]], gt=0)
     """Age from which the value is too old to rely on; the default depends on the kind."""
     required: bool = False
-    """Whether the robot counts as degraded without this source (odometry and vision only)."""
+    """Whether the robot is degraded and not ready without this source."""
     image_width_px: int = Field(default=1280, gt=0)
     """Width of the image that the boxes of detections refer to; the messages don't hold it."""
     image_height_px: int = Field(default=720, gt=0)

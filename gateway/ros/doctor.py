@@ -4,6 +4,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +23,14 @@ DISCOVERY_S: Final = 3.0
 _POLL_EVERY_S: Final = 0.1
 
 
+@dataclass(frozen=True, slots=True)
+class _Announced:
+    """The publishers of a topic, or why they can't be listed."""
+
+    publishers: Sequence[Any] = ()
+    problem: str = ""
+
+
 def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
     """Yields the findings on the ROS 2 graph, without subscribing to anything."""
     yield from _environment()
@@ -38,16 +47,16 @@ def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
     except UserError as error:
         yield wrong("ros", error.what, "Without ROS 2 no source can be read", error.remedy)
         return
-    for source, publishers in found:
-        if isinstance(publishers, str):
+    for source, announced in found:
+        if announced.problem:
             yield wrong(
                 f"topic.{source.name}",
-                f"the publishers of {source.topic} can't be listed: {publishers}",
+                f"the publishers of {source.topic} can't be listed: {announced.problem}",
                 "A program in this ROS domain announces itself with a name that is no text",
                 "Set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, so that other machines are left out",
             )
         else:
-            yield _topic_finding(source, publishers)
+            yield _topic_finding(source, announced.publishers)
 
 
 def _environment() -> Iterator[Finding]:
@@ -96,26 +105,25 @@ def _is_stand_in(message_type: Any) -> bool:
     return len(file.parents) > 4 and (file.parents[4] / "share" / package / _STAND_IN).exists()
 
 
-def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, list[Any] | str]]:
-    """Returns the publishers of each source, or why they can't be listed, once each has one or time is up."""
+def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, _Announced]]:
+    """Returns what is announced for each source, once each has a publisher or a problem, or time is up."""
     until_s = time.monotonic() + DISCOVERY_S
     while True:
         found = [(source, _publishers(node, source.topic)) for source in sources]
-        if all(publishers for _, publishers in found) or time.monotonic() >= until_s:
+        if all(each.publishers or each.problem for _, each in found) or time.monotonic() >= until_s:
             return found
         # Polled: graph events need an executor that spins.
         time.sleep(_POLL_EVERY_S)
 
 
-def _publishers(node: Any, topic: str) -> list[Any] | str:
-    """Returns the publishers of a topic, or why they can't be listed."""
+def _publishers(node: Any, topic: str) -> _Announced:
     try:
-        return list(node.get_publishers_info_by_topic(topic))
+        return _Announced(node.get_publishers_info_by_topic(topic))
     except (RuntimeError, UnicodeError) as error:
-        return str(error)
+        return _Announced(problem=str(error) or type(error).__name__)
 
 
-def _topic_finding(source: SourceSettings, publishers: list[Any]) -> Finding:
+def _topic_finding(source: SourceSettings, publishers: Sequence[Any]) -> Finding:
     check = f"topic.{source.name}"
     if not publishers:
         report = wrong if source.required else note

@@ -18,7 +18,7 @@ from gateway.status.sources import (
     EFFECTIVE_COMMAND,
     MUX_INPUTS,
     PLATFORM_SOURCES,
-    SOURCES,
+    ROS_SOURCES,
     SourceSpec,
     ValueT,
 )
@@ -26,7 +26,6 @@ from gateway.status.sources import (
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
 ROS_STALLED_AFTER_S: Final = 2.0
 """Forty passes of the ROS sampler: it hangs in the middleware, or the computer is overloaded."""
-_HEALTH_SOURCES: Final = tuple(spec for spec in SOURCES if spec.health_name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +70,16 @@ class SourceRule:
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """The expectations of all sources; `sources` holds the configured ones in the order they are shown."""
+    """The expectations of the robot.
+
+    Attributes:
+        sources: the configured ones, in the order they are shown.
+        ignored_by_health: fault ids, or their beginnings up to a dot, whose errors don't degrade the health.
+    """
 
     sources: Mapping[SourceSpec[Any], SourceRule]
     platform_stale_after_ms: int
+    ignored_by_health: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +144,13 @@ def take(
         health=NOT_READ
         if ros_stalled
         else assess(
-            (spec.health_name, samples[spec].freshness)
-            for spec in _HEALTH_SOURCES
-            if spec in configured and configured[spec].required
+            (
+                (spec.health_name or spec.display_name, samples[spec].freshness)
+                for spec in ROS_SOURCES
+                if spec in configured and configured[spec].required
+            ),
+            faults,
+            rules.ignored_by_health,
         ),
         samples=samples,
         command=_command(rules, board, now_s),

@@ -41,7 +41,7 @@ class SourceSpec(Generic[ValueT]):
         max_items: length to which lists are truncated before decoding; None: max_items of the configuration.
         merge: combines the present value with a new one; None: the new one replaces it.
         add_truncated: adds the number of list items that were truncated before decoding to a value.
-        health_name: name in the health summary; empty: the robot's health does not depend on the source.
+        health_name: name in the health summary, where it differs from the one for people.
         quiet: published on change only, so silence is a fault only where the source is required.
         in_change_key: whether a new value counts as a change of the status.
     """

@@ -52,12 +52,17 @@ class Detections:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """State of one battery."""
+    """State of one battery.
+
+    Attributes:
+        charge_out_of_range: whether it reports a charge that can't be one, which is then unknown.
+    """
 
     present: bool
     voltage_v: float | None
     charge_percent: float | None
     charging: bool | None
+    charge_out_of_range: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,11 @@ The next process moves a report aside, where it stays for people until the next 
 """
 
 import faulthandler
+import fcntl
 import json
 import logging
+import os
+import weakref
 from pathlib import Path
 from typing import IO, Final
 
@@ -23,6 +26,7 @@ _log = logging.getLogger(__name__)
 _MARKER: Final = "encoder-in-use.json"
 _REPORT: Final = "crash.txt"
 LAST_REPORT: Final = "last-crash.txt"
+_IN_USE_BY_ANOTHER: Final = "another preview service uses it; give each a runtime_dir of its own"
 _IN_USE: Final = ""
 """Reason of a marker that blames the encoder only together with a crash report."""
 
@@ -31,11 +35,13 @@ class CrashMarkerFile:
     """The marker of this process, and what the previous one left.
 
     Args:
-        directory: runtime directory, created when missing. Where it is not writable or not this user's own,
-            a warning is logged, nothing in it is read, and the next process must find out by itself.
+        directory: runtime directory, created when missing. Where it is not writable, not this user's own or
+            in use by another service, a warning is logged, nothing in it is read or written, and the next
+            process must find out by itself.
     """
 
     def __init__(self, directory: Path) -> None:
+        self._claimed = False
         self._directory = directory
         self._marker = directory / _MARKER
         self._report = directory / _REPORT
@@ -45,7 +51,7 @@ class CrashMarkerFile:
         """Has the encoder that ended the previous process passed over; starts this process's crash report."""
         crash = self.begin_report()
         try:
-            make_own_directory(self._directory)
+            self._claim()
             marker = json.loads(self._marker.read_text(encoding="utf-8"))
             name, reason = str(marker["encoder"]), str(marker["why"])
         except FileNotFoundError:
@@ -70,7 +76,7 @@ class CrashMarkerFile:
         """
         previous = ""
         try:
-            make_own_directory(self._directory)
+            self._claim()
             if self._report.exists():
                 previous = _cause(self._report.read_text(encoding="utf-8", errors="replace"))
             if previous:
@@ -91,7 +97,7 @@ class CrashMarkerFile:
             reason: what it did, for people. Empty: nothing yet; counts only if this process crashes.
         """
         try:
-            make_own_directory(self._directory)
+            self._claim()
             self._marker.write_text(json.dumps({"encoder": encoder, "why": reason}), encoding="utf-8")
         except OSError as error:
             _log.warning("no crash marker for encoder %s in %s: %s", encoder, self._marker, error)
@@ -99,9 +105,30 @@ class CrashMarkerFile:
     def clear(self) -> None:
         """Removes the marker: no encoder is in use."""
         try:
+            self._claim()
             self._marker.unlink(missing_ok=True)
         except OSError as error:
             _log.warning("the crash marker %s can't be removed: %s", self._marker, error)
+
+    def _claim(self) -> None:
+        """Makes the directory and locks it for the life of this object (flock(2)).
+
+        Raises:
+            OSError: it can't be made or is not this user's own; `BlockingIOError` if another process has it.
+        """
+        make_own_directory(self._directory)
+        if self._claimed:
+            return
+        handle = os.open(self._directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(handle)
+            if isinstance(error, BlockingIOError):
+                raise BlockingIOError(error.errno, _IN_USE_BY_ANOTHER, str(self._directory)) from error
+            raise
+        self._claimed = True
+        weakref.finalize(self, os.close, handle)
 
 
 def _cause(report: str) -> str:

@@ -46,6 +46,8 @@ def hints(ground: Ground) -> str:
     )
     return f"""
 In a second terminal, for example:
+  .venv/bin/robotctl{target} monitor    (the operator's window: video, status, faults, plots)
+  .venv/bin/robotctl{target} view       (the video alone; p switches it on)
   .venv/bin/robotctl{target} preview on --profile balanced
   .venv/bin/robotctl{target} watch
   .venv/bin/robotctl{target} overlay

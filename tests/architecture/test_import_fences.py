@@ -82,6 +82,11 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/pipeline/", ("preview.rpc", "preview.supervisor", "preview.app")),
         ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
         ("preview/rpc/", ("common.gst",)),
+        *(
+            (f"console/{name}.py", (*HEAVY, *WIRE, "asyncio", "typer", "rich", "console.client"))
+            for name in ("target", "credentials", "printable")
+        ),
+        ("console/robots/", ("console.client",)),
         ("console/client/", (*HEAVY, "common.gst", "console.receiver")),
         ("console/presentation/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),
         ("console/robots/", (*HEAVY, *WIRE, "common.gst", "typer", "rich", "console.cli")),

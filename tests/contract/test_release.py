@@ -33,3 +33,9 @@ def test_the_schema_of_a_release_is_frozen(release: str) -> None:
 def test_the_interface_packages_have_a_released_version() -> None:
     for package in (ROOT / "interfaces").rglob("package.xml"):
         assert ET.parse(package).findtext("version") in RELEASES, package  # noqa: S314  # our own
+
+
+def test_type_checkers_use_the_clients_annotations() -> None:
+    """PEP 561: a package without the marker is untyped to its users."""
+    for package in ("console", "common", "proto/python/omniseer"):
+        assert (ROOT / package / "py.typed").is_file(), package

@@ -6,9 +6,9 @@ import pytest
 from google.protobuf.message import Message
 
 from common.findings import findings_json, good
+from console.cli.error_report import error_as_json
 from console.cli.info import info_json
 from console.cli.json_form import json_form
-from console.cli.session import error_as_json
 from console.client import Unreachable
 from console.client.mapping.events import event
 from console.client.mapping.methods import (

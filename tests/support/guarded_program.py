@@ -55,7 +55,7 @@ class Guarded:
         _, bundle = self.admin.add(CredentialRequest(person, role, self.kind))
         file = self.home / f"{person}.login"
         file.write_text(bundle.text(), encoding="utf-8")
-        done = self.robotctl("login", ROBOT, self.target, str(file), "--json")
+        done = self.robotctl("login", ROBOT, self.target, str(file), "--json", "--replace")
         assert done.returncode == 0, done.stderr
         said: dict[str, Any] = json.loads(done.stdout)
         return said

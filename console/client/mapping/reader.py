@@ -21,7 +21,7 @@ from google.protobuf.message import Message
 
 from console.client import results
 from console.client.mapping import enums
-from console.client.printable import printable, printable_lines
+from console.printable import printable, printable_lines
 
 ResultT = TypeVar("ResultT")
 

@@ -1,5 +1,6 @@
 """What the robot's components report about themselves: vision, battery, mode, diagnostics."""
 
+import math
 from typing import Any, Final
 
 from gateway.config import SourceSettings
@@ -45,6 +46,7 @@ def from_battery_state(message: Any, _source: SourceSettings) -> Battery:
         voltage_v=finite(message.voltage),
         charge_percent=_percent(message.percentage),
         charging=_CHARGING.get(int(message.power_supply_status)),
+        charge_out_of_range=_percent(message.percentage) is None and not math.isnan(message.percentage),
     )
 
 

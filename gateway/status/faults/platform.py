@@ -52,6 +52,14 @@ def platform_faults(
         was_broken = condition.fault_id in active
         if was_broken if value is None else limit.broken(value, was_broken=was_broken):
             yield condition
+    battery = snapshot[BATTERY]
+    if battery.value and battery.value.charge_out_of_range and not battery.freshness.stale:
+        yield _warning(
+            "battery.out_of_range",
+            "power",
+            "the robot's battery reports a charge outside its range: it is unknown, and no fault when low",
+            "Have its publisher send percentage as 0 to 1 (sensor_msgs/BatteryState), not as 0 to 100",
+        )
     yield from _throttling(snapshot, active)
     if snapshot[COMPUTE].freshness.stale or snapshot[NETWORK].freshness.stale:
         yield _warning(

@@ -49,5 +49,8 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
             Severity.WARNING,
             _COMPONENT,
             f"{encoder.name} encodes{in_software} instead of {encoder.wanted}: {encoder.fallback_reason}",
-            "Type on the robot: robot-preview encoders",
+            "Type on the robot: robot-preview encoders"
+            if encoder.hardware
+            else "No hardware encoder here? Set encoders.order: [x264] in the preview's configuration. "
+            "Else type on the robot: robot-preview encoders",
         )

@@ -15,9 +15,9 @@ from typing import Any
 from testcontainers.compose import DockerCompose
 
 from console.client.blocking import GatewayClient
-from console.client.credentials import Credentials
 from console.client.errors import Unreachable
 from console.client.results import SystemStatus
+from console.credentials import Credentials
 from tests.support.engine import ROOT, TAG
 from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.waiting import wait_until

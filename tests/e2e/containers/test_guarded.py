@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from console.client.credentials import Credentials
 from console.client.errors import GatewayError, NotAllowed, NotTrusted, Unreachable
 from console.client.results import PreviewState
+from console.credentials import Credentials
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from console.robots.login import parse_login

@@ -1,5 +1,6 @@
 """`robot-gateway credentials` and `robotctl login` as people type them, and what must be in no log."""
 
+import io
 import json
 import re
 import subprocess
@@ -8,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from typer.testing import CliRunner
@@ -129,6 +131,41 @@ def test_from_nothing_to_a_robot_that_is_switched_and_a_credential_that_is_over(
     assert {log, *(ground / "credentials" / name for name in credentials_files)} <= set(written)
     assert [path for path in written if SECRET.search(path.read_text())] == []
     assert SECRET.search(login.read_text())
+
+
+def test_a_login_from_a_pipe_is_accepted_every_time(ground: Path) -> None:
+    """The gateway's own look at the list comes every half a second; the pipe is faster."""
+    credentials(ground, "init", "--host", "lab.local")
+    with running(ground):
+        for number in range(9):
+            login = credentials(ground, "add", f"person-{number}", "--role", "viewer")
+            with mock.patch.object(sys, "stdin", io.StringIO(login)):
+                done = operator(ground, "login", f"lab{number}", f"127.0.0.1:{port_of(ground)}")
+            assert done.returncode == 0, done.stderr
+        for number in (0, 8):
+            credentials(ground, "revoke", f"person-{number}")
+        audit = ground / "credentials/audit.jsonl"
+        wait_until(
+            lambda: "revoked person-8 (viewer, " in audit.read_text(), "the audit log names whose it was"
+        )
+
+
+def test_a_login_is_stored_over_another_only_on_request(ground: Path) -> None:
+    credentials(ground, "init")
+    login = ground / "anna.login"
+    credentials(ground, "add", "anna", "--role", "viewer", "--out", str(login))
+    words = ("login", "lab", "lab.local:1", str(login), "--offline")
+    assert operator(ground, *words).returncode == 0
+    again = operator(ground, *words)
+    assert again.returncode == 2
+    assert f"robotctl login lab lab.local:1 {login} --replace" in only_line(again.stderr)
+    assert operator(ground, *words, "--replace").returncode == 0
+
+
+def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:
+    credentials(ground, "init")
+    done = gateway(ground, "credentials", "rotate", "ca")
+    assert f"robotctl login ROBOT HOST:{port_of(ground)} --ca FILE" in done.stderr
 
 
 def test_rights_are_tight_whatever_the_umask_says(ground: Path) -> None:

@@ -5,9 +5,8 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from typer.main import get_command
 
-from console.cli.app import app
+from console.cli.app import command_line
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import only_line, robotctl
@@ -22,7 +21,7 @@ WORDS = {"watch": ("--count", "1"), "view": ("--headless", "--frames", "1")}
 
 
 def names() -> list[str]:
-    return sorted(get_command(app).commands)  # type: ignore[attr-defined]  # a group, as robotctl has commands
+    return sorted(command_line().commands)
 
 
 def lines() -> Iterator[tuple[str, ...]]:

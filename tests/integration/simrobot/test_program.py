@@ -143,6 +143,10 @@ def test_control_speaks_to_a_running_robot(tmp_path: Path) -> None:
         at = ("--control", str(robot.control))
         assert '"odometry"' in simrobot("control", *at, "silence", "odometry", "battery").stdout
         assert set(robot.change()["silent"]) == {"battery", "odometry"}
+        for action in ("silence", "resume", "set"):
+            without = simrobot("control", *at, action)
+            assert without.returncode == 2
+            assert "needs at least one" in without.stderr
         assert simrobot("control", *at, "resume", "odometry").returncode == 0
         assert robot.change()["silent"] == ["battery"]
         changed = simrobot("control", *at, "set", "speed_mps=2.5", "components=drive:error,lidar:stale")

@@ -43,8 +43,8 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         ("grpc: {port: 99999}", "key 'grpc.port' is 99999"),
         (
             "sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]",
-            "key 'sources.0.kind' is 'smell': Input should be 'odometry', 'vision', 'detections', 'battery', "
-            "'diagnostics', 'mode', 'effective_command' or 'mux_input'",
+            "key 'sources.0.kind' is 'smell', expected: one of odometry, vision, detections, battery, "
+            "diagnostics, mode, effective_command, mux_input",
         ),
         ("sources: [{kind: compute, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
         ("grpc: {host: 0.0.0.0}", "anyone on that network"),
@@ -67,6 +67,14 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
             "and no other, has a label",
         ),
+        (
+            "sources: [{kind: odometry, topic: my odom, type: nav_msgs/msg/Odometry}]",
+            "expected: a topic name",
+        ),
+        ("sources: [{kind: odometry, topic: /a/, type: n/msg/O}]", "expected: a topic name"),
+        ("sources: [{kind: odometry, topic: /a//b, type: n/msg/O}]", "expected: a topic name"),
+        ("sources: [{kind: odometry, topic: /1a, type: n/msg/O}]", "expected: a topic name"),
+        ("sources: [{kind: odometry, topic: /a, type: Odometry}]", "expected: a message type"),
         ("- a list", "holds a list at the top level"),
         ("a: [", "is not YAML"),
     ],

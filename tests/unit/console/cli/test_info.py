@@ -21,13 +21,22 @@ def answer() -> GetGatewayInfoResponse:
 
 def test_people_see_the_build_the_calls_and_the_configuration() -> None:
     console = Console(file=io.StringIO(), width=120, highlight=False, markup=False)
-    console.print(info_view(GET_GATEWAY_INFO.decode(answer().SerializeToString()), "robot:50051"))
+    decoded = GET_GATEWAY_INFO.decode(answer().SerializeToString())
+    console.print(info_view(decoded, "robot:50051", full=True))
     assert isinstance(console.file, io.StringIO)
     text = console.file.getvalue()
     for part in ("lab-1", "robot:50051", "1.2.3", "ab" * 20, "1 min 05 s", "2023-11-14T22:13:20"):
         assert part in text
     assert ["GetSystemStatus", "12", "3", "1"] in [line.split() for line in text.splitlines()]
     assert '  "name": "lab-1"' in text
+
+
+def test_the_configuration_is_left_out_unless_it_is_requested() -> None:
+    console = Console(file=io.StringIO(), width=120, highlight=False, markup=False)
+    console.print(info_view(GET_GATEWAY_INFO.decode(answer().SerializeToString()), "robot:50051"))
+    assert isinstance(console.file, io.StringIO)
+    assert '"name"' not in console.file.getvalue()
+    assert "robotctl info --full" in console.file.getvalue()
 
 
 def test_scripts_get_the_configuration_as_an_object() -> None:

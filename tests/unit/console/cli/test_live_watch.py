@@ -9,10 +9,11 @@ from rich.console import Console
 from rich.text import Text
 
 from console.cli.keyboard import Key, keys_in
-from console.cli.live_screen import Fitted
+from console.cli.live_screen import Fitted, live_view
 from console.cli.preview_keys import PreviewKeys
 from console.client import (
     DesiredPreview,
+    GatewayError,
     PreviewChange,
     PreviewProfile,
     PreviewState,
@@ -21,8 +22,10 @@ from console.client import (
 )
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.presentation.severity_style import SeverityStyle
+from omniseer.gateway.v1 import states_pb2
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.clock import Clock
+from tests.support.gateway_double import healthy_status
 
 PREVIEW = GET_SYSTEM_STATUS.decode(SystemStatus().SerializeToString()).preview
 
@@ -137,3 +140,30 @@ def test_the_body_is_cut(height: int, middle: int) -> None:
     if middle < 10:
         assert lines[-3].startswith("... ")
         assert f"{11 - middle} more lines" in lines[-3]
+
+
+def drawn(error: GatewayError | None) -> str:
+    """The lines of the view 5.6 s after the last status."""
+    message = healthy_status()
+    message.preview.state = states_pb2.PREVIEW_RUNNING
+    status = GET_SYSTEM_STATUS.decode(message.SerializeToString())
+    out = Console(file=io.StringIO(), width=160, height=60)
+    out.print(live_view(status, "lab:1", error=error, silent_ms=5600))
+    assert isinstance(out.file, io.StringIO)
+    return out.file.getvalue()
+
+
+def test_during_an_outage_no_value_counts_as_fresh() -> None:
+    assert "fresh" in drawn(None)
+    during = drawn(Unreachable("gone"))
+    assert "NO ANSWER, the values below are 5.6 s old" in during
+    assert "fresh" not in during
+    assert "last known: OK, robot healthy" in during
+    assert "last known: RUNNING" in during
+
+
+def test_during_an_outage_ages_count_on() -> None:
+    """The double's odometry was 12 ms old."""
+    (motion,) = (line for line in drawn(Unreachable("gone")).splitlines() if line.startswith("motion"))
+    assert "STALE" in motion
+    assert motion.rstrip().endswith("5.6 s")

@@ -135,9 +135,9 @@ def test_a_running_preview_shows_its_figures_and_where_to_watch() -> None:
     measured.available, measured.fps, measured.bitrate_kbps, measured.viewer_count = True, 30, 2480, 1
     text = printed(status_view(decoded(message), "robot:50051"))
     assert "srt://10.0.0.7:7100" in text
-    assert "2480 kbit/s of 2500, 30.0 fps, 1 viewer" in text
+    assert "2.48 Mbit/s of 2.50 Mbit/s, 30.0 fps, 1 viewer" in text
     assert "round trip" not in text, "none was measured"
-    assert "preview running 30.0 fps 2480 kbit/s 1 viewer" in status_line(decoded(message))
+    assert "preview running 30.0 fps 2.48 Mbit/s 1 viewer" in status_line(decoded(message))
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])
@@ -168,3 +168,11 @@ def test_overlay_lists_objects_and_events() -> None:
         assert part in text
     assert "#4" in text
     assert "1 min 05 s ago" in text
+
+
+def test_health_counts_active_errors_and_warnings() -> None:
+    message = healthy_status()
+    for severity, active in (("ERROR", True), ("ERROR", True), ("WARNING", True), ("ERROR", False)):
+        message.faults.add(severity=f"FAULT_SEVERITY_{severity}", active=active, message="broken")
+    health = table_rows(View(decoded(message)))[0]
+    assert (health.label, health.text) == ("health", "robot healthy (2 errors, 1 warning)")

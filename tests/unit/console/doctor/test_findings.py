@@ -17,7 +17,7 @@ from console.doctor import network, robot
 from console.doctor.examination import examine, reached
 from console.doctor.srt_probe import answers_as_srt, induction, is_answer
 from omniseer.gateway.v1 import states_pb2 as states
-from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR
+from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.source_pb2 import SOURCE_STATE_QOS_MISMATCH, SOURCE_STATE_SILENT
 from tests.support.gateway_double import GatewayDouble, serving
 
@@ -41,9 +41,9 @@ def examined(double: GatewayDouble, *, ahead_s: float = 0.0) -> dict[str, Findin
 
 def test_a_robot_that_is_well(double: GatewayDouble) -> None:
     findings = examined(double)
-    assert {each.verdict for each in findings.values()} == {Verdict.GOOD, Verdict.NOTE}
-    assert [check for check, each in findings.items() if each.verdict is Verdict.NOTE] == ["encoder"]
-    assert {"name", "tcp", "grpc", "version", "clock", "calls", "health", "encoder"} <= set(findings)
+    assert {each.verdict for each in findings.values()} == {Verdict.GOOD}
+    assert "encoder" not in findings, "a preview that is off proves none"
+    assert {"name", "tcp", "grpc", "version", "clock", "calls", "health"} <= set(findings)
 
 
 @pytest.mark.parametrize(("ahead_s", "word"), [(90.0, "ahead of"), (-90.0, "behind")])
@@ -102,6 +102,13 @@ def test_one_condition_is_one_finding(double: GatewayDouble, *, faulted: bool) -
         double.status.faults.add(id="odometry.stale", active=True, severity=FAULT_SEVERITY_ERROR)
     wrong = [check for check, each in examined(double).items() if each.verdict is Verdict.WRONG]
     assert wrong == ["fault.odometry.stale" if faulted else "health"]
+
+
+def test_an_encoder_in_software_is_a_note(double: GatewayDouble) -> None:
+    double.status.faults.add(
+        id="preview.fallback", active=True, severity=FAULT_SEVERITY_WARNING, message="x264 encodes"
+    )
+    assert examined(double)["fault.preview.fallback"].verdict is Verdict.NOTE
 
 
 def test_a_cleared_fault_is_not_reported(double: GatewayDouble) -> None:

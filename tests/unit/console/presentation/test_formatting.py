@@ -2,7 +2,16 @@ from datetime import UTC
 
 import pytest
 
-from console.presentation.formatting import age, gibibytes, joined, plural, quantity, signed, wall_clock
+from console.presentation.formatting import (
+    age,
+    bit_rate,
+    gibibytes,
+    joined,
+    plural,
+    quantity,
+    signed,
+    wall_clock,
+)
 
 
 @pytest.mark.parametrize(
@@ -54,6 +63,13 @@ def test_empty_parts_leave_no_comma() -> None:
 def test_a_time_of_day() -> None:
     assert wall_clock(1_795_302_000_999, UTC) == "2026-11-21 23:00:00"
     assert len(wall_clock(1_795_302_000_999)) == len("2026-11-21 23:00:00")
+
+
+@pytest.mark.parametrize(
+    ("kbps", "text"), [(None, "-"), (850.4, "850 kbit/s"), (1000, "1.00 Mbit/s"), (2980, "2.98 Mbit/s")]
+)
+def test_a_bit_rate_for_people(kbps: float | None, text: str) -> None:
+    assert bit_rate(kbps) == text
 
 
 @pytest.mark.parametrize("unix_ms", [2**64 - 1, 2**63, 2**62, 253_402_300_800_000, -(2**63)])

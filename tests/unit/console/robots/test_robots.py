@@ -2,6 +2,7 @@
 
 import stat
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -146,6 +147,13 @@ def test_without_anything_it_is_this_computer() -> None:
     assert choose(None, None, {}, lambda: RobotsFile(Path("/b"))) == (Robot(target="127.0.0.1:50051"), None)
 
 
+def test_robots_without_a_default_do_not_lead_to_this_computer() -> None:
+    known = replace(KNOWN, default=None)
+    with pytest.raises(UserError, match=r"none of one, two is the default.*robotctl robots default NAME"):
+        choose(None, None, {}, lambda: known)
+    assert choose(None, None, {"ROBOTCTL_ROBOT": "one"}, lambda: known)[1] == "one"
+
+
 def test_an_address_beside_a_name_replaces_the_address_alone() -> None:
     assert choose("tunnel:1", "two", {}, lambda: KNOWN)[0] == Robot(target="tunnel:1", token_file=Path("/t"))
 
@@ -157,6 +165,11 @@ def test_a_secret_goes_to_no_address_it_was_not_meant_for() -> None:
         raise AssertionError
 
     assert choose("typed:1", None, {"ROBOTCTL_ROBOT": "two"}, read)[0] == Robot(target="typed:1")
+
+
+def test_a_name_with_a_slip() -> None:
+    with pytest.raises(UserError, match=r"known: one, two\)\. Did you mean 'two'\?"):
+        KNOWN.find("tow")
 
 
 def test_an_unknown_name() -> None:

@@ -107,6 +107,22 @@ def test_a_name_finds_all_of_that_name_that_are_not_revoked() -> None:
             store.find(unknown, 100)
 
 
+def test_changes_name_each_credential_and_no_secret() -> None:
+    before = Store().adding(ONE).adding(numbered(1)).adding(numbered(2))
+    after = before.revoking([ONE], 9).expiring([numbered(1)], 99).adding(numbered(3))
+    assert list(after.changes_since(before)) == [
+        f"revoked anna (admin, {ONE.credential_id})",
+        "changed person-1 (viewer, 000000000001)",
+        "added person-3 (viewer, 000000000003)",
+    ]
+    assert list(before.changes_since(after)) == [
+        f"changed anna (admin, {ONE.credential_id})",
+        "changed person-1 (viewer, 000000000001)",
+        "dropped person-3 (viewer, 000000000003)",
+    ]
+    assert ONE.proof not in str(ONE)
+
+
 def test_an_earlier_expiry_is_kept() -> None:
     store = Store().adding(numbered(1, ends_s=50)).adding(numbered(2))
     ended = store.expiring(store.credentials.values(), 80)

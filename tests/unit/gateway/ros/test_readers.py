@@ -157,7 +157,9 @@ def test_a_battery_tells_percent() -> None:
     ],
 )
 def test_a_charge_out_of_range_is_not_shown_as_full(share: float, percent: float | None) -> None:
-    assert read(BATTERY, battery(percentage=share)).charge_percent == percent
+    value = read(BATTERY, battery(percentage=share))
+    assert value.charge_percent == percent
+    assert value.charge_out_of_range == (percent is None and not math.isnan(share)), "NaN is unknown"
 
 
 @pytest.mark.parametrize(

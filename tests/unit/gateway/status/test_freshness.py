@@ -92,4 +92,4 @@ def test_health_follows_the_contract_line_by_line(
 
 
 def test_a_robot_without_both_sources_is_healthy() -> None:
-    assert assess([]) == RobotHealth(HealthState.OK, "robot healthy")
+    assert assess([]) == RobotHealth(HealthState.OK, "robot healthy", ready=True)

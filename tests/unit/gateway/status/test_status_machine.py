@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
+from gateway.status.fault import Severity
 from gateway.status.faults.tracker import FaultTracker
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
@@ -142,7 +143,14 @@ class Life(RuleBasedStateMachine):
                 expected = f"waiting for {WORDS[spec]}"
             elif seen.stale:
                 expected = f"{WORDS[spec]} stale"
-        assert (now.health.summary, now.health.ready) == (expected, expected == "robot healthy")
+        ready = expected == "robot healthy"
+        active = [fault.condition for fault in now.faults if fault.active]
+        errors = [each for each in active if each.severity is Severity.ERROR]
+        if ready and errors:
+            # A fault outlasts its condition for a moment; all of these sources are required.
+            more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+            expected = f"{errors[0].message}{more}"
+        assert (now.health.summary, now.health.ready) == (expected, ready)
 
     @invariant()
     def what_is_wrong_is_a_fault_and_what_is_well_is_none_for_long(self) -> None:

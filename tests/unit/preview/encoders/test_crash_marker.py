@@ -137,3 +137,12 @@ def test_a_cleared_marker_blames_no_encoder(tmp_path: Path) -> None:
 def test_a_damaged_marker_is_ignored(tmp_path: Path, content: str) -> None:
     (tmp_path / "encoder-in-use.json").write_text(content, encoding="utf-8")
     assert life(tmp_path, "x264") == ""
+
+
+def test_two_services_do_not_blame_each_others_encoders(tmp_path: Path) -> None:
+    first = CrashMarkerFile(tmp_path)
+    first.set("mpp-h265", "it hung when it was stopped")
+    assert life(tmp_path, "x264") == ""
+    assert json.loads((tmp_path / "encoder-in-use.json").read_text(encoding="utf-8"))["encoder"] == "mpp-h265"
+    del first
+    assert life(tmp_path, "x264").startswith("encoder mpp-h265 is passed over")

@@ -192,7 +192,9 @@ class RobotHealth(_message.Message):
     state: _states_pb2.RobotHealthState.ValueType
     """One word."""
     ready: _builtins.bool
-    """Whether the robot can take work: true exactly when state is OK."""
+    """Whether the robot can take work: its required sources are received. An active
+    error degrades the state of a robot that is ready.
+    """
     summary: _builtins.str
     """One sentence for a person: the first thing that is wrong, or "robot healthy"."""
     odom_available: _builtins.bool

@@ -39,6 +39,7 @@ from gateway.status.sources import (
     BATTERY,
     COMPUTE,
     DETECTIONS,
+    DIAGNOSTICS,
     EFFECTIVE_COMMAND,
     MODE,
     NETWORK,
@@ -52,6 +53,7 @@ from gateway.status.values import (
     Compute,
     Detection,
     Detections,
+    Diagnostics,
     Mode,
     Network,
     Received,
@@ -68,6 +70,7 @@ from omniseer.gateway.v1 import (
     system_status_pb2,
 )
 
+FRESH = SourceRule(10**9, required=True)
 NOW_S = 1000.0
 CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
 FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "look at it")
@@ -149,12 +152,16 @@ def everything() -> Snapshot:
             EFFECTIVE_COMMAND: Received(Velocity(0.25, -0.5, 0.75), at_s),
             COMPUTE: Received(Compute(40.0, 60.0, True, 1, 2, 50.0), at_s),
             NETWORK: Received(Network("wlan0", True, -60, 70), at_s),
+            DIAGNOSTICS: Received(Diagnostics(()), at_s),
             ONBOARD_BATTERY: Received(Battery(True, 12.0, 70.0, True), at_s),
         }
     )
     return take(
         identity=Identity("lab", "1.2.3", insecure=True),
-        rules=Rules({spec: SourceRule(1000, required=spec is BATTERY) for spec in ROS_SOURCES}, 3000),
+        # All of them are stale but the one that is required.
+        rules=Rules(
+            {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES} | {DIAGNOSTICS: FRESH}, 3000
+        ),
         board=board,
         preview=preview,
         events=(OperatorEvent(1, at_s, "something happened"),),

@@ -253,6 +253,14 @@ def test_a_battery_that_charges_or_is_not_there_is_not_low(battery: Battery) -> 
     assert found(snapshot(board(battery=battery), battery=False), frozenset({"battery.low"})) == {}
 
 
+def test_a_charge_outside_its_range_is_a_fault_that_says_so() -> None:
+    """Many publishers send 0 to 100."""
+    wrong = board(battery=replace(FULL, charge_percent=None, charge_out_of_range=True))
+    faults = found(snapshot(wrong, battery=False))
+    assert set(faults) == {"battery.out_of_range"}
+    assert "0 to 1" in faults["battery.out_of_range"].remedy
+
+
 def test_what_is_not_known_neither_raises_nor_ends_a_fault() -> None:
     unknown = board(Compute(10.0, None, None, 1, 4, None), Network("eth0", True, None, None))
     active = frozenset({"platform.temperature", "platform.throttled", "platform.wifi", "platform.disk"})

@@ -1,10 +1,8 @@
-"""Token and certificates of a client, and the certificate authority of the robot."""
+"""Token and certificates of a client, and the certificate authority of the robot. Knows no gRPC."""
 
 import ipaddress
 from dataclasses import dataclass, field
 from typing import Final
-
-import grpc
 
 from common.errors import ExitCode, UserError
 
@@ -32,8 +30,8 @@ class Credentials:
         """Returns the metadata of every call (RFC 6750 2.1)."""
         return ((_TOKEN_HEADER, f"Bearer {self.token}"),) if self.token else ()
 
-    def channel_credentials(self, target: str) -> grpc.ChannelCredentials | None:
-        """Returns the TLS credentials of the connection; None for plaintext.
+    def encrypts(self, target: str) -> bool:
+        """Returns whether the connection is encrypted; False for plaintext.
 
         Args:
             target: HOST:PORT of the gateway.
@@ -42,7 +40,7 @@ class Credentials:
             UserError: A secret would be sent over the network unencrypted.
         """
         if self.ca_certificate is not None:
-            return grpc.ssl_channel_credentials(self.ca_certificate, self.client_key, self.client_certificate)
+            return True
         if self.client_certificate is not None:
             raise UserError(
                 "a client certificate needs the robot's CA certificate beside it",
@@ -56,7 +54,7 @@ class Credentials:
                 "or use a tunnel to 127.0.0.1",
                 exit_code=ExitCode.USAGE,
             )
-        return None
+        return False
 
 
 def _is_loopback(target: str) -> bool:

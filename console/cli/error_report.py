@@ -1,0 +1,27 @@
+"""An error as robotctl reports it: one line, or one JSON document."""
+
+import json
+import sys
+from typing import Any
+
+from common.errors import ExitCode, UserError
+from console.printable import escaped
+
+
+def error_as_json(error: UserError) -> dict[str, Any]:
+    """Returns the JSON form of an error."""
+    own = "usage" if error.exit_code is ExitCode.USAGE else "failed"
+    return {
+        "kind": error.kind or own,
+        "what": " ".join(error.what.split()),
+        "remedy": error.remedy,
+        "exit_code": int(error.exit_code),
+    }
+
+
+def report(error: UserError) -> None:
+    """Prints an error on one line of standard error; as JSON where the command line has --json."""
+    if "--json" in sys.argv[1:]:
+        print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
+    else:
+        print(f"error: {error}", file=sys.stderr)

@@ -1,0 +1,41 @@
+"""Commands typed in a container (`docker compose exec`) read the configuration of its program."""
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from gateway.cli import app as gateway_app
+from preview.cli import app as preview_app
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("program", ["gateway", "preview"])
+def test_the_images_name_the_file_once(program: str) -> None:
+    dockerfile = (ROOT / f"docker/{program}.Dockerfile").read_text(encoding="utf-8")
+    served = re.search(r'"--config", "([^"]+)"', dockerfile)
+    named = re.search(rf"ROBOT_{program.upper()}_CONFIG=(\S+)", dockerfile)
+    assert served
+    assert named
+    assert named[1] == served[1]
+
+
+def test_the_variables_name_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text("log_level: debug", encoding="utf-8")
+    for app, variable in ((gateway_app, "ROBOT_GATEWAY_CONFIG"), (preview_app, "ROBOT_PREVIEW_CONFIG")):
+        shown = CliRunner().invoke(app, ["check", "--print"], env={variable: str(file)})
+        assert shown.exit_code == 0, shown.output
+        assert "log_level: debug\n" in shown.output
+
+
+def test_check_refuses_a_kind_with_a_type_that_has_no_reader(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(
+        "sources: [{kind: odometry, topic: /odom, type: geometry_msgs/msg/Twist}]", encoding="utf-8"
+    )
+    refused = CliRunner().invoke(gateway_app, ["check", "--config", str(file)])
+    assert refused.exit_code != 0
+    assert "no reader supports" in str(refused.exception)

@@ -1,0 +1,113 @@
+"""Mistakes in a configuration file: the line, the key, what is there and what is expected."""
+
+import json
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from pydantic import Field
+from pydantic_settings import SettingsConfigDict
+
+from common.config import Section, Settings, as_yaml, json_schema, load
+from common.errors import ExitCode, UserError
+
+
+class _Item(Section):
+    kind: Literal["a", "b"]
+    size: int = Field(default=1, ge=1, le=9)
+
+
+class _Server(Section):
+    host: str = "localhost"
+    port: int = 1
+    ratio: float = 0.5
+    names: tuple[str, ...] = ()
+
+
+class _Settings(Settings):
+    model_config = SettingsConfigDict(env_prefix="TESTED__")
+
+    name: str = Field(default="x", min_length=1, max_length=5)
+    enabled: bool = True
+    folder: Path = Path("/tmp")  # noqa: S108  # a value
+    server: _Server = _Server()
+    items: tuple[_Item, ...] = ()
+
+
+def mistake(tmp_path: Path, text: str) -> str:
+    file = tmp_path / "x.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError) as raised:
+        load(_Settings, file)
+    assert raised.value.exit_code is ExitCode.USAGE
+    assert "Input should" not in str(raised.value), "that is how pydantic speaks"
+    return raised.value.what.removeprefix(f"configuration {file}")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "name: a\nserver:\n  prot: 1",
+            ", line 3: unknown key 'server.prot'. Did you mean 'port'? Allowed: ",
+        ),
+        (
+            "nam: a",
+            ", line 1: unknown key 'nam'. Did you mean 'name'? Allowed: name, enabled, folder, server",
+        ),
+        (
+            "items:\n- kind: a\n- kind: b\n  sise: 2",
+            ", line 4: unknown key 'items.1.sise'. Did you mean 'size'?",
+        ),
+        ("zzz: 1", ", line 1: unknown key 'zzz'. Allowed: "),
+        ("items:\n- size: 2", ", line 2: key 'items.0.kind' is missing"),
+        ("items: [{kind: c}]", "key 'items.0.kind' is 'c', expected: one of a, b"),
+        ("items: [{kind: a, size: 10}]", "key 'items.0.size' is 10, expected: at most 9"),
+        ("items: [{kind: a, size: 0}]", "expected: at least 1"),
+        ("items: 3", "key 'items' is 3, expected: a list, [a, b] for example"),
+        ("server: 3", "key 'server' is 3, expected: a section of keys and values"),
+        ("server: {port: many}", "expected: a whole number"),
+        ("server: {port: 1.5}", "expected: a whole number"),
+        ("server: {ratio: x}", "expected: a number, 2.5 for example"),
+        ("server: {names: a}", "expected: a list, [a, b] for example"),
+        ("enabled: perhaps", "expected: true or false"),
+        ("name: 5", "expected: a text; write numbers and dates in quotation marks"),
+        ("name: ''", "expected: a text that is not empty"),
+        ("name: abcdef", "expected: a text of at most 5 characters"),
+        ("name: a\nname: b", ", line 2: key 'name' is there twice, first in line 1"),
+        ("server:\n  port: 1\n  port: 1", ", line 3: key 'port' is there twice, first in line 2"),
+        ("a: [", ", line 1 is not YAML: "),
+        ("name: abcdef\nenabled: perhaps", "(and 1 more)"),
+    ],
+)
+def test_a_mistake(tmp_path: Path, text: str, says: str) -> None:
+    assert says in mistake(tmp_path, text)
+
+
+def test_a_merge_key_is_not_a_key_twice(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text("items:\n- &one {kind: a, size: 2}\n- <<: *one\n  size: 3\n")
+    assert [item.size for item in load(_Settings, file).items] == [2, 3]
+
+
+def test_a_mistake_in_the_environment_has_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TESTED__SERVER__PORT", "many")
+    with pytest.raises(UserError) as raised:
+        load(_Settings, None)
+    assert raised.value.what.startswith("configuration from the environment: key 'server.port' is 'many'")
+
+
+def test_what_is_in_effect_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TESTED__NAME", "env")
+    settings = load(_Settings, None)
+    file = tmp_path / "effective.yaml"
+    file.write_text(as_yaml(settings), encoding="utf-8")
+    monkeypatch.delenv("TESTED__NAME")
+    assert load(_Settings, file) == settings
+
+
+def test_the_schema_forbids_unknown_keys() -> None:
+    schema = json_schema(_Settings)
+    assert schema["additionalProperties"] is False
+    assert schema["properties"]["name"]["maxLength"] == 5
+    json.dumps(schema)
