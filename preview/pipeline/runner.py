@@ -1,9 +1,9 @@
 """One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
 supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in three
-places only (framing.py, keyframe_gate.py, file_loop.py) and schedule calls on the loop. Every call that may
-block in a driver (state changes, properties of a playing encoder, requests for key frames) runs in a thread
-of its own with a deadline.
+places only (framing.py, keyframe_gate.py, file_loop.py), at most frame rates for no frame, and schedule calls
+on the loop. Every call that may block in a driver (state changes, properties of a playing encoder, requests
+for key frames) runs in a thread of its own with a deadline.
 """
 
 import asyncio
@@ -39,7 +39,7 @@ _WINDOW_S: Final = 0.5
 _DRIVER_DEADLINE_S: Final = 2.0
 """For a call into the encoder's driver while it runs."""
 _GRAPH_DEADLINE_S: Final = 0.3
-_MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
+_MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING
 
 
 class Runner:
@@ -62,7 +62,7 @@ class Runner:
         self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
-        self._framing = Framing(parts, self._first_frame, plan.target.fps)
+        self._framing = Framing(parts, self._first_frame, self._source_ended, plan.target.fps)
         self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
         self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
         self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
@@ -141,7 +141,8 @@ class Runner:
             except TimeoutError as error:
                 raise HungError(f"{name} hung when it was stopped") from error
         del part
-        return asyncio.create_task(_stop_pipeline(self._release(), deadline_s), name="stop the encoder")
+        work = _stop_pipeline(self._release(), self._framing.close, deadline_s)
+        return asyncio.create_task(work, name="stop the encoder")
 
     async def write_graph(self, path: Path) -> None:
         """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
@@ -186,10 +187,8 @@ class Runner:
             if message.type == Gst.MessageType.ERROR:
                 _log.debug("%s: %s", message.src.get_path_string(), message.parse_error())
                 self._fail(faults.from_message(message, self._parts, self.plan))
-            elif message.type == Gst.MessageType.WARNING:
-                _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
             else:
-                self._source_ended()
+                _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
 
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
@@ -207,7 +206,7 @@ class Runner:
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)
-        self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
+        self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
             self._adapt_bitrate(statistics.link_report(before, now))
         self._events.measured(self._viewer_limit.take_refused())
@@ -219,8 +218,8 @@ class Runner:
         """Requests a key frame for a new viewer; one that is already requested serves both."""
         if self._ended.done() or self._is_pending("key frame"):
             return
-        sink_pad = self._parts.sink.get_static_pad("sink")
-        call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, sink_pad)
+        muxed_pad = self._parts.pipe_in.get_static_pad("sink")
+        call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, muxed_pad)
         self._spawn("key frame", self._call_driver(call, "it was asked for a key frame"))
 
     def _adapt_bitrate(self, link: LinkReport | None) -> None:
@@ -267,7 +266,9 @@ class Runner:
                 calling.cancel()
 
 
-async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
+async def _stop_pipeline(
+    last_reference: list[Any], close_pipe: Callable[[], None], deadline_s: float
+) -> bool:
     """Stops and frees a pipeline; False when that does not finish in time."""
 
     def stop_and_free() -> None:
@@ -275,6 +276,7 @@ async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
         # Freed here, in this thread: libsrt frees the port for good, and cleans up, when the last element is
         # freed, and both take their time.
         last_reference.clear()
+        close_pipe()
 
     try:
         await in_thread(stop_and_free, deadline_s)

@@ -30,6 +30,7 @@ class Reading:
         at: the moment.
         frames: encoded frames.
         bytes: of the transport stream.
+        last_frame_age_ms: since the capture of the newest frame.
         rtts_ms: round-trip times, by viewer's address.
         packets: srtsink's counters since the viewer connected, by viewer's address.
     """
@@ -37,6 +38,7 @@ class Reading:
     at: float
     frames: int
     bytes: int
+    last_frame_age_ms: float
     rtts_ms: dict[str, float]
     packets: dict[str, dict[str, int]]
 
@@ -50,7 +52,8 @@ def read(framing: Framing, sink: Any) -> Reading:
     return Reading(
         at=time.monotonic(),
         frames=framing.frames,
-        bytes=framing.bytes,
+        bytes=framing.sent_bytes,
+        last_frame_age_ms=framing.last_frame_age_ms,
         rtts_ms={address: float(caller.get_value("rtt-ms")) for address, caller in viewers.items()},
         packets={
             address: {name: int(caller.get_value(name)) for name in (_SENT, *_SHARES.values())}
@@ -59,7 +62,7 @@ def read(framing: Framing, sink: Any) -> Reading:
     )
 
 
-def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
+def measure(before: Reading, now: Reading) -> Measurement:
     """Returns the statistics of the window between two readings."""
     seconds = max(now.at - before.at, 1e-3)
     link = link_report(before, now)
@@ -67,7 +70,7 @@ def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
         fps=(now.frames - before.frames) / seconds,
         bitrate_kbps=(now.bytes - before.bytes) * 8 / 1000 / seconds,
         viewer_count=len(now.packets),
-        last_frame_age_ms=max(0, round((now.at - last_frame_at) * 1000)),
+        last_frame_age_ms=round(now.last_frame_age_ms),
         worst_rtt_ms=link.rtt_ms if link else None,
         worst_loss_percent=link.loss_percent if link else None,
     )
