@@ -103,7 +103,8 @@ class Measurement:
         viewer_count: connected viewers.
         last_frame_age_ms: since the capture of the newest encoded frame.
         worst_rtt_ms: longest round-trip time of any viewer; None without viewers.
-        worst_loss_percent: largest share of packets reported lost by any viewer; None without viewers.
+        worst_loss_percent: largest loss of packets to any viewer, as the share of those sent that were sent
+            again. None without viewers.
     """
 
     fps: float

@@ -20,7 +20,7 @@ from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, faults, statistics
-from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
+from preview.pipeline.adaptive import BitrateController, Decision, Sample
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
@@ -208,7 +208,8 @@ class Runner:
         now = statistics.read(self._framing, self._parts.sink)
         self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
-            self._adapt_bitrate(statistics.link_report(before, now))
+            links = statistics.viewer_links(before, now)
+            self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links))
         self._events.measured(self._viewer_limit.take_refused())
         return now
 
@@ -222,10 +223,10 @@ class Runner:
         call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, muxed_pad)
         self._spawn("key frame", self._call_driver(call, "it was asked for a key frame"))
 
-    def _adapt_bitrate(self, link: LinkReport | None) -> None:
+    def _adapt_bitrate(self, sample: Sample) -> None:
         if self._is_pending("bit rate"):
             return  # The encoder has yet to apply the previous one.
-        decision = self._controller.decide(link, time.monotonic())
+        decision = self._controller.decide(sample, time.monotonic())
         if decision.bitrate_kbps == self._bitrate.bitrate_kbps:
             self._bitrate = decision
         else:
