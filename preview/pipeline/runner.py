@@ -208,7 +208,7 @@ class Runner:
         now = statistics.read(self._framing, self._parts.sink)
         self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
-            links = statistics.viewer_links(before, now)
+            links = statistics.measured_links(before, now)
             self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links))
         self._events.measured(self._viewer_limit.take_refused())
         return now

@@ -73,21 +73,26 @@ def measure(before: Reading, now: Reading) -> Measurement:
 
 
 def viewer_links(before: Reading, now: Reading) -> dict[str, ViewerLink]:
-    """Returns the figures of each viewer's link in the window, by the viewer's address.
-
-    A viewer that had not acknowledged anything before the window has none yet: until then, SRT assumes a
-    round-trip time of 100 ms.
-    """
+    """Returns the figures of each viewer's link in the window, by the viewer's address."""
 
     def percent(address: str, name: str) -> float:
-        sent, counted = (now.packets[address][each] - before.packets[address][each] for each in (_SENT, name))
+        old = before.packets.get(address, {})
+        sent, counted = (now.packets[address][each] - old.get(each, 0) for each in (_SENT, name))
         return min(100.0, 100.0 * counted / sent) if sent > 0 else 0.0
 
     return {
         address: ViewerLink(now.rtts_ms[address], percent(address, _AGAIN), percent(address, _DROPPED))
         for address in now.packets
-        if before.packets.get(address, {}).get(_ACKNOWLEDGED)
     }
+
+
+def measured_links(before: Reading, now: Reading) -> dict[str, ViewerLink]:
+    """Returns the figures of viewers that had acknowledged something before the window.
+
+    Until a viewer does, SRT assumes a round-trip time of 100 ms.
+    """
+    links = viewer_links(before, now)
+    return {a: link for a, link in links.items() if before.packets.get(a, {}).get(_ACKNOWLEDGED)}
 
 
 def address_of(socket_address: Any) -> str:
