@@ -48,7 +48,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
         srt.reached_at,
         srt.port,
     )
-    trials = asyncio.create_task(prober.try_all(encoders.allowed), name="trials")
+    trials = asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials")
     try:
         await supervisor.run(stop)
     except HungError as error:

@@ -275,7 +275,7 @@ class Supervisor:
             self.failed(Fault(Blame.OTHER, str(error)))
             return
         self._retry_now = False
-        self._marker.set(encoder.name)
+        self._marker.set(encoder.name, proven=self._encoders.proven)
         await pipeline.start()
 
     def _report_software_fallback(self, choice: EncoderChoice) -> None:
@@ -343,7 +343,7 @@ class Supervisor:
         hung = [name for task, name in self._teardowns.items() if not _has_finished(task)]
         self._teardowns.clear()
         if hung:
-            self._marker.set(hung[0], "it hung when it was stopped")
+            self._marker.set(hung[0], "it hung when it was stopped", self._encoders.proven)
             raise HungError(f"encoder {hung[0]} hung when it was stopped")
         self._marker.clear()
 

@@ -106,9 +106,10 @@ class Measurement:
         fps: encoded frames per second.
         bitrate_kbps: bit rate of the transport stream.
         viewer_count: connected viewers.
-        last_frame_age_ms: age of the newest encoded frame.
+        last_frame_age_ms: since the capture of the newest encoded frame.
         worst_rtt_ms: longest round-trip time of any viewer; None without viewers.
-        worst_loss_percent: largest share of packets reported lost by any viewer; None without viewers.
+        worst_loss_percent: largest loss of packets to any viewer, as the share of those sent that were sent
+            again. None without viewers.
     """
 
     fps: float

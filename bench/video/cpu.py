@@ -86,7 +86,7 @@ def _row(name: str, measure: _Way, how: str, source: Camera, robot: product.Robo
         values=[ours.ms_per_frame for _, ours in rounds],
         references=[theirs.ms_per_frame for theirs, _ in rounds],
         discarded=discarded,
-        bar=1.10,
+        bar=1.05,
     )
 
 

@@ -17,6 +17,8 @@ from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequ
 # One attempt is short here: the conversation retries by itself, and reports each failure.
 _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_after_s=0.3))
 
+_CALLS_END_WITHIN_S: Final = 0.5
+
 Connect: TypeAlias = Callable[[str], AbstractAsyncContextManager[RobotSession]]
 
 
@@ -114,3 +116,7 @@ class Worker:
     async def _converse(self) -> None:
         async with self._connect(self.target) as robot:
             await first_to_end(self._conversation.run(robot), self._closing.wait())
+        # gRPC's own tasks end when its cancelled calls have. Its queue of completions is the process's: what
+        # came for this loop after its end would be an error in another worker's.
+        if left := asyncio.all_tasks() - {asyncio.current_task()}:
+            await asyncio.wait(left, timeout=_CALLS_END_WITHIN_S)

@@ -3,6 +3,7 @@
 A driver can end this process, by a crash or by a hang that only the end of the process resolves. The encoder
 would prove itself in the next process's trial, be used and end that process, too; the marker makes the next
 process pass it over for a while. A process that was killed from outside (SIGKILL, SIGTERM) blames no encoder.
+The marker also names the encoders that have been proven, so that viewers need not wait for another trial.
 
 In the runtime directory are the marker, written when an encoder starts and removed when it has stopped
 properly, and the report that Python's fault handler writes on SIGSEGV, SIGABRT, SIGBUS, SIGFPE and SIGILL.
@@ -15,6 +16,7 @@ import json
 import logging
 import os
 import weakref
+from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Final
 
@@ -54,6 +56,7 @@ class CrashMarkerFile:
             self._claim()
             marker = json.loads(self._marker.read_text(encoding="utf-8"))
             name, reason = str(marker["encoder"]), str(marker["why"])
+            proven = {str(each) for each in marker.get("proven", ())}
         except FileNotFoundError:
             return
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -62,11 +65,13 @@ class CrashMarkerFile:
         self.clear()
         if reason == _IN_USE and not crash:
             _log.info("the previous process was ended from outside while encoder %s was in use", name)
+            selection.trust(proven)
             return
         reason = reason or f"the process crashed while it was in use ({crash})"
         text = f"encoder {name} is passed over: {reason}"
         _log.warning("%s", text)
         selection.pass_over(name, text)
+        selection.trust(proven - {name})
 
     def begin_report(self) -> str:
         """Enables the crash report of this process.
@@ -89,16 +94,18 @@ class CrashMarkerFile:
             faulthandler.enable(self._report_file, all_threads=False)
         return previous
 
-    def set(self, encoder: str, reason: str = _IN_USE) -> None:
+    def set(self, encoder: str, reason: str = _IN_USE, proven: Iterable[str] = ()) -> None:
         """Writes the marker.
 
         Args:
             encoder: name of the encoder that is about to be used, or that hangs.
             reason: what it did, for people. Empty: nothing yet; counts only if this process crashes.
+            proven: names of the encoders that have been proven.
         """
         try:
             self._claim()
-            self._marker.write_text(json.dumps({"encoder": encoder, "why": reason}), encoding="utf-8")
+            marker = {"encoder": encoder, "why": reason, "proven": sorted(proven)}
+            self._marker.write_text(json.dumps(marker), encoding="utf-8")
         except OSError as error:
             _log.warning("no crash marker for encoder %s in %s: %s", encoder, self._marker, error)
 

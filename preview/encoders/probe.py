@@ -46,7 +46,7 @@ class TrialProber:
         repeats: whether trials are repeated that a busy machine may have spoiled.
 
     Attributes:
-        verdicts: newest results, by encoder name.
+        verdicts: newest results, by encoder name; what is known before the first trial replaces it.
     """
 
     def __init__(self, attempt: Callable[[Encoder], Awaitable[Verdict]], *, repeats: bool = True) -> None:
@@ -61,6 +61,8 @@ class TrialProber:
     async def verdict(self, encoder: Encoder) -> Verdict:
         """Returns the newest result for one encoder; runs its trial when there is none."""
         name = encoder.name
+        if name not in self._tasks and name in self.verdicts:
+            return self.verdicts[name]
         if name not in self._tasks:
             self._first[name] = asyncio.get_running_loop().create_future()
             self._tasks[name] = asyncio.create_task(self._try(encoder), name=f"trials of {name}")

@@ -101,7 +101,7 @@ def request_key_frame(element: Any, encoder: Encoder, sink_pad: Any) -> None:
     Args:
         element: the encoder element.
         encoder: its entry in the catalogue.
-        sink_pad: sink pad of the listener. The event travels upstream from there through muxer and parser,
+        sink_pad: the one behind the muxer. The event travels upstream from there through muxer and parser,
             which then repeat their tables and headers.
     """
     if signal := encoder.properties.key_frame_signal:

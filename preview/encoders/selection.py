@@ -1,11 +1,11 @@
 """Selection of the encoder: the first one in the order that is proven and has not failed since. Pure."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from common.errors import UserError
 from preview.encoders.catalogue import Encoder
-from preview.encoders.probe import TrialProber
+from preview.encoders.probe import TrialProber, Verdict
 from preview.values import EncoderChoice
 
 
@@ -37,13 +37,32 @@ class Selection:
         """Excludes an encoder that failed in a pipeline, for `forgive_after_s`."""
         self._failures[name] = (reason, self._clock())
 
-    async def probe(self) -> bool:
-        """Runs trials in order until an encoder is proven that has not failed; False when there is none."""
+    def trust(self, names: Collection[str]) -> None:
+        """Counts these encoders as proven without a trial: the previous process proved them.
+
+        One that does not work any more fails in the pipeline, and the next one takes over.
+        """
         for encoder in self._order:
+            if encoder.name in names:
+                self._prober.verdicts[encoder.name] = Verdict(present=True, proven=True)
+
+    @property
+    def proven(self) -> list[str]:
+        """Names of the proven encoders that have not failed."""
+        return [encoder.name for encoder in self._proven() if encoder.name not in self._failures]
+
+    @property
+    def order_of_trials(self) -> list[Encoder]:
+        """All encoders, those last that are passed over: a process that follows a crash needs the others."""
+        return sorted(self._order, key=lambda encoder: encoder.name in self._recent_failures())
+
+    async def probe(self) -> bool:
+        """Runs trials until an encoder is proven that has not failed; False when there is none."""
+        for encoder in self.order_of_trials:
+            if self.proven:
+                break
             await self._prober.verdict(encoder)
-            if any(proven.name not in self._failures for proven in self._proven()):
-                return True
-        return False
+        return bool(self.proven)
 
     def choose(self) -> tuple[Encoder, EncoderChoice]:
         """Returns the encoder to use, and the choice as reported in the status; to be called after `probe`.
@@ -53,8 +72,7 @@ class Selection:
         Raises:
             UserError: no encoder is proven.
         """
-        now = self._clock()
-        recent = {n: (why, at) for n, (why, at) in self._failures.items() if now - at < self._forgive_after_s}
+        recent = self._recent_failures()
         proven = self._proven()
         if not proven:
             raise UserError(
@@ -65,6 +83,10 @@ class Selection:
         wanted = self._order[0]
         reason = "" if chosen is wanted else self._why_not(wanted)
         return chosen, EncoderChoice(chosen.name, chosen.hardware, wanted.name, reason)
+
+    def _recent_failures(self) -> dict[str, tuple[str, float]]:
+        now = self._clock()
+        return {n: (why, at) for n, (why, at) in self._failures.items() if now - at < self._forgive_after_s}
 
     def _proven(self) -> list[Encoder]:
         verdicts = self._prober.verdicts

@@ -1,56 +1,82 @@
-"""Adaptive bit rate: congestion control by multiplicative decrease and additive increase. Pure.
+"""Adaptive bit rate: delay-based congestion control. Pure.
 
-A congested link gets a lower bit rate at once, by a factor; a quiet one is probed with small steps, and with
-smaller ones near the rate that congested it last. A link counts as congested when the sender drops packets
-(its buffer did not drain in time), when many packets are lost or sent again, or when the round-trip time has
-grown well beyond its own minimum, because packets then wait in a queue. A little loss alone is no congestion:
-SRT repairs it, and a lower bit rate does not improve a bad radio link. No standard prescribes the thresholds;
-docs/benchmarks.md (video.adaptive_*) has what they achieve.
+A congested link shows in a delay that is longer than its minimum (queue_delay.py): the age of the pictures
+where viewers report it, and the round-trip time. Then the bit rate falls at once, to below the rate that was
+delivered, so that the queue drains. Loss counts only where it exceeds what SRT can repair: a radio link loses
+packets at any rate, and a lower one does not improve it.
+
+The delivered rate is remembered as the one that congests the link. Far below it, the bit rate rises by a
+step a second. Close to it, it first waits, longer after each attempt that failed, and then rises in small
+steps. The principle is that of Google Congestion Control (draft-ietf-rmcat-gcc); the thresholds are our own,
+and docs/benchmarks.md (video.adaptive_*) has what they achieve.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
-_DECREASE: Final = 0.7
-_SEVERE_DECREASE: Final = 0.5
-"""Applies where a large share of the packets does not arrive at all."""
-_SEVERE_LOSS_PERCENT: Final = 20.0
-_SEVERE_DROPPED_PERCENT: Final = 10.0
-_INCREASE_SHARE: Final = 0.05
-"""Step up, as a share of the target."""
-_CAREFUL_FROM: Final = 0.8
-"""Above this share of the rate that congested the link last, steps are divided by _CAREFUL."""
-_CAREFUL: Final = 4
+from preview.pipeline.queue_delay import QueueDelay
+
+_BELOW_DELIVERED: Final = 0.85
+"""A decrease sets this share of the delivered rate at most, ..."""
+_DRAIN_S: Final = 2.0
+"""... and less where the queue would not drain within this time, ..."""
+_LEAST_SHARE: Final = 0.5
+"""... but at least this share of it."""
+_LEAST_DELIVERED: Final = 0.4
+"""Estimates of the delivered share below this are not trusted: a rate that is too low takes long to rise."""
 _HOLD_AFTER_DECREASE_S: Final = 1.0
 """A lower rate takes this long to show in the statistics."""
-_QUIET_BEFORE_INCREASE_S: Final = 3.0
+_CALM_BEFORE_INCREASE_S: Final = 2.0
 _INCREASE_EVERY_S: Final = 1.0
-_LOSS_PERCENT: Final = 8.0
-_RETRANSMITTED_PERCENT: Final = 12.0
-_DROPPED_PERCENT: Final = 0.5
-_RTT_GROWTH: Final = 2.5
+_STEP: Final = 0.05
+"""Step up, as a share of the target."""
+_CLOSE: Final = 0.9
+"""From this share of the rate that congested the link, the bit rate waits, and rises in small steps ..."""
+_PASSED: Final = 1.1
+"""... until this share of it, where that rate is forgotten."""
+_SMALL_STEP: Final = 0.025
+"""As a share of the bit rate."""
+_FIRST_WAIT_S: Final = 4.0
+_LONGEST_WAIT_S: Final = 60.0
 _RTT_SLACK_MS: Final = 40.0
-"""A round-trip time below its minimum plus this is never long."""
-_BASELINE_DRIFT: Final = 1.02
-"""Factor per window by which the minimum round-trip time rises: a robot that moved away gets a new one."""
+_RTT_SLACK_SHARE: Final = 0.5
+_AGE_SLACK_MS: Final = 150.0
+_LOSS_PERCENT: Final = 20.0
+_LOSS_SMOOTHING: Final = 0.5
+"""Weight of the newest window in the average: at a low bit rate a window has few packets."""
+_DROPPED_PERCENT: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class LinkReport:
-    """Worst figures of all viewers' links in one window; shares in percent of the packets sent to a viewer.
+class ViewerLink:
+    """Figures of the link to one viewer in one window; shares in percent of the packets sent to it.
 
     Args:
         rtt_ms: round-trip time.
-        loss_percent: packets reported lost.
-        retransmitted_percent: packets sent again.
+        loss_percent: packets that were sent again. That is nearly the loss itself, while SRT's counter of
+            lost packets counts each repetition of a loss report again.
         dropped_percent: packets dropped by the sender because they were too late to send (SRTO_TLPKTDROP).
-        age_ms: age of the oldest picture that a viewer shows, as viewers report it; None if none does.
     """
 
     rtt_ms: float
-    loss_percent: float
-    retransmitted_percent: float
-    dropped_percent: float
+    loss_percent: float = 0.0
+    dropped_percent: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What is known of one window.
+
+    Args:
+        stream_kbps: bit rate of the stream, without what was sent again.
+        viewers: their links, by address.
+        age_ms: time from capture to display of the viewer that is furthest behind; None: not reported. A
+            viewer that waits for every packet gets older pictures where others lose them.
+    """
+
+    stream_kbps: float
+    viewers: Mapping[str, ViewerLink]
     age_ms: float | None = None
 
 
@@ -67,6 +93,23 @@ class Decision:
     reason: str = ""
 
 
+@dataclass(slots=True)
+class _Observed:
+    """What has been seen of a viewer's link."""
+
+    rtt: QueueDelay = field(default_factory=lambda: QueueDelay(_RTT_SLACK_MS, _RTT_SLACK_SHARE))
+    loss_percent: float = 0.0
+    """Of the newest window, but no more than on average: neither one bad window counts nor what is over."""
+    dropped_percent: float = 0.0
+    _average_loss_percent: float = 0.0
+
+    def observe(self, link: ViewerLink, now: float) -> None:
+        self.rtt.observe(link.rtt_ms, now)
+        self._average_loss_percent += _LOSS_SMOOTHING * (link.loss_percent - self._average_loss_percent)
+        self.loss_percent = min(link.loss_percent, self._average_loss_percent)
+        self.dropped_percent = link.dropped_percent
+
+
 class BitrateController:
     """Controls the bit rate of one encoder.
 
@@ -76,78 +119,127 @@ class BitrateController:
     """
 
     def __init__(self, target_kbps: int, floor_kbps: int) -> None:
-        self._lowest_rtt_ms: float | None = None
+        self._viewers: dict[str, _Observed] = {}
+        self._age: QueueDelay | None = None
         self._last_decrease_at = float("-inf")
         self._last_increase_at = float("-inf")
-        self._last_congested_at = float("-inf")
+        self._calm_since: float | None = None
+        self._congested_kbps = float("inf")
+        self._wait_s = _FIRST_WAIT_S
+        """Before the next attempt to exceed it."""
+        self._close_since: float | None = None
+        """Since when the bit rate is close to the one that congested the link."""
         self.retarget(target_kbps, floor_kbps)
 
     def retarget(self, target_kbps: int, floor_kbps: int) -> None:
         """Sets the limits of another profile and starts at its target."""
         self._target_kbps = target_kbps
         self._floor_kbps = min(floor_kbps, target_kbps)
-        self._too_much_kbps = target_kbps
+        self._forget_congestion()
         self._decision = Decision(target_kbps)
 
-    def decide(self, link: LinkReport | None, now: float) -> Decision:
+    def decide(self, sample: Sample, now: float) -> Decision:
         """Returns the bit rate after a window.
 
         Args:
-            link: statistics of the window; None without viewers.
+            sample: of the window.
             now: monotonic seconds.
         """
-        if link is None:
+        self._observe(sample, now)
+        if not self._viewers:
             # The next viewer starts with the profile's own rate.
-            self._lowest_rtt_ms = None
+            self._forget_congestion()
             self._decision = Decision(self._target_kbps)
-            return self._decision
-        signs = self._congestion(link)
-        if signs:
-            self._last_congested_at = now
-            if now - self._last_decrease_at >= _HOLD_AFTER_DECREASE_S:
-                severe = (
-                    link.loss_percent > _SEVERE_LOSS_PERCENT or link.dropped_percent > _SEVERE_DROPPED_PERCENT
-                )
-                self._decrease(signs, _SEVERE_DECREASE if severe else _DECREASE, now)
-        elif self._may_increase(now):
-            self._increase(now)
+        elif signs := self._signs_of_congestion():
+            self._calm_since = None
+            if now - self._last_decrease_at >= _HOLD_AFTER_DECREASE_S and not self._is_draining():
+                self._decrease(", ".join(signs), sample.stream_kbps, now)
+        elif not all(delay.is_calm for delay in self._delays()):
+            self._calm_since = None
+        else:
+            self._calm_since = now if self._calm_since is None else self._calm_since
+            if self._may_increase(now):
+                self._increase(now)
         return self._decision
 
-    def _congestion(self, link: LinkReport) -> str:
-        """Returns the signs of congestion, comma-separated; empty for none."""
-        self._lowest_rtt_ms = min(link.rtt_ms, (self._lowest_rtt_ms or link.rtt_ms) * _BASELINE_DRIFT)
-        long_rtt_ms = max(self._lowest_rtt_ms * _RTT_GROWTH, self._lowest_rtt_ms + _RTT_SLACK_MS)
-        resent = link.retransmitted_percent
-        signs = [
-            (link.rtt_ms > long_rtt_ms, f"RTT {link.rtt_ms:.0f} ms"),
-            (link.loss_percent > _LOSS_PERCENT, f"{link.loss_percent:.0f} % loss"),
-            (resent > _RETRANSMITTED_PERCENT, f"{resent:.0f} % sent again"),
-            (link.dropped_percent > _DROPPED_PERCENT, f"{link.dropped_percent:.1f} % too late to send"),
-        ]
-        return ", ".join(text for bad, text in signs if bad)
+    def _observe(self, sample: Sample, now: float) -> None:
+        self._viewers = {address: self._viewers.get(address, _Observed()) for address in sample.viewers}
+        for address, link in sample.viewers.items():
+            self._viewers[address].observe(link, now)
+        if sample.age_ms is None:
+            self._age = None
+        else:
+            self._age = self._age or QueueDelay(_AGE_SLACK_MS)
+            self._age.observe(sample.age_ms, now)
 
-    def _decrease(self, signs: str, factor: float, now: float) -> None:
+    def _delays(self) -> list[QueueDelay]:
+        return [*([self._age] if self._age else []), *(viewer.rtt for viewer in self._viewers.values())]
+
+    def _signs_of_congestion(self) -> list[str]:
+        viewers = self._viewers.values()
+        longest = max((viewer.rtt for viewer in viewers), key=lambda rtt: rtt.queued_ms)
+        loss = max(viewer.loss_percent for viewer in viewers)
+        dropped = max(viewer.dropped_percent for viewer in viewers)
+        signs = [
+            (any(v.rtt.is_long for v in viewers), f"RTT {longest.delay_ms:.0f} ms"),
+            (loss > _LOSS_PERCENT, f"{loss:.0f} % loss"),
+            (dropped > _DROPPED_PERCENT, f"{dropped:.1f} % too late to send"),
+        ]
+        if self._age:
+            signs.insert(0, (self._age.is_long, f"pictures {self._age.delay_ms:.0f} ms old"))
+        return [text for bad, text in signs if bad]
+
+    def _is_draining(self) -> bool:
+        """Whether the last decrease was enough: every queue that is left becomes shorter."""
+        queues = [delay for delay in self._delays() if delay.is_long]
+        return bool(queues) and all(queue.is_draining for queue in queues)
+
+    def _decrease(self, signs: str, stream_kbps: float, now: float) -> None:
         before = self._decision.bitrate_kbps
-        after = max(self._floor_kbps, round(before * factor))
-        self._too_much_kbps = before
+        # An encoder may deliver less than it is set to.
+        sent_kbps = min(before, stream_kbps)
+        delays = self._delays()
+        lost = max(viewer.loss_percent for viewer in self._viewers.values()) / 100
+        delivered = (1 - lost) * (1 - max(delay.growth for delay in delays))
+        drained = 1 - max(delay.queued_ms for delay in delays) / 1000 / _DRAIN_S
+        self._congested_kbps = sent_kbps * max(_LEAST_DELIVERED, delivered)
+        share = max(_LEAST_SHARE, min(_BELOW_DELIVERED, drained))
+        after = max(self._floor_kbps, round(self._congested_kbps * share))
+        self._wait_s = min(_LONGEST_WAIT_S, self._wait_s * 2 if self._close_since else self._wait_s)
+        self._close_since = None
         self._last_decrease_at = now
-        if after != before:
+        if after < before:
             self._decision = Decision(after, f"{signs}: {before} -> {after} kbit/s")
         elif after < self._target_kbps:
-            self._decision = Decision(after, f"{signs}: at the floor of {after} kbit/s")
+            self._decision = Decision(before, f"{signs}: at the floor of {before} kbit/s")
 
     def _may_increase(self, now: float) -> bool:
         return (
             self._decision.bitrate_kbps < self._target_kbps
-            and now - self._last_congested_at >= _QUIET_BEFORE_INCREASE_S
+            and self._calm_since is not None
+            and now - self._calm_since >= _CALM_BEFORE_INCREASE_S
             and now - self._last_increase_at >= _INCREASE_EVERY_S
         )
 
     def _increase(self, now: float) -> None:
         before = self._decision.bitrate_kbps
-        careful = _CAREFUL if before >= self._too_much_kbps * _CAREFUL_FROM else 1
-        step = max(1, round(self._target_kbps * _INCREASE_SHARE / careful))
-        after = min(self._target_kbps, before + step)
+        close_kbps = self._congested_kbps * _CLOSE
+        if before > close_kbps - 1:
+            if self._close_since is None:
+                self._close_since = now
+            if now - self._close_since < self._wait_s:
+                return
+            step = before * _SMALL_STEP
+        else:
+            step = min(self._target_kbps * _STEP, close_kbps - before)
+        after = min(self._target_kbps, before + max(1, round(step)))
+        if after >= self._congested_kbps * _PASSED or after == self._target_kbps:
+            self._forget_congestion()
         self._last_increase_at = now
         reason = "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
         self._decision = Decision(after, reason)
+
+    def _forget_congestion(self) -> None:
+        self._congested_kbps = float("inf")
+        self._wait_s = _FIRST_WAIT_S
+        self._close_since = None

@@ -1,6 +1,6 @@
 """Builds the pipeline of a plan, not yet started.
 
-    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! plain caps ! listener
+    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! pipe ! listener
 
 - Frames are dropped to the profile's rate before any work is done on them. A source that generates any rate
   is negotiated to that rate instead.
@@ -25,12 +25,8 @@ _TABLES_EVERY: Final = 4500
 """In ticks of 90 kHz: 50 ms. At 10 frames per second and more, tables are at most 100 ms apart."""
 _CLOCK_REFERENCE_EVERY: Final = 900
 """In ticks of 90 kHz: 10 ms, so that every frame has a PCR, up to 100 frames per second."""
-_WITHOUT_TABLES: Final = "video/mpegts,systemstream=true,packetsize=188"
-"""Replaces the muxer's caps, which contain its tables as stream headers. srtsink would send these to every
-new viewer, with continuity counters that the stream does not continue; its key frame brings tables anyway.
-
-An element does it, not a probe: caps that a probe drops are pushed again with every buffer.
-"""
+_LONGEST_READ: Final = 50 * 7 * 188
+"""Bytes: a full pipe, in whole datagrams of seven packets."""
 _SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 _SRT_POLL_MS: Final = 1000
@@ -53,6 +49,8 @@ class Parts:
     encoder: Any
     parser_pad: Any
     muxer_pad: Any
+    pipe_in: Any
+    pipe_out: Any
     sink: Any
 
 
@@ -90,6 +88,8 @@ def build(plan: Plan) -> Parts:
         encoder=encoder,
         parser_pad=find("parser").get_static_pad("src"),
         muxer_pad=find("muxer").get_static_pad("src"),
+        pipe_in=find("pipe_in"),
+        pipe_out=find("pipe_out"),
         sink=sink,
     )
 
@@ -165,7 +165,8 @@ def _body(plan: Plan) -> str:
             properties.chain(plan.encoder),
             f"mpegtsmux name=muxer alignment=0 pat-interval={_TABLES_EVERY} pmt-interval={_TABLES_EVERY}"
             f" pcr-interval={_CLOCK_REFERENCE_EVERY}",
-            f"capssetter replace=true join=false caps={_WITHOUT_TABLES}",
+            # framing.py connects them by a pipe.
+            f"fdsink name=pipe_in sync=false async=false fdsrc name=pipe_out blocksize={_LONGEST_READ}",
             "srtsink name=sink",
         ]
     )

@@ -4,11 +4,11 @@ The PCR shall come at least every 100 ms (ISO/IEC 13818-1 2.7.2); receivers and 
 (ETSI TR 101 290, PCR_error) expect 40 ms. The muxer writes one with a frame only: every 67 ms at 15 frames
 per second. So packets that carry nothing but a PCR are sent in between.
 
-A thread of its own sends them, because sending must not block the event loop. It and the streaming thread
-send under one lock, so a reference is sent before the next frame or not at all, and never ahead of that
-frame's own PCR. A frame that is late is preceded by no more references than one in time, and after a change
-of the frame rate none is sent before two frames came at the new interval. At high frame rates there is no
-thread.
+A thread of its own sends them, because sending must not block the event loop. It sends under the lock under
+which the streaming thread announces the next frame, and only once the newest one has been written: so a
+reference is sent before the next frame or not at all, and never ahead of a frame's own PCR. A frame that is
+late is preceded by no more references than one in time, and after a change of the frame rate none is sent
+before two frames came at the new interval. At high frame rates there is no thread.
 """
 
 import math
@@ -23,10 +23,12 @@ MAX_GAP_S: Final = 0.038
 """Between two references: just below 40 ms."""
 _INTERVAL_S: Final = 0.030
 """Longest time from a frame to the first reference after it, and on to the next."""
+_LOOK_AGAIN_S: Final = 0.001
+"""Where a frame takes longer to be passed on than until its first reference: a machine that is very busy."""
 _CLOCK_HZ: Final = 27_000_000
 _WRAP: Final = (1 << 33) * 300
 """Ticks: program_clock_reference_base has 33 bits, and counts every 300th tick (2.4.3.5)."""
-_HEAD_PACKETS: Final = 6
+HEAD_PACKETS: Final = 6
 """A frame's own PCR is in its first packet, which follows the tables."""
 
 
@@ -58,8 +60,12 @@ class Reference:
 
 
 def read(packets: bytes) -> Reference | None:
-    """Returns the PCR of a frame, whose last packet is of the video; None when it has none."""
-    for start in range(0, min(len(packets), _HEAD_PACKETS * PACKET_BYTES), PACKET_BYTES):
+    """Returns the PCR of a frame; None when it has none.
+
+    Args:
+        packets: the first HEAD_PACKETS of the frame or more, and its last one, which is of the video.
+    """
+    for start in range(0, min(len(packets), HEAD_PACKETS * PACKET_BYTES), PACKET_BYTES):
         has_clock = packets[start + 3] & 0x20 and packets[start + 4] >= 7 and packets[start + 5] & 0x10
         if has_clock:
             field = int.from_bytes(packets[start + 6 : start + 12])
@@ -86,46 +92,53 @@ class ClockReferences:
 
     Args:
         send: passes a packet to the listener; called on a thread of its own.
+        written: returns how many frames have been passed on so far.
         fps: frame rate.
     """
 
-    def __init__(self, send: Callable[[bytes], None], fps: float) -> None:
+    def __init__(self, send: Callable[[bytes], None], written: Callable[[], int], fps: float) -> None:
         self._send = send
+        self._written = written
         self._changed = threading.Condition()
         self._frame: Reference | None = None
         """The newest frame; None where no references follow it."""
         self._frame_at = 0.0
+        self._written_before = 0
+        """Frames passed on before the newest."""
         self._sent = 0
         self._in_rhythm = True
         """Whether frames come at the interval that the frame rate says."""
         self._count, self._interval_s = rhythm(fps)
         self._thread: threading.Thread | None = None
 
+    @property
+    def wanted(self) -> bool:
+        """Whether references follow the frames at this rate."""
+        return self._count > 0
+
     def set_rate(self, fps: float) -> None:
-        """Sets another frame rate. May block while a frame is being sent."""
+        """Sets another frame rate."""
         with self._changed:
             self._count, self._interval_s = rhythm(fps)
             self._frame, self._in_rhythm = None, False
             self._changed.notify()
 
-    def around(self, packets: bytes, send_frame: Callable[[], None]) -> None:
-        """Sends a frame, on the streaming thread, and schedules the references that follow it.
+    def follow(self, packets: bytes) -> None:
+        """Schedules the references that follow a frame, on the streaming thread, before it is passed on.
 
         Args:
-            packets: the frame.
-            send_frame: sends it.
+            packets: the frame, at least as much as `read` needs.
         """
-        if not self._count:
-            send_frame()
-            return
         with self._changed:
+            if not self._count:
+                return
             before, self._frame = self._frame, read(packets)
             self._frame_at, self._sent = time.monotonic(), 0
+            self._written_before = self._written()
             if before and self._frame and not self._in_rhythm:
                 # Frames closer together leave no room for the last reference.
                 apart_ticks = (self._frame.ticks - before.ticks) % _WRAP
                 self._in_rhythm = apart_ticks > round(self._count * self._interval_s * _CLOCK_HZ)
-            send_frame()
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name="clock-references", daemon=True)
                 self._thread.start()
@@ -135,7 +148,7 @@ class ClockReferences:
         """Stops sending and releases the listener, which has stopped. The thread ends by itself."""
         with self._changed:
             self._count = 0
-            del self._send
+            del self._send, self._written
             self._changed.notify()
 
     def _run(self) -> None:
@@ -153,6 +166,8 @@ class ClockReferences:
             left_s = self._frame_at + due_s - time.monotonic()
             if left_s > 0:
                 return left_s
+            if self._written() == self._written_before:
+                return _LOOK_AGAIN_S
             self._sent += 1
             self._send(self._frame.packet(due_s))
         return None

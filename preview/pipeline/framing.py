@@ -1,90 +1,139 @@
 """Frame-aligned transport stream: sends each access unit whole, without waiting for the next one.
 
 A muxer that groups packets by seven (mpegtsmux alignment=7) holds back the tail of every frame until the next
-one fills the group. Here the muxer pushes all packets of a frame as one buffer list (alignment=0), and this
-probe on its source pad joins them into one buffer. The listener cuts that into datagrams of seven packets (7
-x 188 = 1316 bytes, SRTO_PAYLOADSIZE of live mode); the last one ends where the frame ends.
+one fills the group. Without groups (alignment=0) it pushes all packets of a frame as one buffer list, and
+srtsink would send each of them as a datagram of its own. So the frame passes through a pipe:
 
-The buffer inherits none of the packets' flags: the muxer flags each run that starts with its tables (PAT,
-PMT) as HEADER, and a srtsink that got stream headers in its caps drops such buffers.
+    muxer ! fdsink ---> pipe ---> fdsrc ! listener
 
-This is the only Python that runs for every frame, and every call into GStreamer costs microseconds, so it
-makes as few as possible. It also counts the frames.
+fdsink writes the list with one call of writev, and fdsrc reads it as one buffer. The listener cuts that into
+datagrams of seven packets (7 x 188 = 1316 bytes, SRTO_PAYLOADSIZE of live mode); the last one ends where the
+frame ends. A frame larger than the pipe passes in parts, which cost no time either. Joining the packets in
+Python takes a twentieth of the CPU time that x264 needs for the frame.
+
+The pipe passes nothing but bytes: neither the flag HEADER, which the muxer sets on each run that starts with
+its tables (PAT, PMT), nor its stream headers; srtsink drops buffers with the one if it got the others. They
+would also reach every new viewer, with continuity counters that the stream does not continue; its key frame
+brings tables anyway.
+
+No Python runs for a frame, except at frame rates that need clock references: the elements count.
 """
 
 import asyncio
-import time
+import os
+import threading
 from collections.abc import Callable
-from typing import Any, Final
+from contextlib import suppress
+from typing import Any
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
-from preview.pipeline.clock_references import ClockReferences
+from preview.pipeline.clock_references import HEAD_PACKETS, ClockReferences
 from preview.pipeline.threads import call_on_loop
-
-# Larger than any packet: asking each of some fifty packets for its size would add a third to the cost.
-_ALL: Final = 1 << 16
 
 
 class Framing:
-    """The probe and its counters, which streaming threads write and any thread may read.
+    """The pipe, and what has passed it.
 
     Args:
-        parts: the pipeline.
-        on_first_frame: called once, on the event loop, after the first frame.
+        parts: the pipeline, not yet started.
+        on_first_frame: called once, on the event loop, with the first frame.
+        on_end: called on the event loop when the stream has ended. The pipeline does not report that: the end
+            does not pass the pipe.
         fps: frame rate.
     """
 
-    def __init__(self, parts: Parts, on_first_frame: Callable[[], None], fps: float) -> None:
-        self.frames = 0
-        self.bytes = 0
-        self.last_frame_at = 0.0
-        """time.monotonic() of the newest frame."""
+    def __init__(
+        self, parts: Parts, on_first_frame: Callable[[], None], on_end: Callable[[], None], fps: float
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._on_first_frame = on_first_frame
-        self._references = ClockReferences(self._send_reference, fps)
+        self._on_end = on_end
+        self._read_fd, self._write_fd = os.pipe()
+        # A full pipe, left behind by a listener that has stopped, must not block a thread of Python.
+        os.set_blocking(self._write_fd, False)
+        self._pipe_in, self._pipe_out = parts.pipe_in, parts.pipe_out
+        self._pipe_in.set_property("fd", self._write_fd)
+        self._pipe_out.set_property("fd", self._read_fd)
+        self._begun = False
+        self._references = ClockReferences(self._send_reference, lambda: self.frames, fps)
         self._muxer_pad = parts.muxer_pad
-        self._listener_pad: Any = parts.muxer_pad.get_peer()
-        """None once detached, while the encoder may still deliver."""
-        self._probe_id = self._muxer_pad.add_probe(
-            Gst.PadProbeType.BUFFER_LIST | Gst.PadProbeType.BUFFER, self._probe
-        )
+        self._lock = threading.Lock()
+        """Held by threads that add or remove the probe: doing so and keeping its number is one step."""
+        self._frame_probe: int | None = None
+        self._event_probe = self._muxer_pad.add_probe(Gst.PadProbeType.EVENT_DOWNSTREAM, self._on_event)
+        self._watch_frames()
 
     def detach(self) -> None:
-        """Removes the probe: with it the pipeline and this object would keep each other alive."""
-        self._muxer_pad.remove_probe(self._probe_id)
-        self._references.stop()
-        del self._muxer_pad
-        self._listener_pad = None
+        """Removes the probes: with them the pipeline and this object would keep each other alive."""
+        with self._lock:
+            self._muxer_pad.remove_probe(self._event_probe)
+            if self._frame_probe is not None:
+                self._muxer_pad.remove_probe(self._frame_probe)
+            self._references.stop()
+            del self._muxer_pad, self._pipe_in, self._pipe_out
+
+    def close(self) -> None:
+        """Closes the pipe; to be called once the pipeline has stopped, which could write to another file."""
+        os.close(self._write_fd)
+        os.close(self._read_fd)
+
+    @property
+    def frames(self) -> int:
+        """Encoded frames so far."""
+        return int(self._pipe_in.get_property("stats").get_value("rendered"))
+
+    @property
+    def sent_bytes(self) -> int:
+        """Bytes of the transport stream so far."""
+        return int(self._pipe_out.query_position(Gst.Format.BYTES).cur)
+
+    @property
+    def last_frame_age_ms(self) -> float:
+        """Milliseconds since the capture of the newest encoded frame; 0 before the first."""
+        newest = self._pipe_in.get_property("last-sample")
+        clock = self._pipe_in.get_clock()
+        if newest is None or clock is None:
+            return 0.0
+        captured_at = self._pipe_in.get_base_time() + newest.get_buffer_list().get(0).pts
+        age_ms: float = (clock.get_time() - captured_at) / Gst.MSECOND
+        return max(0.0, age_ms)
 
     def set_rate(self, fps: float) -> None:
-        """Sets another frame rate. May block while a frame is being sent."""
+        """Sets another frame rate."""
         self._references.set_rate(fps)
+        if self._references.wanted:
+            self._watch_frames()
 
-    def _probe(self, _pad: Any, info: Any) -> Any:
-        if info.type & Gst.PadProbeType.BUFFER_LIST:
-            packets = info.get_buffer_list()
-            buffers = [packets.get(index) for index in range(packets.length())]
-        else:
-            buffers = [info.get_buffer()]
-        if buffers and (listener_pad := self._listener_pad):
-            self._send_frame(b"".join(buffer.extract_dup(0, _ALL) for buffer in buffers), listener_pad)
-        return Gst.PadProbeReturn.DROP
+    def _watch_frames(self) -> None:
+        with self._lock:
+            if self._frame_probe is None:
+                self._frame_probe = self._muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST, self._on_frame)
 
-    def _send_frame(self, packets: bytes, listener_pad: Any) -> None:
-        frame = Gst.Buffer.new_wrapped(packets)
-
-        def send() -> None:
-            listener_pad.chain(frame)
-            self.bytes += len(packets)
-
-        self._references.around(packets, send)
-        self.last_frame_at = time.monotonic()
-        self.frames += 1
-        if self.frames == 1:
+    def _on_frame(self, _pad: Any, info: Any) -> Any:
+        if not self._begun:
+            self._begun = True
             call_on_loop(self._loop, self._on_first_frame)
+        with self._lock:
+            if not self._references.wanted:
+                self._frame_probe = None
+                return Gst.PadProbeReturn.REMOVE
+        self._references.follow(_head_and_last(info.get_buffer_list()))
+        return Gst.PadProbeReturn.OK
+
+    def _on_event(self, _pad: Any, info: Any) -> Any:
+        if info.get_event().type == Gst.EventType.EOS:
+            call_on_loop(self._loop, self._on_end)
+        return Gst.PadProbeReturn.OK
 
     def _send_reference(self, packet: bytes) -> None:
         """Sends a clock reference, on the thread and under the lock of ClockReferences."""
-        self._listener_pad.chain(Gst.Buffer.new_wrapped(packet))
-        self.bytes += len(packet)
+        with suppress(BlockingIOError):  # The listener has stopped.
+            os.write(self._write_fd, packet)
+
+
+def _head_and_last(packets: Any) -> bytes:
+    """Returns the packets of a frame that clock_references.read needs."""
+    count = packets.length()
+    wanted = [packets.get(index) for index in (*range(min(count, HEAD_PACKETS)), count - 1)]
+    return b"".join(packet.extract_dup(0, packet.get_size()) for packet in wanted)

@@ -1,9 +1,9 @@
 """One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
 supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in three
-places only (framing.py, keyframe_gate.py, file_loop.py) and schedule calls on the loop. Every call that may
-block in a driver (state changes, properties of a playing encoder, requests for key frames) runs in a thread
-of its own with a deadline.
+places only (framing.py, keyframe_gate.py, file_loop.py), at most frame rates for no frame, and schedule calls
+on the loop. Every call that may block in a driver (state changes, properties of a playing encoder, requests
+for key frames) runs in a thread of its own with a deadline.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, capture_clock, faults, statistics
-from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
+from preview.pipeline.adaptive import BitrateController, Decision, Sample
 from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
@@ -41,7 +41,7 @@ _DRIVER_DEADLINE_S: Final = 2.0
 _PICTURE_AGE_COUNTS_S: Final = 3.0
 """As the gateway counts a viewer's report."""
 _GRAPH_DEADLINE_S: Final = 0.3
-_MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING | Gst.MessageType.EOS
+_MESSAGES: Final = Gst.MessageType.ERROR | Gst.MessageType.WARNING
 
 
 class Runner:
@@ -64,7 +64,7 @@ class Runner:
         self._controller = BitrateController(plan.target.bitrate_kbps, plan.target.floor_kbps)
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
-        self._framing = Framing(parts, self._first_frame, plan.target.fps)
+        self._framing = Framing(parts, self._first_frame, self._source_ended, plan.target.fps)
         self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
         self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
         self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
@@ -154,7 +154,8 @@ class Runner:
             except TimeoutError as error:
                 raise HungError(f"{name} hung when it was stopped") from error
         del part
-        return asyncio.create_task(_stop_pipeline(self._release(), deadline_s), name="stop the encoder")
+        work = _stop_pipeline(self._release(), self._framing.close, deadline_s)
+        return asyncio.create_task(work, name="stop the encoder")
 
     async def write_graph(self, path: Path) -> None:
         """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
@@ -199,10 +200,8 @@ class Runner:
             if message.type == Gst.MessageType.ERROR:
                 _log.debug("%s: %s", message.src.get_path_string(), message.parse_error())
                 self._fail(faults.from_message(message, self._parts, self.plan))
-            elif message.type == Gst.MessageType.WARNING:
-                _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
             else:
-                self._source_ended()
+                _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
 
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
@@ -220,10 +219,10 @@ class Runner:
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)
-        self.measurement = statistics.measure(before, now, self._framing.last_frame_at)
+        self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
-            link = statistics.link_report(before, now)
-            self._adapt_bitrate(replace(link, age_ms=self._picture_age(now.at)) if link else None)
+            links = statistics.measured_links(before, now)
+            self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, self._picture_age(now.at)))
         self._events.measured(self._viewer_limit.take_refused())
         return now
 
@@ -237,14 +236,14 @@ class Runner:
         """Requests a key frame for a new viewer; one that is already requested serves both."""
         if self._ended.done() or self._is_pending("key frame"):
             return
-        sink_pad = self._parts.sink.get_static_pad("sink")
-        call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, sink_pad)
+        muxed_pad = self._parts.pipe_in.get_static_pad("sink")
+        call = partial(properties.request_key_frame, self._parts.encoder, self.plan.encoder, muxed_pad)
         self._spawn("key frame", self._call_driver(call, "it was asked for a key frame"))
 
-    def _adapt_bitrate(self, link: LinkReport | None) -> None:
+    def _adapt_bitrate(self, sample: Sample) -> None:
         if self._is_pending("bit rate"):
             return  # The encoder has yet to apply the previous one.
-        decision = self._controller.decide(link, time.monotonic())
+        decision = self._controller.decide(sample, time.monotonic())
         if decision.bitrate_kbps == self._bitrate.bitrate_kbps:
             self._bitrate = decision
         else:
@@ -285,7 +284,9 @@ class Runner:
                 calling.cancel()
 
 
-async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
+async def _stop_pipeline(
+    last_reference: list[Any], close_pipe: Callable[[], None], deadline_s: float
+) -> bool:
     """Stops and frees a pipeline; False when that does not finish in time."""
 
     def stop_and_free() -> None:
@@ -293,6 +294,7 @@ async def _stop_pipeline(last_reference: list[Any], deadline_s: float) -> bool:
         # Freed here, in this thread: libsrt frees the port for good, and cleans up, when the last element is
         # freed, and both take their time.
         last_reference.clear()
+        close_pipe()
 
     try:
         await in_thread(stop_and_free, deadline_s)

@@ -8,18 +8,14 @@ import time
 from dataclasses import dataclass
 from typing import Any, Final
 
-from preview.pipeline.adaptive import LinkReport
+from preview.pipeline.adaptive import ViewerLink
 from preview.pipeline.framing import Framing
 from preview.values import Measurement
 
+_ACKNOWLEDGED: Final = "packet-ack-received"
 _SENT: Final = "packets-sent"
-_SHARES: Final = {
-    # srtsink's name is misleading: it counts loss reports.
-    "loss_percent": "packets-sent-lost",
-    "retransmitted_percent": "packets-retransmitted",
-    "dropped_percent": "packets-sent-dropped",
-}
-"""Shares of a LinkReport, and srtsink's counters of them."""
+_AGAIN: Final = "packets-retransmitted"
+_DROPPED: Final = "packets-sent-dropped"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +26,7 @@ class Reading:
         at: the moment.
         frames: encoded frames.
         bytes: of the transport stream.
+        last_frame_age_ms: since the capture of the newest frame.
         rtts_ms: round-trip times, by viewer's address.
         packets: srtsink's counters since the viewer connected, by viewer's address.
     """
@@ -37,6 +34,7 @@ class Reading:
     at: float
     frames: int
     bytes: int
+    last_frame_age_ms: float
     rtts_ms: dict[str, float]
     packets: dict[str, dict[str, int]]
 
@@ -50,43 +48,51 @@ def read(framing: Framing, sink: Any) -> Reading:
     return Reading(
         at=time.monotonic(),
         frames=framing.frames,
-        bytes=framing.bytes,
+        bytes=framing.sent_bytes,
+        last_frame_age_ms=framing.last_frame_age_ms,
         rtts_ms={address: float(caller.get_value("rtt-ms")) for address, caller in viewers.items()},
         packets={
-            address: {name: int(caller.get_value(name)) for name in (_SENT, *_SHARES.values())}
+            address: {name: int(caller.get_value(name)) for name in (_ACKNOWLEDGED, _SENT, _AGAIN, _DROPPED)}
             for address, caller in viewers.items()
         },
     )
 
 
-def measure(before: Reading, now: Reading, last_frame_at: float) -> Measurement:
+def measure(before: Reading, now: Reading) -> Measurement:
     """Returns the statistics of the window between two readings."""
     seconds = max(now.at - before.at, 1e-3)
-    link = link_report(before, now)
+    links = viewer_links(before, now).values()
     return Measurement(
         fps=(now.frames - before.frames) / seconds,
         bitrate_kbps=(now.bytes - before.bytes) * 8 / 1000 / seconds,
         viewer_count=len(now.packets),
-        last_frame_age_ms=max(0, round((now.at - last_frame_at) * 1000)),
-        worst_rtt_ms=link.rtt_ms if link else None,
-        worst_loss_percent=link.loss_percent if link else None,
+        last_frame_age_ms=round(now.last_frame_age_ms),
+        worst_rtt_ms=max((link.rtt_ms for link in links), default=None),
+        worst_loss_percent=max((link.loss_percent for link in links), default=None),
     )
 
 
-def link_report(before: Reading, now: Reading) -> LinkReport | None:
-    """Returns the worst figures of all viewers in the window; None without viewers."""
-    if not now.packets:
-        return None
+def viewer_links(before: Reading, now: Reading) -> dict[str, ViewerLink]:
+    """Returns the figures of each viewer's link in the window, by the viewer's address."""
 
-    def in_window(address: str, name: str) -> int:
-        return now.packets[address][name] - before.packets.get(address, {}).get(name, 0)
+    def percent(address: str, name: str) -> float:
+        old = before.packets.get(address, {})
+        sent, counted = (now.packets[address][each] - old.get(each, 0) for each in (_SENT, name))
+        return min(100.0, 100.0 * counted / sent) if sent > 0 else 0.0
 
-    def worst_percent(name: str) -> float:
-        sent = {address: in_window(address, _SENT) for address in now.packets}
-        return max(min(100.0, 100.0 * in_window(a, name) / sent[a]) if sent[a] > 0 else 0.0 for a in sent)
+    return {
+        address: ViewerLink(now.rtts_ms[address], percent(address, _AGAIN), percent(address, _DROPPED))
+        for address in now.packets
+    }
 
-    shares = {share: worst_percent(name) for share, name in _SHARES.items()}
-    return LinkReport(rtt_ms=max(now.rtts_ms.values()), **shares)
+
+def measured_links(before: Reading, now: Reading) -> dict[str, ViewerLink]:
+    """Returns the figures of viewers that had acknowledged something before the window.
+
+    Until a viewer does, SRT assumes a round-trip time of 100 ms.
+    """
+    links = viewer_links(before, now)
+    return {a: link for a, link in links.items() if before.packets.get(a, {}).get(_ACKNOWLEDGED)}
 
 
 def address_of(socket_address: Any) -> str:

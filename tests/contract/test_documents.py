@@ -30,6 +30,12 @@ def test_relative_links_lead_somewhere(document: Path) -> None:
         assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_ffplay_is_given_its_latency_in_microseconds(document: Path) -> None:
+    latencies = re.findall(r"ffplay.*[?&]latency=(\d+)", document.read_text(encoding="utf-8"))
+    assert [each for each in latencies if int(each) < 1000] == []
+
+
 def test_the_contributors_guide_names_files_that_exist() -> None:
     guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(

@@ -33,6 +33,38 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
         assert watcher.reconnects == 0
 
 
+def test_random_loss_on_a_wide_link_costs_nothing(tmp_path: Path) -> None:
+    bad = Impairment(delay_s=0.02, loss=0.03, control_loss=0.03)
+    with (
+        RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
+        UdpLink(preview.port, bad) as link,
+        Watcher(link.port, latency_ms=125) as watcher,
+    ):
+        preview.enable()
+        preview.running()
+        watcher.wait_for_frames(300)
+        state = preview.wait_for(lambda a: a.measurement.worst_loss_percent > 0, "loss is reported")
+        assert (state.stream.target_bitrate_kbps, state.stream.bitrate_reason) == (600, "")
+
+
+def test_a_narrow_link_gets_what_it_carries(tmp_path: Path) -> None:
+    with (
+        RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
+        UdpLink(preview.port, Impairment(delay_s=0.02)) as link,
+        Watcher(link.port, latency_ms=125) as watcher,
+    ):
+        preview.enable()
+        preview.running()
+        watcher.wait_for_frames(60)
+        link.impairment.rate_kbps = 450
+        state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 450, "a lower rate")
+        assert "RTT" in state.stream.bitrate_reason
+        preview.wait_for(lambda a: a.measurement.worst_rtt_ms < 80, "the queue has drained")
+        watcher.wait_for_frames(150)
+        state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 450, "still below the limit")
+        assert state.stream.target_bitrate_kbps > 150, "above the floor"
+
+
 def test_unless_it_is_asked_to_the_bit_rate_stays(tmp_path: Path) -> None:
     with (
         RunningPreview(tmp_path) as preview,

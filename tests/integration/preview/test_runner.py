@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from preview.config import AdaptiveSettings
-from preview.pipeline.adaptive import BitrateController, Decision, LinkReport
+from preview.pipeline.adaptive import BitrateController, Decision, Sample
 from preview.pipeline.events import PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
@@ -27,9 +27,9 @@ async def test_the_age_that_viewers_report_reaches_the_adaptive_bit_rate(
 ) -> None:
     seen: list[float | None] = []
 
-    def decide(self: BitrateController, link: LinkReport | None, now: float) -> Decision:
-        seen.extend([link.age_ms] if link else [])
-        return original(self, link, now)
+    def decide(self: BitrateController, sample: Sample, now: float) -> Decision:
+        seen.extend([sample.age_ms] if sample.viewers else [])
+        return original(self, sample, now)
 
     original = BitrateController.decide
     monkeypatch.setattr(BitrateController, "decide", decide)

@@ -367,6 +367,28 @@ def test_orders_after_the_end_do_nothing(robot: PlayedRobot) -> None:
     assert not robot.requests
 
 
+def test_the_loop_ends_after_what_the_client_still_does() -> None:
+    """The completion of a cancelled call reaches the loop a little later, from gRPC."""
+    ends = []
+
+    async def cancelled_call() -> None:
+        try:
+            await asyncio.sleep(0.05)
+        finally:
+            ends.append("cancelled" if asyncio.current_task().cancelling() else "completed")  # type: ignore[union-attr]
+
+    @asynccontextmanager
+    async def connect(_target: str) -> AsyncIterator[PlayedRobot]:
+        yield PlayedRobot()
+        tasks.add(asyncio.create_task(cancelled_call()))
+
+    tasks: set[asyncio.Task[None]] = set()
+    worker = Worker("robot", lambda: None, connect)
+    worker.start()
+    assert worker.close(10)
+    assert ends == ["completed"]
+
+
 def test_never_started_is_closed_at_once(robot: PlayedRobot) -> None:
     assert Worker("robot", lambda: None, robot.connect).close()
 

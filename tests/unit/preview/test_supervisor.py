@@ -1,7 +1,7 @@
 """The supervisor with pipeline doubles, in virtual time: every row of its failure table, and its requests."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -73,9 +73,10 @@ class Marker(CrashMarkerFile):
         super().__init__(directory)
         self.encoder = ""
         self.reason = ""
+        self.proven: list[str] = []
 
-    def set(self, encoder: str, reason: str = "") -> None:
-        self.encoder, self.reason = encoder, reason
+    def set(self, encoder: str, reason: str = "", proven: Iterable[str] = ()) -> None:
+        self.encoder, self.reason, self.proven = encoder, reason, list(proven)
 
     def clear(self) -> None:
         self.encoder = self.reason = ""
@@ -341,6 +342,7 @@ async def test_an_encoder_that_is_slow_to_stop_is_no_reason_to_end(tmp_path: Pat
         preview.supervisor.apply(ON)
         await preview.runs_with("va-h265")
         assert preview.marker.encoder == "va-h265"
+        assert preview.marker.proven == ["va-h265"], "the one that failed has to prove itself again"
         preview.supervisor.apply(OFF)
         await preview.reaches(State.DISABLED)
         assert now() == pytest.approx(2 + FIRST_FRAME_S, abs=0.1), (

@@ -20,9 +20,10 @@ from preview.encoders.crash_marker import CrashMarkerFile
 marker = CrashMarkerFile(Path(sys.argv[1]))
 class Selection:
     def pass_over(self, name, reason): print(reason, end="; ")
+    def trust(self, names): print(*sorted(names))
 if sys.argv[3:]:
     marker.blame_previous(Selection())
-    marker.set(sys.argv[3])
+    marker.set(sys.argv[3], proven=sys.argv[4:])
 else:
     print(marker.begin_report(), flush=True)
 sys.stdout.flush()
@@ -36,7 +37,7 @@ def life(directory: Path, *uses: str, ends_by: signal.Signals = signal.SIGTERM) 
 
     Args:
         directory: runtime directory.
-        uses: encoder that it uses; none: only the crash report is read.
+        uses: encoder that it uses, and the proven ones; none: only the crash report is read.
         ends_by: signal.
     """
     process = subprocess.run(
@@ -119,6 +120,16 @@ def test_an_encoder_in_use_is_blamed_for_a_crash_and_not_for_a_kill(tmp_path: Pa
         "encoder mpp-h265 is passed over: the process crashed while it was in use (Segmentation fault);"
     )
     assert life(tmp_path, "x264") == ""
+
+
+@pytest.mark.parametrize(
+    ("ends_by", "trusted"), [(signal.SIGSEGV, "x264"), (signal.SIGKILL, "mpp-h265 x264")]
+)
+def test_what_was_proven_is_trusted_except_what_is_blamed(
+    tmp_path: Path, ends_by: signal.Signals, trusted: str
+) -> None:
+    life(tmp_path, "mpp-h265", "mpp-h265", "x264", ends_by=ends_by)
+    assert life(tmp_path, "x264").rpartition("; ")[2] == trusted
 
 
 def test_an_encoder_that_hung_is_blamed_without_a_crash(tmp_path: Path) -> None:

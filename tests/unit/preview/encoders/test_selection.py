@@ -56,6 +56,33 @@ def test_one_that_failed_is_passed_over_until_it_is_forgiven() -> None:
     assert chosen(encoders) == ("mpp-h265", "")
 
 
+async def test_one_that_is_passed_over_is_tried_last() -> None:
+    """After a crash the stream waits for the trial of the encoder that takes over, for no other."""
+    clock, tried = Clock(), prober(ALL_GOOD)
+    encoders = Selection(ORDER, 600, tried, clock)
+    encoders.pass_over("mpp-h265", "it crashed")
+    assert await encoders.probe()
+    assert list(tried.verdicts) == ["va-h265"]
+    assert [encoder.name for encoder in encoders.order_of_trials] == ["va-h265", "x264", "mpp-h265"]
+    clock.now_s += 601
+    assert encoders.order_of_trials == ORDER
+
+
+async def test_what_the_previous_process_proved_needs_no_trial() -> None:
+    tried: list[str] = []
+
+    async def attempt(encoder: Encoder) -> Verdict:
+        tried.append(encoder.name)
+        return GOOD
+
+    encoders = Selection(ORDER, 600, TrialProber(attempt), Clock())
+    encoders.pass_over("mpp-h265", "it crashed")
+    encoders.trust({"x264", "unknown"})
+    assert encoders.proven == ["x264"]
+    assert await encoders.probe()
+    assert tried == []
+
+
 async def test_when_all_have_failed_all_are_forgiven() -> None:
     encoders = selection({"mpp-h265": GOOD, "va-h265": BAD, "x264": GOOD})
     encoders.pass_over("mpp-h265", "one")

@@ -48,10 +48,11 @@ def test_never_more_than_40_ms_and_never_ahead_of_the_next_frame(fps: float) -> 
 
 
 class Listener:
-    """Takes down what comes, and when."""
+    """Takes down the references that come, and counts the frames."""
 
     def __init__(self) -> None:
         self.packets: list[bytes] = []
+        self.frames = 0
 
     def __call__(self, packet: bytes) -> None:
         self.packets.append(packet)
@@ -69,17 +70,23 @@ def listener() -> Listener:
 @pytest.fixture
 def slow(listener: Listener) -> Iterator[ClockReferences]:
     """Between frames that come ten times a second."""
-    made = ClockReferences(listener, 10)
+    made = made_for(listener, 10)
     yield made
     made.stop()
 
 
-def nothing() -> None:
-    pass
+def made_for(listener: Listener, fps: float) -> ClockReferences:
+    return ClockReferences(listener, lambda: listener.frames, fps)
+
+
+def pass_on(references: ClockReferences, listener: Listener, ticks: int) -> None:
+    """Passes a frame on, as the streaming thread does."""
+    references.follow(frame(ticks))
+    listener.frames += 1
 
 
 def test_a_frame_is_followed_by_what_it_needs_and_no_more(slow: ClockReferences, listener: Listener) -> None:
-    slow.around(frame(27_000_000), nothing)
+    pass_on(slow, listener, 27_000_000)
     wait_until(lambda: len(listener.packets) == 3, "three references")
     # The next frame is late: the stream's clock does not run away from it.
     assert not threading.Event().wait(3 * rhythm(10)[1])
@@ -87,8 +94,8 @@ def test_a_frame_is_followed_by_what_it_needs_and_no_more(slow: ClockReferences,
 
 
 def test_they_follow_the_newest_frame_and_keep_its_count(slow: ClockReferences, listener: Listener) -> None:
-    slow.around(frame(0), nothing)
-    slow.around(frame(90 * 27_000), nothing)
+    pass_on(slow, listener, 0)
+    pass_on(slow, listener, 90 * 27_000)
     wait_until(lambda: len(listener.packets) == 3, "three references")
     assert listener.ticks == [27_000 * (90 + ms) for ms in (25, 50, 75)]
     # No payload, so the counter stands where the last packet of the frame left it.
@@ -96,27 +103,25 @@ def test_they_follow_the_newest_frame_and_keep_its_count(slow: ClockReferences, 
     assert {len(packet) for packet in listener.packets} == {188}
 
 
-def test_none_comes_between_the_packets_of_a_frame(slow: ClockReferences, listener: Listener) -> None:
-    slow.around(frame(0), nothing)
-    while_sending: list[int] = []
-
-    def send_slowly() -> None:
-        before = len(listener.packets)
-        assert not threading.Event().wait(2 * rhythm(10)[1])
-        while_sending.append(len(listener.packets) - before)
-
-    slow.around(frame(90 * 27_000), send_slowly)
-    assert while_sending == [0]
+def test_none_comes_before_its_frame(slow: ClockReferences, listener: Listener) -> None:
+    pass_on(slow, listener, 0)
+    slow.follow(frame(90 * 27_000))
+    before = len(listener.packets)
+    assert not threading.Event().wait(2 * rhythm(10)[1])
+    assert len(listener.packets) == before
+    listener.frames += 1
+    wait_until(lambda: len(listener.packets) == before + 3, "three references")
+    assert listener.ticks[before:] == [27_000 * (90 + ms) for ms in (25, 50, 75)]
 
 
 def test_where_frames_come_often_there_is_no_thread(listener: Listener) -> None:
     threads = threading.active_count()
-    fast = ClockReferences(listener, 30)
-    fast.around(frame(0), nothing)
+    fast = made_for(listener, 30)
+    pass_on(fast, listener, 0)
     assert threading.active_count() == threads
     fast.set_rate(15)
     for number in range(2):
-        fast.around(frame(number * 67 * 27_000), nothing)
+        pass_on(fast, listener, number * 67 * 27_000)
     wait_until(lambda: len(listener.packets) == 1, "a reference")
     fast.set_rate(60)
     wait_until(lambda: threading.active_count() == threads, "the thread has ended")
@@ -124,24 +129,24 @@ def test_where_frames_come_often_there_is_no_thread(listener: Listener) -> None:
 
 
 def test_a_new_rhythm_begins_with_the_first_two_frames_in_it(listener: Listener) -> None:
-    references = ClockReferences(listener, 30)
+    references = made_for(listener, 30)
     references.set_rate(10)
     period = 27_000 * 33
     for number in range(3):
         # What was on its way at the old rate: a reference 75 ms later would be ahead of the next one.
-        references.around(frame(number * period), nothing)
+        pass_on(references, listener, number * period)
     assert not threading.Event().wait(0.1)
     assert listener.packets == []
-    references.around(frame(2 * period + 2_700_000), nothing)
+    pass_on(references, listener, 2 * period + 2_700_000)
     wait_until(lambda: len(listener.packets) == 3, "three references")
     references.stop()
 
 
 def test_a_frame_from_before_a_detour_is_forgotten(listener: Listener) -> None:
-    references = ClockReferences(listener, 10)
-    references.around(frame(0), nothing)
+    references = made_for(listener, 10)
+    pass_on(references, listener, 0)
     references.set_rate(60)
-    references.around(frame(27_000 * 500), nothing)
+    pass_on(references, listener, 27_000 * 500)
     references.set_rate(10)
     assert not threading.Event().wait(0.1)
     assert len(listener.packets) <= 1
@@ -150,10 +155,10 @@ def test_a_frame_from_before_a_detour_is_forgotten(listener: Listener) -> None:
 
 def test_after_stop_nothing_comes_and_the_thread_ends(listener: Listener) -> None:
     threads = threading.active_count()
-    references = ClockReferences(listener, 10)
-    references.around(frame(0), nothing)
+    references = made_for(listener, 10)
+    pass_on(references, listener, 0)
     references.stop()
     wait_until(lambda: threading.active_count() == threads, "the thread has ended")
     came = len(listener.packets)
-    references.around(frame(0), nothing)
+    pass_on(references, listener, 0)
     assert len(listener.packets) == came
