@@ -17,7 +17,7 @@ FPS = 30
 SECONDS = 6
 DELAY_S = 0.015
 ROUND_TRIP_MS = 60
-LATENCY_MS = 250
+LATENCY_MS = 500
 """Of the service, for losses that a viewer with 20 ms of its own could not make up for on this link."""
 
 
