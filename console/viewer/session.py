@@ -48,9 +48,9 @@ def open_connection(address: StreamAddress, queue: FrameQueue, options: Receiver
         UserError: GStreamer or one of its elements is not installed.
     """
     # Imported here so that a program without GStreamer fails only when it receives video.
-    from console.receiver.connection import Connection  # noqa: PLC0415
+    from console.receiver.connection import connect  # noqa: PLC0415
 
-    return Connection(address, queue, options)
+    return connect(address, queue, options)
 
 
 class VideoSession:
