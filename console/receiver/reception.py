@@ -27,6 +27,9 @@ _FIRST_KEY_FRAME_S: Final = 2.5
 """The same before a connection's first key frame: a sender may not send one at once, but each 2 s."""
 _LEAST_WAIT_S: Final = 0.2
 _LONGEST_WAIT_S: Final = 0.6
+_FIRST_S: Final = 1.5
+"""How long a connection waits longest at its beginning: SRT assumes a round trip of 100 ms and a deviation of
+50 ms until it has measured (draft-sharabayko-srt-01 4.10), so it repeats a loss report only after 300 ms."""
 _NS_PER_S: Final = 1_000_000_000
 
 
@@ -100,6 +103,7 @@ class Reception:
         self._newest: AccessUnit | None = None
         self._statistics: LinkStatistics | None = None
         self._report_s = 0.0
+        self._settled_s = time.monotonic() + _FIRST_S
         self._torn_s: float | None = None
         """Since when no frame can be shown, or when a key frame was requested last."""
         self.had_data = False
@@ -183,7 +187,8 @@ class Reception:
 
     def _update(self) -> None:
         statistics = self._connection.statistics()
-        self._reorder.wait_s = wait_s(statistics.rtt_ms)
+        if time.monotonic() >= self._settled_s:
+            self._reorder.wait_s = wait_s(statistics.rtt_ms)
         self._statistics = statistics
         self._report(self._figures())
 
