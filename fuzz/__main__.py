@@ -35,6 +35,7 @@ NAMES: Final = (
     "terminal_text",
     "audit_line",
     "admission",
+    "video_stream",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

@@ -8,6 +8,7 @@ from fuzz.robot import SOURCES, type_of
 from gateway.access.ca import new_ca
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
+from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame
 
 _STATUS: Final = system_status_pb2.SystemStatus(
     gateway_name="lab",
@@ -37,6 +38,18 @@ _OVERLAY: Final = overlay_pb2.OverlaySnapshot(
         detections=[overlay_pb2.OverlayDetection(class_name="person", score=0.5)]
     ),
 )
+
+
+def _video(codec: str) -> bytes:
+    """Two frames, in the form of the target."""
+    writer = Writer(codec)
+    tables = writer.tables()
+    packets = [tables[:PACKET_BYTES], tables[PACKET_BYTES:]]
+    for number in range(2):
+        packets += writer.unit(coded_frame(codec, number, key=number == 0), number * 3000)
+    return b"".join(bytes([number]) + packet for number, packet in enumerate(packets))
+
+
 _SEEDS: Final = {
     "operators_request": [
         robot_gateway_pb2.SetPreviewModeRequest(
@@ -77,6 +90,7 @@ _SEEDS: Final = {
     "terminal_text": ["robot healthy\x1b]0;x\x07\u202e\u00fc".encode()],
     "audit_line": [b"enabled: true, profile: LOW_BW"],
     "admission": [bytes((0, 8, 1, 0, 4, 0, 2, 1, 8, 0, 7, 90, 8, 0, 3, 1, 5, 0, 6, 0))],
+    "video_stream": [_video("h264"), _video("h265")],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 

@@ -17,8 +17,11 @@ from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
+from console.capture_time import WRAP_TICKS
 from console.client.mapping.methods import METHODS
 from console.printable import escaped, printable, printable_lines
+from console.receiver.reorder import Reorder
+from console.receiver.transport_stream import PACKET_BYTES, TransportStream, UnknownVideoError
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
@@ -174,6 +177,27 @@ def audit_line(data: bytes) -> None:
     assert json.loads(line)["request"] == text
 
 
+def video_stream(data: bytes) -> None:
+    """Packets in any order and of any content: what is delivered is in order, and looks like access units.
+
+    Each packet is a byte of its number and up to 188 bytes of its content.
+    """
+    reorder, stream, delivered = Reorder(0, wait_s=0.25, capacity=64), TransportStream(), 0
+    with suppress(UnknownVideoError):
+        for index, start in enumerate(range(0, len(data), 1 + PACKET_BYTES)):
+            packet = data[start : start + 1 + PACKET_BYTES]
+            now_s = index * 0.05
+            for each in reorder.put(packet[0], packet[1:], now_s) + reorder.expire(now_s):
+                delivered += 1 + each.missing
+                if each.missing:
+                    stream.damage()
+                for unit in stream.feed(each.payload):
+                    assert unit.data
+                    assert unit.pts_ticks is None or 0 <= unit.pts_ticks < WRAP_TICKS
+    assert delivered <= 256
+    assert reorder.held <= 64
+
+
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
     {
         target.__name__: target
@@ -196,6 +220,7 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             terminal_text,
             audit_line,
             admission,
+            video_stream,
         )
     }
 )

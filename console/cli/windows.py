@@ -13,6 +13,7 @@ from console.cli.json_form import json_form
 from console.cli.options import RobotOption, TargetOption
 from console.cli.session import Session, print_json, session_of, with_session
 from console.cli.stopping import until_stopped
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
 from console.target import parse_target
 from console.viewer.headless import watch_headless
@@ -49,6 +50,13 @@ PatienceOption = Annotated[
         help="With --headless: give up after so long without a frame.",
     ),
 ]
+DeliveryOption = Annotated[
+    DeliveryChoice,
+    typer.Option(
+        "--delivery",
+        help="direct: as packets arrive; srt: after the SRT latency; auto: direct where possible.",
+    ),
+]
 
 
 @with_session
@@ -59,6 +67,7 @@ def view(
     headless: HeadlessOption = False,
     frames: FramesOption = None,
     patience_s: PatienceOption = 15.0,
+    delivery: DeliveryOption = DeliveryChoice.AUTO,
 ) -> None:
     """Show the live preview with detections overlaid. The robot provides all settings.
 
@@ -75,9 +84,11 @@ def view(
     session.credentials()
     if headless:
         recording = Recording(record) if record else None
-        summary = _view_headless(session, address, frames, patience_s, recording)
+        summary = _view_headless(
+            session, address, frames=frames, patience_s=patience_s, recording=recording, delivery=delivery
+        )
     else:
-        summary, recording = run_view(address, record, session.credentials)
+        summary, recording = run_view(address, record, session.credentials, delivery)
     if session.as_json:
         print_json(session.out, json_form(summary))
     elif headless or recording:
@@ -98,7 +109,13 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
 
 
 def _view_headless(
-    session: Session, address: str, frames: int | None, patience_s: float, recording: Recording | None
+    session: Session,
+    address: str,
+    *,
+    frames: int | None,
+    patience_s: float,
+    recording: Recording | None,
+    delivery: DeliveryChoice,
 ) -> ViewSummary:
     # The viewer looks at the event itself: nothing has to be cut off.
     with until_stopped(lambda: None) as stopped:
@@ -109,6 +126,7 @@ def _view_headless(
             recording=recording,
             stop=stopped.event,
             load=session.credentials,
+            delivery=delivery,
         )
 
 

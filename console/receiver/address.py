@@ -19,6 +19,7 @@ class StreamAddress:
         port: UDP port of its SRT listener.
         latency_ms: how long SRT waits for a lost packet; the larger value of both sides applies.
         passphrase: of this session; empty for an unencrypted stream. Left out of `repr`.
+        capture_offset_ns: capture time minus PTS, both in ns; None when the robot does not report it.
 
     Raises:
         UserError: a value that SRT can't use.
@@ -28,6 +29,7 @@ class StreamAddress:
     port: int = 7100
     latency_ms: int = 125
     passphrase: str = field(default="", repr=False)
+    capture_offset_ns: int | None = None
 
     def __post_init__(self) -> None:
         if not self.host or any(sign in self.host for sign in " /?#@"):

@@ -1,170 +1,47 @@
-"""One SRT connection with its decoder: the GStreamer pipeline of the receiver."""
+"""Connects to a stream by the delivery that is asked for, or possible."""
 
-import socket
-import threading
-from collections import deque
-from contextlib import ExitStack
-from dataclasses import replace
-from typing import Any
+from typing import Protocol
 
 from common.errors import UserError
-from common.gst import GLib, Gst, stop
 from console.receiver.address import StreamAddress
-from console.receiver.decoding import CODECS, DecodingBranch, element
-from console.receiver.errors import UndecodableError, ended, from_srt
-from console.receiver.file_branch import add_file_branch
+from console.receiver.delivery import Delivery, DeliveryChoice
+from console.receiver.direct import DirectConnection
 from console.receiver.frame_queue import FrameQueue
+from console.receiver.libsrt import LibsrtMissingError
 from console.receiver.options import ReceiverOptions
-
-_STOP = "stop"
-_BRANCH_GONE = "branch-gone"
+from console.receiver.srt import SrtConnection
 
 
-class Connection:
+class Connection(Protocol):
+    """A connection that is established or under way."""
+
+    @property
+    def delivery(self) -> Delivery:
+        """The delivery in use, with its figures."""
+
+    def close(self) -> None:
+        """Disconnects; afterwards nothing reaches the queue."""
+
+
+def connect(address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> Connection:
     """Connects to the robot, fills a frame queue, and ends the queue with the reason of a failure.
-
-    GStreamer runs everything up to the decoder on the source's one thread; a second thread, our own, reads
-    the bus. A change of codec makes the demultiplexer offer a new pad: it gets a decoder, and the old one is
-    removed.
 
     Args:
         address: SRT listener to connect to.
         queue: takes the frames and the end of the stream.
-        options: pixel format, decoders and recording.
+        options: of the receiver.
 
     Raises:
-        UserError: a GStreamer element is not installed.
+        UserError: a GStreamer element is not installed, or direct delivery is required and not possible.
     """
-
-    def __init__(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> None:
-        self._address = address
-        self._queue = queue
-        self._options = options
-        self._had_data = False
-        self._branches: dict[str, DecodingBranch] = {}
-        self._removed: deque[DecodingBranch] = deque()
-        self._handlers = ExitStack()
-        """Disconnects the handlers of GStreamer's signals."""
-        self._pipeline = Gst.Pipeline.new(None)
-        self._build()
-        self._bus_reader = threading.Thread(target=self._read_bus, name="receiver-bus", daemon=True)
-        self._bus_reader.start()
-        self._pipeline.set_state(Gst.State.PLAYING)
-
-    def close(self) -> None:
-        """Disconnects. Afterwards nothing reaches the queue."""
-        self._post(_STOP)
-        self._bus_reader.join()
-        stop(self._pipeline)
-        # GStreamer's objects hold our handlers and we hold them: without this no collector frees either, nor
-        # the sockets they keep.
-        for branch in (*self._branches.values(), *self._removed):
-            branch.detach(self._pipeline)
-        self._branches.clear()
-        if self._probe is not None:
-            self._source_pad.remove_probe(self._probe)
-        self._handlers.close()
-
-    def _build(self) -> None:
-        # The URI first: setting it resets the source's other properties.
-        source = element("srtsrc", uri=f"{_with_ipv4(self._address).uri}?mode=caller")
-        for name, value in {
-            "latency": self._address.latency_ms,
-            # Whether and when to connect again is the caller's decision.
-            "auto-reconnect": False,
-            # Bounds how long the source takes to notice that it is to stop.
-            "poll-timeout": 200,
-            "passphrase": self._address.passphrase or None,
-        }.items():
-            if value is not None and source.find_property(name):
-                source.set_property(name, value)
-        self._source_pad = source.get_static_pad("src")
-        self._probe: int | None = self._source_pad.add_probe(Gst.PadProbeType.BUFFER, self._on_first_data)
-        demuxer = element("tsdemux", latency=0)
-        for signal, handler in (("pad-added", self._on_pad_added), ("pad-removed", self._on_pad_removed)):
-            self._handlers.callback(demuxer.disconnect, demuxer.connect(signal, handler))
-        self._pipeline.add(source)
-        self._pipeline.add(demuxer)
-        if self._options.recording:
-            source, release = add_file_branch(self._pipeline, source, self._options.recording)
-            self._handlers.callback(release)
-        source.link(demuxer)
-
-    # On GStreamer's thread.
-
-    def _on_first_data(self, _pad: Any, _info: Any) -> Any:
-        self._had_data = True
-        self._probe = None
-        return Gst.PadProbeReturn.REMOVE
-
-    def _on_pad_added(self, _demuxer: Any, pad: Any) -> None:
-        media_type = pad.query_caps(None).get_structure(0).get_name()
-        if not media_type.startswith("video/"):
-            return
-        codec = CODECS.get(media_type)
-        if codec is None:
-            self._queue.end(_undecodable(self._address, media_type))
-            return
-        try:
-            branch = DecodingBranch(codec, self._queue, self._options)
-        except UserError as error:
-            self._queue.end(UndecodableError(error.what, error.remedy, final=True))
-            return
-        self._branches[pad.get_name()] = branch
-        branch.attach(self._pipeline, pad)
-
-    def _on_pad_removed(self, _demuxer: Any, pad: Any) -> None:
-        branch = self._branches.pop(pad.get_name(), None)
-        if branch:
-            self._removed.append(branch)
-            self._post(_BRANCH_GONE)
-
-    # On the bus reader's thread.
-
-    def _read_bus(self) -> None:
-        bus = self._pipeline.get_bus()
-        kinds = Gst.MessageType.ERROR | Gst.MessageType.EOS | Gst.MessageType.APPLICATION
-        while True:
-            message = bus.timed_pop_filtered(Gst.CLOCK_TIME_NONE, kinds)
-            if message is None:
-                continue
-            if message.type == Gst.MessageType.ERROR:
-                self._on_error(message)
-            elif message.type == Gst.MessageType.EOS:
-                self._queue.end(ended(self._address))
-            elif message.get_structure().get_name() == _STOP:
-                return
-            else:
-                self._removed.popleft().detach(self._pipeline)
-
-    def _on_error(self, message: Any) -> None:
-        error, detail = message.parse_error()
-        if any(branch.owns(message.src) for branch in self._branches.values()) or error.matches(
-            GLib.quark_from_string("gst-stream-error-quark"), Gst.StreamError.DECODE
-        ):
-            self._queue.end(_undecodable(self._address, error.message))
-        else:
-            self._queue.end(from_srt(self._address, detail or error.message, had_data=self._had_data))
-
-    def _post(self, name: str) -> None:
-        self._pipeline.post_message(
-            Gst.Message.new_application(self._pipeline, Gst.Structure.new_empty(name))
-        )
-
-
-def _with_ipv4(address: StreamAddress) -> StreamAddress:
-    """Returns the address with its host resolved to IPv4 where there is one: GLib would prefer IPv6."""
+    if options.delivery is DeliveryChoice.SRT:
+        return SrtConnection(address, queue, options)
     try:
-        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_DGRAM)
-    except OSError:
-        # The source resolves the name itself and reports the failure.
-        return address
-    return replace(address, host=str(found[0][4][0]))
-
-
-def _undecodable(address: StreamAddress, content: str) -> UndecodableError:
-    return UndecodableError(
-        f"{address.uri} sends {content}, which this receiver can't decode",
-        "Check that this is the robot's preview port: H.264 or H.265 in an MPEG transport stream is expected",
-        final=True,
-    )
+        return DirectConnection(address, queue, options)
+    except LibsrtMissingError as error:
+        if options.delivery is DeliveryChoice.DIRECT:
+            raise UserError(
+                f"direct delivery is not possible: {error}",
+                "Type: sudo apt-get install libsrt1.5-gnutls, or use --delivery auto",
+            ) from error
+        return SrtConnection(address, queue, options, reason=str(error))

@@ -1,9 +1,10 @@
 """Decodes one compressed stream into frames without waiting for the next one."""
 
 import time
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeAlias
 
 from common.errors import UserError
 from common.gst import Gst, GstVideo, stop_element
@@ -11,6 +12,7 @@ from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
+CaptureTimes: TypeAlias = Callable[[int], int | None]
 CODECS = {"video/x-h264": "h264", "video/x-h265": "h265"}
 """Codec by media type of its stream; GStreamer's parser, software decoder and caps are named after it."""
 _BAD = "gstreamer1.0-plugins-bad"
@@ -55,7 +57,7 @@ def element(factory: str, **properties: Any) -> Any:
 class DecodingBranch:
     """Parser, decoder and appsink for one elementary stream of the transport stream.
 
-    Two settings keep a frame from waiting for its successor. The sender writes one access unit per PES
+    Two things keep a frame from waiting for its successor. The sender writes one access unit per PES
     packet, so capssetter declares the parser's input as whole access units; and the decoder's threads share
     the slices of one frame instead of working at several frames.
 
@@ -63,37 +65,51 @@ class DecodingBranch:
         codec: of the stream, "h264" or "h265".
         queue: takes every frame, on a GStreamer thread.
         options: pixel format and decoders.
+        source: element that provides whole access units; None to take them from the pad of `attach`.
+        capture_ns: returns the capture time for a frame's presentation time.
 
     Raises:
         UserError: an element is not installed.
     """
 
-    def __init__(self, codec: str, queue: FrameQueue, options: ReceiverOptions) -> None:
+    def __init__(
+        self,
+        codec: str,
+        queue: FrameQueue,
+        options: ReceiverOptions,
+        source: Any = None,
+        capture_ns: CaptureTimes | None = None,
+    ) -> None:
         self._codec = codec
+        self._capture_ns = capture_ns or _unknown
         self._queue = queue
         self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
         self._layout: Any = None
         caps = f"video/x-raw,format={options.pixels.value}"
         self._sink = element("appsink", sync=False, emit_signals=True, max_buffers=1, drop=True, caps=caps)
+        # A branch is added while the pipeline plays: waiting for its first frame would pause a live source,
+        # and no frame would come. `async` is a keyword of Python's.
+        self._sink.set_property("async", False)
         self._handler = self._sink.connect("new-sample", self._on_sample)
         self._elements = [
-            element("capssetter", caps=f"video/x-{codec},alignment=au"),
+            source or element("capssetter", caps=f"video/x-{codec},alignment=au"),
             element(f"{codec}parse"),
             element(self._decoder, thread_type="slice"),
             element("videoconvert"),
             self._sink,
         ]
 
-    def attach(self, pipeline: Any, pad: Any) -> None:
-        """Adds the branch behind `pad` and starts it."""
+    def attach(self, pipeline: Any, pad: Any = None) -> None:
+        """Adds the branch, behind `pad` if there is one, and starts it."""
         for one in self._elements:
             pipeline.add(one)
         for upstream, downstream in pairwise(self._elements):
             upstream.link(downstream)
         for one in reversed(self._elements):
             one.sync_state_with_parent()
-        pad.link(self._elements[0].get_static_pad("sink"))
+        if pad:
+            pad.link(self._elements[0].get_static_pad("sink"))
 
     def detach(self, pipeline: Any) -> None:
         """Stops and removes the branch. Not on a GStreamer thread."""
@@ -120,17 +136,23 @@ class DecodingBranch:
             self._caps, self._layout = caps, GstVideo.VideoInfo.new_from_caps(caps)
         info = self._layout
         buffer = sample.get_buffer()
+        pts_ns = None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts
         return Frame(
             width=info.width,
             height=info.height,
             codec=self._codec,
-            pts_ns=None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts,
+            pts_ns=pts_ns,
             arrival_s=arrival_s,
             corrupt=buffer.has_flags(Gst.BufferFlags.CORRUPTED),
             stride=info.stride[0],
             read=partial(_pixels, buffer),
             decoder=self._decoder,
+            capture_ns=None if pts_ns is None else self._capture_ns(pts_ns),
         )
+
+
+def _unknown(_pts_ns: int) -> None:
+    """Returns no capture time."""
 
 
 def _pixels(buffer: Any) -> bytes:

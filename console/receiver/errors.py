@@ -65,6 +65,20 @@ def ended(address: StreamAddress, reason: str = "") -> StreamEndedError:
     )
 
 
+def undecodable(address: StreamAddress, content: str) -> UndecodableError:
+    """Returns the error of a stream that arrives but can't be decoded.
+
+    Args:
+        address: listener of the connection.
+        content: what it sends, or the decoder's own text.
+    """
+    return UndecodableError(
+        f"{address.uri} sends {content}, which this receiver can't decode",
+        "Check that this is the robot's preview port: H.264 or H.265 in an MPEG transport stream is expected",
+        final=True,
+    )
+
+
 def no_frame_within(address: StreamAddress, timeout_s: float) -> StreamError:
     """Returns the error of a timeout."""
     return StreamError(

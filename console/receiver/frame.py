@@ -30,6 +30,7 @@ class Frame:
         stride: from one row of the first plane (I420: luma) to the next, in bytes.
         read: copies all its pixels, the first plane first.
         decoder: GStreamer's element that decoded it.
+        capture_ns: when the camera took it, on the robot's monotonic clock; None while that is unknown.
     """
 
     width: int
@@ -41,3 +42,4 @@ class Frame:
     stride: int
     read: Callable[[], bytes] = field(repr=False)
     decoder: str = ""
+    capture_ns: int | None = None

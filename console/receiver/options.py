@@ -1,10 +1,15 @@
 """Options of a receiver: everything but the address."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
+from console.capture_time import CaptureClock
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
+
+MAX_AGE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,8 +20,18 @@ class ReceiverOptions:
         pixels: pixel format of the frames.
         decoders: GStreamer's element by codec ("h264", "h265"); a codec without one is decoded in software.
         recording: keeps the encoded stream, too; None records nothing.
+        delivery: how packets are delivered. What follows applies to direct delivery.
+        capture: capture times of the stream's frames; None when they are not known.
+        max_age_s: age of the frames beyond which the connection is made anew.
+        on_picture_lost: requests a key frame, without which no further frame can be shown; called again while
+            none comes. On the receiver's thread, so it must only hand over. Without it the connection is made
+            anew.
     """
 
     pixels: PixelFormat = PixelFormat.I420
     decoders: Mapping[str, str] = field(default_factory=dict)
     recording: Recording | None = None
+    delivery: DeliveryChoice = DeliveryChoice.AUTO
+    capture: CaptureClock | None = None
+    max_age_s: float = MAX_AGE_S
+    on_picture_lost: Callable[[], None] | None = None

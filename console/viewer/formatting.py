@@ -5,6 +5,7 @@ from typing import Final
 
 from console.presentation.formatting import joined, plural
 from console.presentation.severity_style import SeverityStyle
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.playback import Playback, PlaybackState
@@ -59,6 +60,20 @@ def figures_line(latest: Frame | None, fps: float, redials: int) -> str:
         return reconnected
     stream = f"{latest.width}x{latest.height} {latest.codec} by {latest.decoder}"
     return joined(stream, f"{fps:.0f} fps", reconnected)
+
+
+def delivery_text(delivery: Delivery | None) -> str:
+    """Returns the delivery with its figures: direct, round trip 20 ms, 3 packets given up."""
+    if delivery is None:
+        return ""
+    if delivery.kind is DeliveryChoice.SRT:
+        return "SRT latency" + (f" ({delivery.reason})" if delivery.reason else "")
+    return joined(
+        "direct",
+        f"round trip {delivery.rtt_ms:.0f} ms" if delivery.rtt_ms is not None else "",
+        f"{plural(delivery.given_up, 'packet')} given up" if delivery.given_up else "",
+        f"rejoined {delivery.rejoins}x" if delivery.rejoins else "",
+    )
 
 
 def live_note(playback: Playback) -> str:

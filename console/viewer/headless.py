@@ -9,6 +9,7 @@ from console.client import PreviewState
 from console.monitor.credential_refresh import LoadCredentials
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
 from console.viewer.playback import Playback, PlaybackState
@@ -27,6 +28,7 @@ def watch_headless(
     recording: Recording | None,
     stop: threading.Event,
     load: LoadCredentials | None = None,
+    delivery: DeliveryChoice = DeliveryChoice.AUTO,
 ) -> ViewSummary:
     """Receives frames until there are enough.
 
@@ -37,6 +39,7 @@ def watch_headless(
         recording: keeps the encoded stream, too; closed at the end.
         stop: ends it early.
         load: reads the stored credentials.
+        delivery: how packets are delivered.
 
     Raises:
         GatewayError: the gateway was never reached.
@@ -44,7 +47,7 @@ def watch_headless(
             failed.
     """
     counter = FrameCounter()
-    robot = RobotVideo(target, load, pixels=PixelFormat.I420, recording=recording)
+    robot = RobotVideo(target, load, pixels=PixelFormat.I420, recording=recording, delivery=delivery)
     robot.session.add_frame_listener(counter.count)
 
     def done() -> bool:
@@ -60,7 +63,7 @@ def watch_headless(
                 counter.changed.wait_for(done, _POLL_S)
     finally:
         robot.close(_CLOSE_TIMEOUT_S)
-    summary = counter.summary(robot.session.redials, recording)
+    summary = counter.summary(robot.session.redials, recording, robot.session.delivery())
     if frames and summary.pictures < frames:
         raise UserError(f"ended after {summary.pictures} of {frames} frames")
     return summary

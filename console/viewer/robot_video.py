@@ -8,6 +8,7 @@ from console.client.results import Detections
 from console.monitor.credential_refresh import LoadCredentials
 from console.monitor.link import LinkState
 from console.monitor.worker import Worker, connecting
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
 from console.viewer.session import VideoSession
@@ -24,6 +25,7 @@ class RobotVideo:
         load: reads the stored credentials; by default there are none.
         pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; closed together with the session.
+        delivery: how packets are delivered.
         on_change: called after each change of the status, in the worker's thread; must only hand over.
 
     Raises:
@@ -37,11 +39,12 @@ class RobotVideo:
         *,
         pixels: PixelFormat = PixelFormat.BGRX,
         recording: Recording | None = None,
+        delivery: DeliveryChoice = DeliveryChoice.AUTO,
         on_change: Callable[[], None] | None = None,
     ) -> None:
         self._on_change = on_change
         self.recording = recording
-        self.session = VideoSession(pixels=pixels, recording=recording)
+        self.session = VideoSession(pixels=pixels, recording=recording, delivery=delivery)
         self.worker = Worker(target, self._update_session, connecting(load))
 
     def start(self) -> None:

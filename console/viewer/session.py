@@ -8,8 +8,10 @@ from dataclasses import replace
 from typing import Final, Protocol, TypeAlias
 
 from common.errors import UserError
+from console.capture_time import CaptureClock
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import StreamError, UndecodableError, no_frame_within
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.frame_queue import FrameQueue
@@ -28,11 +30,16 @@ from console.viewer.redial import (
 _POLL_S: Final = 0.1
 """Period, while no frame comes, of checking whether the connection is still needed."""
 
+RobotTime: TypeAlias = Callable[[], int | None]
 FrameListener: TypeAlias = Callable[[Frame], None]
 
 
 class OpenConnection(Protocol):
     """A connection that is established or under way."""
+
+    @property
+    def delivery(self) -> Delivery:
+        """The delivery in use, with its figures."""
 
     def close(self) -> None:
         """Disconnects; afterwards nothing reaches the queue."""
@@ -48,9 +55,9 @@ def open_connection(address: StreamAddress, queue: FrameQueue, options: Receiver
         UserError: GStreamer or one of its elements is not installed.
     """
     # Imported here so that a program without GStreamer fails only when it receives video.
-    from console.receiver.connection import Connection  # noqa: PLC0415
+    from console.receiver.connection import connect  # noqa: PLC0415
 
-    return Connection(address, queue, options)
+    return connect(address, queue, options)
 
 
 class VideoSession:
@@ -67,6 +74,11 @@ class VideoSession:
         pixels: pixel format of the frames.
         recording: keeps the encoded stream, too; the caller closes it.
         decoders: choice of the decoders; by default hardware that has passed its trial, else software.
+        delivery: how packets are delivered.
+        robot_now_ns: reads the estimate of the robot's monotonic clock, in ns; None while there is none.
+            Without it frames have no capture time.
+        on_picture_lost: requests a key frame, in the receiver's thread; must only hand over. Without it the
+            receiver connects anew.
         connect: opens connections; tests pass a double.
     """
 
@@ -76,12 +88,19 @@ class VideoSession:
         pixels: PixelFormat = PixelFormat.BGRX,
         recording: Recording | None = None,
         decoders: Decoders | None = None,
+        delivery: DeliveryChoice = DeliveryChoice.AUTO,
+        robot_now_ns: RobotTime | None = None,
+        on_picture_lost: Callable[[], None] | None = None,
         connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
         self._recording = recording
         self._decoders = decoders or Decoders()
+        self._delivery = delivery
+        self._robot_now_ns = robot_now_ns
+        self._on_picture_lost = on_picture_lost
         self._connect = connect
+        self._connection: OpenConnection | None = None
         self._backoff = redial_backoff()
         self._changed = threading.Condition()
         self._inputs = PlaybackInputs()
@@ -143,6 +162,11 @@ class VideoSession:
         """How often the stream was connected to again after it was lost or fell silent."""
         return self._inputs.redials
 
+    def delivery(self) -> Delivery | None:
+        """Returns how packets are delivered, with the figures of the latest connection; None before one."""
+        connection = self._connection
+        return connection.delivery if connection else None
+
     def close(self, timeout_s: float = 2.0) -> bool:
         """Disconnects. Returns whether the thread ended in time. Closing again does nothing."""
         with self._changed:
@@ -172,14 +196,27 @@ class VideoSession:
     def _receive(self, address: StreamAddress) -> UserError:
         """Takes the frames of one connection, and returns why it ended."""
         queue = FrameQueue(1)
-        options = ReceiverOptions(self._pixels, self._decoders.chosen(), self._recording)
         try:
-            connection = self._connect(address, queue, options)
+            connection = self._connect(address, queue, self._options(address))
         except UserError as error:
             return error
+        self._connection = connection
         with closing(connection):
             end = self._take_frames(queue, address)
         return self._decoders.after_undecodable(end) if isinstance(end, UndecodableError) else end
+
+    def _options(self, address: StreamAddress) -> ReceiverOptions:
+        capture = None
+        if address.capture_offset_ns is not None and self._robot_now_ns:
+            capture = CaptureClock(address.capture_offset_ns, self._robot_now_ns)
+        return ReceiverOptions(
+            self._pixels,
+            self._decoders.chosen(),
+            self._recording,
+            self._delivery,
+            capture,
+            on_picture_lost=self._on_picture_lost,
+        )
 
     def _take_frames(self, queue: FrameQueue, address: StreamAddress) -> StreamError:
         connected_s, frame_s = time.monotonic(), None

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from console.presentation.formatting import joined, plural
+from console.receiver.delivery import Delivery
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
-from console.viewer.formatting import mebibytes
+from console.viewer.formatting import delivery_text, mebibytes
 
 _MS_PER_S = 1000
 
@@ -28,6 +29,7 @@ class ViewSummary:
         fps: frames per second from the first to the last.
         redials: how often the stream was connected to again after it was lost or fell silent.
         recording: file, bytes and gaps of the recording; None without one.
+        delivery: how packets were delivered, with the figures of the latest connection; None without one.
     """
 
     pictures: int
@@ -40,6 +42,7 @@ class ViewSummary:
     fps: float | None = None
     redials: int
     recording: dict[str, Any] | None
+    delivery: Delivery | None = None
 
     def line(self) -> str:
         """Returns the summary for people."""
@@ -51,6 +54,7 @@ class ViewSummary:
             f"first after {self.first_picture_ms} ms",
             f"{self.fps:.1f} fps" if self.fps else "",
             f"{self.corrupt_pictures} corrupt" if self.corrupt_pictures else "",
+            delivery_text(self.delivery),
             f"reconnected {self.redials}x" if self.redials else "",
             _recording_text(self.recording),
         )
@@ -83,7 +87,9 @@ class FrameCounter:
         """When the latest frame came, or counting began, on `time.monotonic()`."""
         return self._last_s or self._started_s
 
-    def summary(self, redials: int, recording: Recording | None) -> ViewSummary:
+    def summary(
+        self, redials: int, recording: Recording | None, delivery: Delivery | None = None
+    ) -> ViewSummary:
         """Returns the summary of all frames so far."""
         kept: dict[str, Any] | None = None
         if recording:
@@ -91,7 +97,9 @@ class FrameCounter:
         with self.changed:
             frame, duration_s = self._latest, self._last_s - self._first_s
             if frame is None:
-                return ViewSummary(pictures=0, corrupt_pictures=0, redials=redials, recording=kept)
+                return ViewSummary(
+                    pictures=0, corrupt_pictures=0, redials=redials, recording=kept, delivery=delivery
+                )
             return ViewSummary(
                 pictures=self.frames,
                 corrupt_pictures=self._corrupt,
@@ -103,6 +111,7 @@ class FrameCounter:
                 fps=round((self.frames - 1) / duration_s, 1) if duration_s > 0 else None,
                 redials=redials,
                 recording=kept,
+                delivery=delivery,
             )
 
 

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from console.monitor.credential_refresh import LoadCredentials
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
 from console.viewer.robot_video import RobotVideo
 from console.viewer.summary import FrameCounter, ViewSummary
@@ -33,7 +34,10 @@ def run_monitor(target: str, load: LoadCredentials | None = None) -> None:
 
 
 def run_view(
-    target: str, record: Path | None, load: LoadCredentials | None = None
+    target: str,
+    record: Path | None,
+    load: LoadCredentials | None = None,
+    delivery: DeliveryChoice = DeliveryChoice.AUTO,
 ) -> tuple[ViewSummary, Recording | None]:
     """Shows the video until its window is closed; returns the summary of the run, and the closed recording.
 
@@ -41,6 +45,7 @@ def run_view(
         target: the robot's gateway.
         record: a new file for the encoded stream. It is not made where there is no display.
         load: reads the stored credentials.
+        delivery: how packets are delivered.
 
     Raises:
         UserError: as `run_monitor`, or the file can't be written.
@@ -48,9 +53,10 @@ def run_view(
     counter = FrameCounter()
     with application("Robot view") as app:
         recording = Recording(record) if record else None
-        with viewing(target, recording, counter, load) as window:
+        with viewing(target, recording, counter, load, delivery) as window:
             app.exec()
-    return counter.summary(window.robot.session.redials, recording), recording
+    session = window.robot.session
+    return counter.summary(session.redials, recording, session.delivery()), recording
 
 
 @contextmanager
@@ -65,10 +71,14 @@ def monitor(target: str, load: LoadCredentials | None = None) -> Iterator[Monito
 
 @contextmanager
 def viewing(
-    target: str, recording: Recording | None, counter: FrameCounter, load: LoadCredentials | None = None
+    target: str,
+    recording: Recording | None,
+    counter: FrameCounter,
+    load: LoadCredentials | None = None,
+    delivery: DeliveryChoice = DeliveryChoice.AUTO,
 ) -> Iterator[ViewWindow]:
     """Opens the window of the video with its background threads; closes them at the end of the block."""
-    robot = RobotVideo(target, load, recording=recording)
+    robot = RobotVideo(target, load, recording=recording, delivery=delivery)
     robot.session.add_frame_listener(counter.count)
     window = ViewWindow(robot, VideoView(robot.session, robot.detections))
     with _open(window, robot):

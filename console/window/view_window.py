@@ -7,7 +7,7 @@ from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from console.monitor.preview_controls import controls
-from console.viewer.formatting import figures_line, live_note, recording_line
+from console.viewer.formatting import delivery_text, figures_line, live_note, recording_line
 from console.viewer.robot_video import RobotVideo
 from console.window.keys import bind_keys
 from console.window.labels import ElidedLabel, PlainLabel, set_text
@@ -69,6 +69,8 @@ class ViewWindow(QWidget):
         set_text(self.figures, figures_line(session.latest_frame(), fps, session.redials))
         notes = [note.text for note in controls(state, None, now_s).notes]
         texts = (recording_line(self.robot.recording), *notes, live_note(session.playback()))
+        # Last: it is what may be elided in a small window.
+        texts += (delivery_text(session.delivery()),)
         set_text(self.notes, "   ".join(filter(None, texts)))
         name = state.snapshot.status.gateway_name if state.snapshot else ""
         self.setWindowTitle(f"{name} {self.robot.worker.target}".strip())

@@ -4,7 +4,8 @@ import time
 from typing import Self
 
 from console.receiver.address import StreamAddress
-from console.receiver.connection import Connection
+from console.receiver.connection import connect
+from console.receiver.delivery import Delivery
 from console.receiver.errors import StreamError, no_frame_within
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
@@ -23,18 +24,26 @@ class Receiver:
     Args:
         address: SRT listener to connect to.
         queue_size: how many decoded frames may wait for the caller.
+        options: of the receiver.
     """
 
-    def __init__(self, address: StreamAddress, *, queue_size: int = 2) -> None:
+    def __init__(
+        self, address: StreamAddress, *, queue_size: int = 2, options: ReceiverOptions | None = None
+    ) -> None:
         self._address = address
         self._queue = FrameQueue(queue_size)
-        self._connection = Connection(address, self._queue, ReceiverOptions())
+        self._connection = connect(address, self._queue, options or ReceiverOptions())
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_error: object) -> None:
         self._connection.close()
+
+    @property
+    def delivery(self) -> Delivery:
+        """The delivery in use, with its figures."""
+        return self._connection.delivery
 
     def next_frame(self, timeout_s: float) -> Frame:
         """Returns the oldest frame that waits, or the next one to come.

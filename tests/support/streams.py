@@ -19,7 +19,14 @@ _ENCODERS = {
 
 
 def encode(
-    codec: str, frames: int, *, gop: int = 30, size: str = "320x240", fps: int = 30, kbps: int = 1000
+    codec: str,
+    frames: int,
+    *,
+    gop: int = 30,
+    size: str = "320x240",
+    fps: int = 30,
+    kbps: int = 1000,
+    pattern: str = "ball",
 ) -> list[bytes]:
     """A moving test pattern in an MPEG transport stream, cut into one piece per frame.
 
@@ -28,7 +35,7 @@ def encode(
     width, height = size.split("x")
     encoder = _ENCODERS[codec].format(gop=gop, kbps=kbps)
     pipeline = Gst.parse_launch(
-        f"videotestsrc num-buffers={frames} pattern=ball"
+        f"videotestsrc num-buffers={frames} pattern={pattern}"
         f" ! video/x-raw,format=I420,width={width},height={height},framerate={fps}/1"
         f" ! {encoder} ! mpegtsmux alignment=0"
         f" ! appsink name=out sync=false buffer-list=true max-buffers=0"

@@ -110,6 +110,11 @@ class UdpLink:
         for each in (self._front, self._stop_here, self._stop_there, *self._backs.values()):
             each.close()
 
+    def inject(self, packet: bytes) -> None:
+        """Sends a datagram of its own to every caller, from the listener's address."""
+        for caller in list(self._backs):
+            self._front.sendto(packet, caller)
+
     def _run(self) -> None:
         while True:
             for key, _ in self._selector.select(self._next_arrival_in_s()):

@@ -2,14 +2,9 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Final
 
+from console.capture_time import capture_ns
 from console.client.results.sample import Sample
-
-_NS_NUMERATOR: Final = 100_000
-_NS_DENOMINATOR: Final = 9
-"""Nanoseconds in a tick of 90 kHz, as a fraction."""
-_WRAP_NS: Final = (1 << 33) * _NS_NUMERATOR // _NS_DENOMINATOR
 
 
 class PreviewState(Enum):
@@ -104,8 +99,7 @@ class StreamEndpoint:
         """
         if self.capture_offset_ns is None:
             return None
-        ahead = (pts * _NS_NUMERATOR // _NS_DENOMINATOR + self.capture_offset_ns - robot_now_ns) % _WRAP_NS
-        return robot_now_ns + ahead - (_WRAP_NS if ahead > _WRAP_NS // 2 else 0)
+        return capture_ns(pts, self.capture_offset_ns, robot_now_ns)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

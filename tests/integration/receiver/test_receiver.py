@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 
 from console.receiver.address import StreamAddress
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.errors import (
     StreamEndedError,
     StreamRefusedError,
     UndecodableError,
 )
+from console.receiver.options import ReceiverOptions
 from tests.support.free import free_udp_port
 from tests.support.receiver import NoFrameError, Receiver
 from tests.support.streams import SrtSender, encode
@@ -35,8 +37,10 @@ def sender(port: int) -> Iterator[SrtSender]:
         yield sender
 
 
-def viewer(port: int, **options: object) -> Receiver:
-    return Receiver(StreamAddress("127.0.0.1", port, latency_ms=20), **options)  # type: ignore[arg-type]
+def viewer(port: int, queue_size: int = 2, delivery: DeliveryChoice = DeliveryChoice.AUTO) -> Receiver:
+    """A test that sends by hand sends slowly, which looks like age."""
+    options = ReceiverOptions(delivery=delivery, max_age_s=1000)
+    return Receiver(StreamAddress("127.0.0.1", port, latency_ms=20), queue_size=queue_size, options=options)
 
 
 def joined(sender: SrtSender) -> None:

@@ -9,6 +9,7 @@ import pytest
 from console.client import Unreachable
 from console.client.results import PreviewState
 from console.receiver.address import StreamAddress
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import UndecodableError, ended, from_srt
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
@@ -27,8 +28,11 @@ class Exchange:
     refuse: bool = False
     calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
+    delivery: Delivery = field(default_factory=lambda: Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=7.0))
+    options: list[ReceiverOptions] = field(default_factory=list)
 
-    def connect(self, address: StreamAddress, queue: FrameQueue, _options: ReceiverOptions) -> "Exchange":
+    def connect(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> "Exchange":
+        self.options.append(options)
         self.calls.append((address, queue))
         self.open += 1
         if self.refuse:
@@ -177,3 +181,25 @@ def test_what_cannot_be_decoded_blocks(session: VideoSession, exchange: Exchange
 
 def test_a_session_that_never_began_can_be_closed() -> None:
     assert VideoSession().close()
+
+
+def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> None:
+    requests: list[str] = []
+    session = VideoSession(
+        connect=exchange.connect,
+        delivery=DeliveryChoice.SRT,
+        robot_now_ns=lambda: 5_000_000_000,
+        on_picture_lost=lambda: requests.append("key frame"),
+    )
+    assert session.delivery() is None
+    session.start()
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    wait_until(lambda: session.delivery() is exchange.delivery, "the connection's figures")
+    assert session.close()
+    (options,) = exchange.options
+    assert options.delivery is DeliveryChoice.SRT
+    assert options.capture is None, "the endpoint names no offset"
+    assert options.on_picture_lost
+    options.on_picture_lost()
+    assert requests == ["key frame"]

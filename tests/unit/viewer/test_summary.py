@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
-from console.viewer.formatting import figures_line, recording_line
+from console.viewer.formatting import delivery_text, figures_line, recording_line
 from console.viewer.summary import FrameCounter
 from tests.unit.receiver.frames import frame
 
@@ -70,6 +71,14 @@ def test_the_line_below_the_video() -> None:
     assert figures_line(None, 0, 3) == "reconnected 3x"
     newest = replace(frame(), decoder="vah264dec")
     assert figures_line(newest, 29.7, 1) == "6x4 h264 by vah264dec, 30 fps, reconnected 1x"
+
+
+def test_the_text_of_the_delivery() -> None:
+    assert delivery_text(None) == ""
+    direct = Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.3, given_up=2, rejoins=1)
+    assert delivery_text(direct) == "direct, round trip 20 ms, 2 packets given up, rejoined 1x"
+    fallback = Delivery(kind=DeliveryChoice.SRT, reason="libsrt is not installed")
+    assert delivery_text(fallback) == "SRT latency (libsrt is not installed)"
 
 
 def test_the_line_of_the_recording(tmp_path: Path) -> None:

@@ -1,0 +1,109 @@
+"""Direct delivery: packets are decoded as they arrive, in the order of their numbers, without SRT latency."""
+
+import socket
+import threading
+from contextlib import closing
+from typing import Final
+
+from console.receiver.address import StreamAddress
+from console.receiver.delivery import Delivery, DeliveryChoice
+from console.receiver.errors import StreamError, from_srt, undecodable
+from console.receiver.frame_queue import FrameQueue
+from console.receiver.libsrt import SrtError, SrtSocket, load
+from console.receiver.options import ReceiverOptions
+from console.receiver.reception import Reception
+from console.receiver.transport_stream import UnknownVideoError
+from console.receiver.unit_decoder import UnitDecoder
+
+_HANDSHAKE_POLL_S: Final = 0.002
+"""Period of looking whether the handshake, which takes two round trips, is done."""
+
+
+class DirectConnection:
+    """Connects to the robot, fills a frame queue, and ends the queue with the reason of a failure.
+
+    A thread of its own receives; GStreamer decodes on another one. The connection is made anew, without an
+    end, when that is the quickest way to a frame of now: see `Reception`.
+
+    Args:
+        address: SRT listener to connect to.
+        queue: takes the frames and the end of the stream.
+        options: of the receiver.
+
+    Raises:
+        LibsrtMissingError: there is no usable libsrt.
+        UserError: a GStreamer element is not installed.
+    """
+
+    def __init__(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> None:
+        load()
+        self._address = address
+        self._queue = queue
+        self._options = options
+        self._decoder = UnitDecoder(address, queue, options)
+        self._had_data = False
+        self.delivery = Delivery(kind=DeliveryChoice.DIRECT)
+        """Figures of the delivery; replaced a few times per second."""
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Disconnects. Afterwards nothing reaches the queue."""
+        self._stopping.set()
+        self._thread.join()
+
+    # On the receiver's thread.
+
+    def _run(self) -> None:
+        with closing(self._decoder):
+            try:
+                while not self._stopping.is_set():
+                    self._receive()
+            except StreamError as error:
+                self._queue.end(error)
+            except UnknownVideoError as error:
+                self._queue.end(undecodable(self._address, str(error)))
+
+    def _receive(self) -> None:
+        """Receives over one connection until it is to be made anew, or closed."""
+        address = self._address
+        try:
+            host = _resolved(address)
+            connection = SrtSocket(host, address.port, address.latency_ms, address.passphrase)
+            with closing(connection):
+                if self._is_established(connection):
+                    self._take_packets(connection)
+        except (SrtError, OSError) as error:
+            reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+            raise from_srt(address, reason, had_data=self._had_data) from error
+
+    def _is_established(self, connection: SrtSocket) -> bool:
+        """Waits for the end of the handshake; returns whether there is one, or raises why it failed."""
+        while connection.connecting:
+            if self._stopping.wait(_HANDSHAKE_POLL_S):
+                return False
+        if not connection.connected:
+            raise SrtError(connection.reject_reason())
+        return True
+
+    def _take_packets(self, connection: SrtSocket) -> None:
+        reception = Reception(connection, self._decoder, self._options, self.delivery, self._report)
+        try:
+            reception.run(self._stopping)
+        finally:
+            self._had_data = self._had_data or reception.had_data
+
+    def _report(self, delivery: Delivery) -> None:
+        self.delivery = delivery
+
+
+def _resolved(address: StreamAddress) -> str:
+    """Returns the numeric address of the host, IPv4 where there is one.
+
+    Raises:
+        OSError: the name is unknown.
+    """
+    found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
+    ipv4 = [each for each in found if each[0] == socket.AF_INET]
+    return str((ipv4 or found)[0][4][0])

@@ -1,0 +1,205 @@
+"""What one connection of direct delivery does with its packets, from the socket to the decoder."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final, Protocol
+
+from console.capture_time import WRAP_TICKS, nearest, ticks_to_ns
+from console.receiver.age import AgeBound
+from console.receiver.delivery import Delivery, LinkStatistics
+from console.receiver.options import ReceiverOptions
+from console.receiver.reorder import Delivered, Reorder
+from console.receiver.transport_stream import AccessUnit, TransportStream
+
+_WAIT_S: Final = 0.01
+"""Longest wait for a datagram; also how late `stopping` and a lost connection may be noticed."""
+_SETTLE_S: Final = 0.0003
+"""What libsrt's thread takes from a datagram to a readable packet, with room for the rest of the burst."""
+_REPORT_S: Final = 0.25
+"""Period of the statistics, and of the wait that follows the round trip."""
+_REPEAT_S: Final = 0.5
+"""Without a key frame for that time, one is requested again."""
+_REJOIN_AFTER_S: Final = 0.2
+"""The same where none can be requested: a new connection begins with one."""
+_FIRST_KEY_FRAME_S: Final = 2.5
+"""The same before a connection's first key frame: a sender may not send one at once, but each 2 s."""
+_LEAST_WAIT_S: Final = 0.2
+_LONGEST_WAIT_S: Final = 0.6
+_FIRST_S: Final = 1.5
+"""How long a connection waits longest at its beginning: SRT assumes a round trip of 100 ms and a deviation of
+50 ms until it has measured (draft-sharabayko-srt-01 4.10), so it repeats a loss report only after 300 ms."""
+_NS_PER_S: Final = 1_000_000_000
+
+
+def wait_s(rtt_ms: float) -> float:
+    """Returns how long a missing packet is waited for, in seconds.
+
+    A retransmission comes one round trip after its loss was reported. Should it be lost, too, the report is
+    repeated about a round trip and four deviations later (draft-sharabayko-srt-01 4.8.2): five round trips
+    and a constant leave room for several attempts.
+    """
+    return min(max(_LEAST_WAIT_S, 0.15 + 5 * rtt_ms / 1000), _LONGEST_WAIT_S)
+
+
+class PacketSocket(Protocol):
+    """An established connection."""
+
+    def first_number(self) -> int:
+        """Returns the number of the connection's first packet."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Waits for a datagram; returns whether one has come."""
+
+    def receive(self) -> tuple[int, bytes] | None:
+        """Returns number and payload of a packet; None when none is there."""
+
+    def statistics(self) -> LinkStatistics:
+        """Returns the statistics so far."""
+
+
+class UnitSink(Protocol):
+    """What decodes."""
+
+    def record(self, payload: bytes) -> None:
+        """Takes a payload of the stream, in order."""
+
+    def push(self, unit: AccessUnit) -> bool:
+        """Decodes an access unit; returns whether it was taken."""
+
+    def check(self) -> None:
+        """Raises the decoder's error, if there is one."""
+
+
+class Reception:
+    """Orders the packets of one connection, cuts them into access units and has those decoded.
+
+    Args:
+        connection: established.
+        sink: decodes.
+        options: of the receiver.
+        totals: figures of the connections before this one, to which its own are added.
+        report: takes the figures, a few times per second.
+    """
+
+    def __init__(
+        self,
+        connection: PacketSocket,
+        sink: UnitSink,
+        options: ReceiverOptions,
+        totals: Delivery,
+        report: Callable[[Delivery], None],
+    ) -> None:
+        self._connection = connection
+        self._sink = sink
+        self._options = options
+        self._totals = totals
+        self._report = report
+        self._reorder = Reorder(connection.first_number(), _LONGEST_WAIT_S)
+        self._stream = TransportStream()
+        self._age = AgeBound(options.max_age_s)
+        self._ticks: int | None = None
+        self._newest: AccessUnit | None = None
+        self._statistics: LinkStatistics | None = None
+        self._report_s = 0.0
+        self._settled_s = time.monotonic() + _FIRST_S
+        self._torn_s: float | None = None
+        """Since when no frame can be shown, or when a key frame was requested last."""
+        self.had_data = False
+        """Whether anything has arrived."""
+
+    def run(self, stopping: threading.Event) -> None:
+        """Receives until `stopping` is set, or the connection is to be made anew.
+
+        Raises:
+            SrtError: the connection is lost.
+            UnknownVideoError: the stream carries video of another codec.
+            StreamError: it can't be decoded.
+        """
+        try:
+            while not stopping.is_set():
+                if self._connection.wait(self._timeout_s()):
+                    stopping.wait(_SETTLE_S)
+                self._drain()
+                now_s = time.monotonic()
+                if self._is_too_old(now_s) or self._needs_rejoin(now_s):
+                    self._totals = replace(self._totals, rejoins=self._totals.rejoins + 1)
+                    return
+                if now_s >= self._report_s:
+                    self._report_s = now_s + _REPORT_S
+                    self._update()
+                    self._sink.check()
+        finally:
+            self._report(self._figures())
+
+    def _timeout_s(self) -> float:
+        deadline_s = self._reorder.deadline_s
+        return _WAIT_S if deadline_s is None else min(_WAIT_S, max(0.0, deadline_s - time.monotonic()))
+
+    def _drain(self) -> None:
+        while packet := self._connection.receive():
+            self.had_data = True
+            self._decode(self._reorder.put(*packet, time.monotonic()))
+        self._decode(self._reorder.expire(time.monotonic()))
+
+    def _decode(self, delivered: Sequence[Delivered]) -> None:
+        for each in delivered:
+            if each.missing:
+                self._stream.damage()
+            self._sink.record(each.payload)
+            for unit in self._stream.feed(each.payload):
+                self._newest = unit
+                if not self._sink.push(unit):
+                    self._stream.damage()
+                    self._stream.dropped_units += 1
+
+    def _is_too_old(self, now_s: float) -> bool:
+        """Whether the newest access unit of those that have just come is too old."""
+        unit, self._newest = self._newest, None
+        if unit is None or unit.pts_ticks is None:
+            return False
+        self._ticks = nearest(
+            unit.pts_ticks, unit.pts_ticks + WRAP_TICKS if self._ticks is None else self._ticks
+        )
+        age_s = self._options.capture.age_s(unit.pts_ticks) if self._options.capture else None
+        return self._age.exceeded(now_s, ticks_to_ns(self._ticks) / _NS_PER_S, age_s)
+
+    def _needs_rejoin(self, now_s: float) -> bool:
+        """Requests a key frame while no frame can be shown; returns whether only a new connection helps."""
+        stream, request = self._stream, self._options.on_picture_lost
+        if not stream.torn:
+            self._torn_s = None
+            return False
+        shown = stream.breaks > 0
+        if not shown and stream.dropped_units == 0:
+            return False
+        if self._torn_s is None:
+            # Before the first frame, the key frame that a new connection gets may be under way.
+            self._torn_s = now_s - _REPEAT_S if shown and request else now_s
+        torn_s = now_s - self._torn_s
+        if request is None:
+            return torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)
+        if torn_s >= _REPEAT_S:
+            self._torn_s = now_s
+            request()
+        return False
+
+    def _update(self) -> None:
+        statistics = self._connection.statistics()
+        if time.monotonic() >= self._settled_s:
+            self._reorder.wait_s = wait_s(statistics.rtt_ms)
+        self._statistics = statistics
+        self._report(self._figures())
+
+    def _figures(self) -> Delivery:
+        totals, found = self._totals, self._statistics
+        return replace(
+            totals,
+            rtt_ms=found.rtt_ms if found else None,
+            lost=totals.lost + (found.lost if found else 0),
+            held=self._reorder.held,
+            given_up=totals.given_up + self._reorder.given_up,
+            wait_ms=round(self._reorder.wait_s * 1000),
+            dropped_frames=totals.dropped_frames + self._stream.dropped_units,
+        )

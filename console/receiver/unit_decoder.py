@@ -1,0 +1,119 @@
+"""Decodes access units that are pushed into it: the GStreamer pipeline of direct delivery."""
+
+from contextlib import ExitStack
+from typing import Any, Final
+
+from common.errors import UserError
+from common.gst import GLib, Gst, stop
+from console.capture_time import WRAP_TICKS, nearest, ns_to_ticks, ticks_to_ns
+from console.receiver.address import StreamAddress
+from console.receiver.decoding import DecodingBranch, element
+from console.receiver.errors import UndecodableError, undecodable
+from console.receiver.file_branch import add_file_branch
+from console.receiver.frame_queue import FrameQueue
+from console.receiver.options import ReceiverOptions
+from console.receiver.transport_stream import AccessUnit
+
+_MOST_WAITING: Final = 90
+"""Access units that may wait for the decoder: 1.5 s at 60 frames/s. What was held for a lost packet comes at
+once, so it must be more than that; a decoder that is too slow for the stream exceeds any bound."""
+
+
+class UnitDecoder:
+    """Decoder and recording behind an appsrc each. Used by one thread, not one of GStreamer's.
+
+    Args:
+        address: of the stream, for errors.
+        queue: takes the frames.
+        options: pixel format, decoders, recording and capture times.
+
+    Raises:
+        UserError: a GStreamer element is not installed.
+    """
+
+    def __init__(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> None:
+        self._address = address
+        self._queue = queue
+        self._options = options
+        self._codec = ""
+        self._source: Any = None
+        self._branch: DecodingBranch | None = None
+        self._latest_ticks: int | None = None
+        self._pipeline = Gst.Pipeline.new(None)
+        self._recorder: Any = None
+        self._release = ExitStack()
+        if options.recording:
+            self._recorder = element("appsrc", caps="video/mpegts,packetsize=188", is_live=True)
+            self._pipeline.add(self._recorder)
+            _, release = add_file_branch(self._pipeline, self._recorder, options.recording)
+            self._release.callback(release)
+        self._pipeline.set_state(Gst.State.PLAYING)
+
+    def record(self, payload: bytes) -> None:
+        """Hands packets of the transport stream to the recording, if there is one."""
+        if self._recorder:
+            self._recorder.emit("push-buffer", Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(payload)))
+
+    def push(self, unit: AccessUnit) -> bool:
+        """Decodes an access unit, unless too many wait already.
+
+        Returns:
+            Whether it was taken; the following ones depend on it.
+
+        Raises:
+            UndecodableError: an element for its codec is not installed.
+        """
+        if unit.codec != self._codec:
+            self._change_codec(unit.codec)
+        if self._source.get_property("current-level-buffers") >= _MOST_WAITING:
+            return False
+        buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
+        if unit.pts_ticks is not None:
+            buffer.pts = ticks_to_ns(self._unwrapped(unit.pts_ticks))
+        if unit.first:
+            buffer.set_flags(Gst.BufferFlags.DISCONT)
+        self._source.emit("push-buffer", buffer)
+        return True
+
+    def check(self) -> None:
+        """Raises the decoder's error.
+
+        Raises:
+            UndecodableError: there is one.
+        """
+        message = self._pipeline.get_bus().pop_filtered(Gst.MessageType.ERROR)
+        if message:
+            raise undecodable(self._address, message.parse_error()[0].message)
+
+    def close(self) -> None:
+        """Stops; afterwards nothing reaches the queue."""
+        stop(self._pipeline)
+        self._remove_branch()
+        self._release.close()
+
+    def _change_codec(self, codec: str) -> None:
+        self._remove_branch()
+        caps = f"video/x-{codec},stream-format=byte-stream,alignment=au"
+        try:
+            source = element("appsrc", caps=caps, is_live=True, format="time", max_bytes=0)
+            self._branch = DecodingBranch(codec, self._queue, self._options, source, self._capture_ns)
+        except UserError as error:
+            raise UndecodableError(error.what, error.remedy, final=True) from error
+        self._codec, self._source = codec, source
+        self._branch.attach(self._pipeline)
+
+    def _remove_branch(self) -> None:
+        if self._branch:
+            self._branch.detach(self._pipeline)
+            # It holds a method of ours: without this only a collector frees both, and GStreamer's sockets.
+            self._branch = None
+
+    def _unwrapped(self, pts_ticks: int) -> int:
+        """Returns a PTS without the wrap, above 0: the decoder's time must not go back."""
+        reference = pts_ticks + WRAP_TICKS if self._latest_ticks is None else self._latest_ticks
+        self._latest_ticks = nearest(pts_ticks, reference)
+        return self._latest_ticks
+
+    def _capture_ns(self, pts_ns: int) -> int | None:
+        """Returns the capture time for the decoder's time. On GStreamer's thread."""
+        return self._options.capture.capture_ns(ns_to_ticks(pts_ns)) if self._options.capture else None

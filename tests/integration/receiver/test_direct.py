@@ -1,0 +1,291 @@
+"""Direct delivery with the real libsrt: GStreamer's srtsink sends, a relay delays and loses."""
+
+import random
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from common.errors import UserError
+from common.gst import Gst, stop
+from console.capture_time import CaptureClock
+from console.receiver import reception
+from console.receiver.address import StreamAddress
+from console.receiver.delivery import DeliveryChoice
+from console.receiver.errors import StreamEndedError, StreamRefusedError
+from console.receiver.frame import Frame
+from console.receiver.libsrt import LibsrtMissingError
+from console.receiver.options import ReceiverOptions
+from console.receiver.reorder import Delivered, Reorder
+from tests.support.free import free_udp_port
+from tests.support.receiver import NoFrameError, Receiver
+from tests.support.streams import SrtSender, encode
+from tests.support.udp_link import Impairment, UdpLink
+
+pytestmark = pytest.mark.gst
+
+PATIENCE_S = 20
+FRAMES = 90
+FRAME_S = 1 / 30
+CLOSED_WITHIN_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def pieces() -> list[bytes]:
+    """Frames of several packets each, none so large that its PES packet does not say how long it is."""
+    made = encode("h264", FRAMES, kbps=2000, pattern="snow")
+    assert max(map(len, made)) < 1 << 16
+    return made
+
+
+@pytest.fixture
+def port() -> int:
+    return free_udp_port()
+
+
+def receiver(port: int, **options: Any) -> Receiver:
+    address = StreamAddress("127.0.0.1", port, latency_ms=125)
+    return Receiver(address, queue_size=2 * FRAMES, options=ReceiverOptions(**options))
+
+
+def play(sender: SrtSender, pieces: list[bytes]) -> None:
+    """Sends in real time."""
+    begun_s = time.monotonic()
+    for number, piece in enumerate(pieces):
+        time.sleep(max(0.0, begun_s + number * FRAME_S - time.monotonic()))
+        sender.send(piece)
+
+
+def everything(viewer: Receiver, silence_s: float = 1.0) -> list[Frame]:
+    """Returns the frames that have come, and those that come until none does."""
+    frames = []
+    while True:
+        try:
+            frames.append(viewer.next_frame(silence_s))
+        except NoFrameError:
+            return frames
+
+
+def watched(
+    port: int, pieces: list[bytes], impairment: Impairment, **options: Any
+) -> tuple[Any, list[Frame]]:
+    """Plays a stream over a link; returns the final figures and all frames."""
+    with (
+        SrtSender(port, latency_ms=125) as sender,
+        UdpLink(port, impairment) as link,
+        receiver(link.port, **options) as viewer,
+    ):
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        play(sender, pieces)
+        frames = everything(viewer)
+        return viewer.delivery, frames
+
+
+def assert_every_frame(frames: list[Frame]) -> None:
+    """Each frame came once, in order and whole."""
+    times_ns = [frame.pts_ns or 0 for frame in frames]
+    assert len(times_ns) == FRAMES
+    steps = [later - earlier for earlier, later in pairwise(times_ns)]
+    assert all(abs(step / 1e9 - FRAME_S) < 0.001 for step in steps)
+    assert not any(frame.corrupt for frame in frames)
+
+
+@pytest.mark.parametrize(
+    "impairment",
+    [
+        Impairment(),
+        Impairment(delay_s=0.01, loss=0.03, control_loss=0.03),
+        Impairment(delay_s=0.01, loss=0.1, control_loss=0.1),
+    ],
+    ids=["loopback", "20 ms, 3 %", "20 ms, 10 %"],
+)
+def test_every_frame_is_delivered(
+    port: int, pieces: list[bytes], impairment: Impairment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # This machine may be busy for longer than a packet is waited for; the waiting itself has unit tests.
+    monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 3.0)
+    delivery, frames = watched(port, pieces, impairment, max_age_s=10)
+    assert_every_frame(frames)
+    assert delivery.kind is DeliveryChoice.DIRECT
+    assert (delivery.given_up, delivery.dropped_frames, delivery.rejoins) == (0, 0, 0)
+    assert (delivery.lost > 0) == (impairment.loss > 0)
+
+
+def test_it_is_the_order_that_delivers_them(
+    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same without the ordering: packets do come out of their order."""
+    monkeypatch.setattr(Reorder, "put", lambda _self, _number, payload, _now_s: [Delivered(0, payload)])
+    loss = Impairment(delay_s=0.01, loss=0.05, control_loss=0.05)
+    delivery, frames = watched(port, pieces, loss, on_picture_lost=lambda: None)
+    assert len(frames) < FRAMES
+    assert delivery.dropped_frames > 0
+    assert not any(frame.corrupt for frame in frames), "even so, none that is torn"
+
+
+def test_no_torn_frame_is_shown_where_packets_are_given_up(
+    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reception, "wait_s", lambda _rtt_ms: 0.005)
+    lost = threading.Event()
+    loss = Impairment(delay_s=0.02, loss=0.02)
+    delivery, frames = watched(port, pieces, loss, on_picture_lost=lost.set)
+    assert delivery.given_up > 0
+    assert lost.is_set()
+    assert 0 < len(frames) < FRAMES
+    assert not any(frame.corrupt for frame in frames)
+
+
+def test_ten_viewers(port: int, pieces: list[bytes]) -> None:
+    with SrtSender(port) as sender, ExitStack() as stack:
+        viewers = []
+        for _ in range(10):
+            sender.viewer_joined.clear()
+            viewers.append(stack.enter_context(receiver(port, max_age_s=1000)))
+            assert sender.viewer_joined.wait(PATIENCE_S)
+        play(sender, pieces[:20])
+        for viewer in viewers:
+            assert len([viewer.next_frame(PATIENCE_S) for _ in range(20)]) == 20
+
+
+def test_a_sender_that_restarts_is_an_end_and_can_be_connected_to_again(
+    port: int, pieces: list[bytes]
+) -> None:
+    for _ in range(2):
+        with SrtSender(port) as sender, receiver(port, max_age_s=1000) as viewer:
+            assert sender.viewer_joined.wait(PATIENCE_S)
+            sender.send(pieces[0])
+            viewer.next_frame(PATIENCE_S)
+            sender.close()
+            with pytest.raises(StreamEndedError):
+                viewer.next_frame(PATIENCE_S)
+
+
+@contextmanager
+def closed_in_time(viewer: Receiver) -> Iterator[Receiver]:
+    """Measures how long leaving takes."""
+    with viewer:
+        yield viewer
+        begun_s = time.monotonic()
+    assert time.monotonic() - begun_s < CLOSED_WITHIN_S
+
+
+def test_it_stops_while_a_listener_does_not_answer() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        with closed_in_time(receiver(silent.getsockname()[1])) as viewer, pytest.raises(NoFrameError):
+            viewer.next_frame(0.3)
+
+
+def test_a_listener_that_does_not_answer_is_reported() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        refused = pytest.raises(StreamRefusedError, match="no SRT listener answers")
+        with receiver(silent.getsockname()[1]) as viewer, refused:
+            viewer.next_frame(PATIENCE_S)
+
+
+def test_it_stops_while_nothing_comes(port: int, pieces: list[bytes]) -> None:
+    with SrtSender(port) as sender, closed_in_time(receiver(port)) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        sender.send(pieces[0])
+        viewer.next_frame(PATIENCE_S)
+        with pytest.raises(NoFrameError):
+            viewer.next_frame(0.5)
+
+
+def test_hostile_datagrams_do_no_harm(port: int, pieces: list[bytes]) -> None:
+    noise = random.Random(1)
+    with SrtSender(port) as sender, UdpLink(port) as link, receiver(link.port, max_age_s=1000) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        for piece in pieces[:20]:
+            for _ in range(20):
+                link.inject(noise.randbytes(noise.choice([0, 1, 15, 16, 17, 60, 1316, 1472])))
+            sender.send(piece)
+            assert not viewer.next_frame(PATIENCE_S).corrupt
+
+
+def _missing() -> None:
+    raise LibsrtMissingError("libsrt is not installed")
+
+
+def test_without_libsrt_the_srt_latency_applies_and_the_reason_is_given(
+    port: int, pieces: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("console.receiver.direct.load", _missing)
+    with SrtSender(port) as sender, receiver(port) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        for piece in pieces[:5]:
+            sender.send(piece)
+        assert viewer.next_frame(PATIENCE_S).width == 320
+        assert (viewer.delivery.kind, viewer.delivery.reason) == (
+            DeliveryChoice.SRT,
+            "libsrt is not installed",
+        )
+
+
+def test_direct_alone_is_an_error_without_libsrt(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("console.receiver.direct.load", _missing)
+    with pytest.raises(UserError, match="direct delivery is not possible: libsrt is not installed"):
+        receiver(port, delivery=DeliveryChoice.DIRECT)
+
+
+def test_srt_delivery_on_request(port: int, pieces: list[bytes]) -> None:
+    with SrtSender(port) as sender, receiver(port, delivery=DeliveryChoice.SRT) as viewer:
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        for piece in pieces[:5]:
+            sender.send(piece)
+        assert viewer.next_frame(PATIENCE_S).width == 320
+        assert viewer.delivery.kind is DeliveryChoice.SRT
+
+
+def test_every_frame_carries_its_capture_time(port: int) -> None:
+    """The sender runs on the monotonic clock, so PTS is capture time and an hour."""
+    captured_ns: set[int] = set()
+    pipeline = Gst.parse_launch(
+        "videotestsrc is-live=true ! video/x-raw,width=320,height=240,framerate=30/1 ! identity name=camera"
+        " ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 ! h264parse config-interval=-1"
+        f" ! mpegtsmux alignment=7 ! srtsink uri=srt://127.0.0.1:{port}?mode=listener"
+        " wait-for-connection=false sync=false async=false"
+    )
+    pipeline.use_clock(Gst.SystemClock.obtain())
+    pipeline.set_start_time(Gst.CLOCK_TIME_NONE)
+    pipeline.set_base_time(0)
+
+    def note(_pad: Any, info: Any) -> Any:
+        captured_ns.add(info.get_buffer().pts)
+        return Gst.PadProbeReturn.OK
+
+    pad = pipeline.get_by_name("camera").get_static_pad("src")
+    probe = pad.add_probe(Gst.PadProbeType.BUFFER, note)
+    capture = CaptureClock(-3600 * 10**9, time.monotonic_ns)
+    try:
+        pipeline.set_state(Gst.State.PLAYING)
+        with receiver(port, capture=capture) as viewer:
+            frames = [viewer.next_frame(PATIENCE_S) for _ in range(20)]
+    finally:
+        stop(pipeline)
+        pad.remove_probe(probe)
+    now_ns = time.monotonic_ns()
+    for frame in frames:
+        assert frame.capture_ns is not None
+        assert min(abs(frame.capture_ns - each) for each in captured_ns) < 1_000_000
+        assert 0 < now_ns - frame.capture_ns < PATIENCE_S * 10**9
+    assert len({frame.capture_ns for frame in frames}) == len(frames)
+
+
+def test_a_narrow_link_does_not_make_frames_old(port: int) -> None:
+    """2500 kbit/s over 1500 kbit/s: past the bound the connection is made anew."""
+    pieces = encode("h264", 150, gop=10, kbps=2500, pattern="snow")
+    begun_s = time.monotonic()
+    delivery, frames = watched(port, pieces, Impairment(rate_kbps=1500, queue_s=5), max_age_s=0.6)
+    assert delivery.rejoins > 0
+    first_ns = frames[0].pts_ns or 0
+    ages_s = [frame.arrival_s - begun_s - ((frame.pts_ns or 0) - first_ns) / 1e9 for frame in frames]
+    assert max(ages_s) < 2.0
+    assert not any(frame.corrupt for frame in frames)

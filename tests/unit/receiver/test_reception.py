@@ -1,0 +1,217 @@
+"""One connection's loop with a socket and a decoder that the test plays."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import pytest
+
+from console.capture_time import CaptureClock
+from console.receiver.delivery import Delivery, DeliveryChoice, LinkStatistics
+from console.receiver.options import ReceiverOptions
+from console.receiver.reception import Reception, wait_s
+from console.receiver.transport_stream import AccessUnit
+from tests.support.mpegts_writer import Writer, coded_frame
+
+TICKS = 3000
+GOP = 5
+FIRST_WAIT_S = 0.6
+"""While SRT has not measured the round trip yet."""
+TICK_S = 0.01
+"""How much the clock advances each time that the socket is waited on."""
+
+
+@dataclass
+class Played:
+    """Socket, decoder and clock of one connection, all in the test's hand."""
+
+    packets: deque[tuple[float, int, bytes]] = field(default_factory=deque)
+    """When each arrives, its number and payload."""
+    now_s: float = 100.0
+    rtt_ms: float = 20.0
+    units: list[AccessUnit] = field(default_factory=list)
+    payloads: list[bytes] = field(default_factory=list)
+    reports: list[Delivery] = field(default_factory=list)
+    requests_s: list[float] = field(default_factory=list)
+    full_until_s: float = 0.0
+    stopping: threading.Event = field(default_factory=threading.Event)
+    until_s: float = 110.0
+
+    def first_number(self) -> int:
+        return 0
+
+    def wait(self, _timeout_s: float) -> bool:
+        self.now_s += TICK_S
+        if self.now_s > self.until_s:
+            self.stopping.set()
+        return False
+
+    def receive(self) -> tuple[int, bytes] | None:
+        if self.packets and self.packets[0][0] <= self.now_s:
+            return self.packets.popleft()[1:]
+        return None
+
+    def statistics(self) -> LinkStatistics:
+        return LinkStatistics(self.rtt_ms, lost=3)
+
+    def record(self, payload: bytes) -> None:
+        self.payloads.append(payload)
+
+    def push(self, unit: AccessUnit) -> bool:
+        taken = self.now_s > self.full_until_s
+        if taken:
+            self.units.append(unit)
+        return taken
+
+    def check(self) -> None:
+        pass
+
+    def request(self) -> None:
+        self.requests_s.append(self.now_s)
+
+    @property
+    def shown(self) -> list[int]:
+        return [(unit.pts_ticks or 0) // TICKS for unit in self.units]
+
+    def run(self, **options: object) -> Delivery:
+        """Receives until the end, or until the connection is to be made anew."""
+        totals = Delivery(kind=DeliveryChoice.DIRECT)
+        given = ReceiverOptions(**options)  # type: ignore[arg-type]
+        Reception(self, self, given, totals, self.reports.append).run(self.stopping)
+        return self.reports[-1]
+
+
+@pytest.fixture
+def played(monkeypatch: pytest.MonkeyPatch) -> Played:
+    made = Played()
+    monkeypatch.setattr("console.receiver.reception.time.monotonic", lambda: made.now_s)
+    return made
+
+
+def send(
+    played: Played,
+    frames: int,
+    *,
+    lose: Callable[[int, int], bool] = lambda _frame, _packet: False,
+    delay_s: Callable[[int], float] = lambda _frame: 0.0,
+) -> None:
+    """Sends frames at 30 per second, each in payloads of two packets; `lose` by frame and payload."""
+    writer, number = Writer(), 0
+    for frame in range(frames):
+        key = frame % GOP == 0
+        packets = [writer.tables()] if key else []
+        packets += writer.unit(coded_frame("h264", frame, key=key, size=1000), frame * TICKS)
+        content = b"".join(packets)
+        for index, at in enumerate(range(0, len(content), 376)):
+            if not lose(frame, index):
+                arrival_s = 100.0 + frame / 30 + delay_s(frame)
+                played.packets.append((arrival_s, number, content[at : at + 376]))
+            number += 1
+
+
+def test_every_frame_of_a_clean_link_is_decoded(played: Played) -> None:
+    send(played, 60)
+    found = played.run()
+    assert played.shown == list(range(60))
+    assert found == Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.0, lost=3, wait_ms=250)
+
+
+def test_a_late_packet_is_waited_for(played: Played) -> None:
+    send(played, 30)
+    late = next(each for each in played.packets if each[1] == 20)
+    played.packets.remove(late)
+    arrival_s = late[0] + 0.1
+    before = sum(each[0] <= arrival_s for each in played.packets)
+    played.packets.insert(before, (arrival_s, *late[1:]))
+    found = played.run()
+    assert played.shown == list(range(30))
+    assert (found.given_up, found.dropped_frames) == (0, 0)
+
+
+def test_after_a_packet_is_given_up_no_torn_frame_is_decoded(played: Played) -> None:
+    send(played, 30, lose=lambda frame, packet: (frame, packet) == (7, 1))
+    found = played.run(on_picture_lost=played.request)
+    assert played.shown == [*range(7), *range(10, 30)]
+    assert played.units[7].first
+    assert (found.given_up, found.dropped_frames, found.rejoins) == (1, 3, 0)
+    # Once: frame 7 was given up 250 ms after what follows it, and by then its key frame was there.
+    assert len(played.requests_s) <= 1
+
+
+def test_a_key_frame_is_requested_at_once_and_again_while_none_comes(played: Played) -> None:
+    send(played, 60, lose=lambda frame, packet: frame >= 7 and packet == 1)
+    played.until_s = 102.0
+    played.run(on_picture_lost=played.request)
+    given_up_s = 100 + 7 / 30 + FIRST_WAIT_S
+    assert played.requests_s[0] == pytest.approx(given_up_s, abs=0.03)
+    steps = [b - a for a, b in pairwise(played.requests_s)]
+    assert len(steps) >= 2
+    assert all(step == pytest.approx(0.5, abs=0.02) for step in steps)
+
+
+def test_without_a_request_the_connection_is_made_anew(played: Played) -> None:
+    send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
+    found = played.run()
+    assert played.now_s == pytest.approx(100 + 7 / 30 + FIRST_WAIT_S + 0.2, abs=0.03)
+    assert found.rejoins == 1
+
+
+def test_joining_between_key_frames_requests_none_at_once(played: Played) -> None:
+    send(played, 60, lose=lambda frame, _packet: frame == 0)
+    played.run(on_picture_lost=played.request)
+    assert played.shown[0] == 5
+    assert played.requests_s == []
+
+
+def test_a_decoder_that_is_too_slow_skips_to_a_key_frame(played: Played) -> None:
+    send(played, 30)
+    played.full_until_s = 100.45
+    found = played.run(on_picture_lost=played.request)
+    assert played.shown == list(range(15, 30))
+    assert played.units[0].first
+    assert found.dropped_frames == 15
+
+
+@pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
+def test_the_age_of_the_frames_is_bounded(played: Played, clock: bool) -> None:
+    """A link that is narrower than the stream: each frame comes 20 ms later than it should."""
+    send(played, 120, delay_s=lambda frame: 0.02 * frame)
+    capture = CaptureClock(0, lambda: int((played.now_s - 100.0) * 1e9)) if clock else None
+    found = played.run(capture=capture, max_age_s=1.0)
+    assert found.rejoins == 1
+    newest_s = played.shown[-1] / 30
+    assert played.now_s - 100.0 - newest_s == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_burst_after_an_outage_is_no_age(played: Played) -> None:
+    """What has waited for two seconds comes at once, up to a frame of now."""
+    send(played, 90, delay_s=lambda frame: max(0.0, 2.0 - frame / 30) if frame < 60 else 0.0)
+    played.packets = deque(sorted(played.packets))
+    assert played.run().rejoins == 0
+    assert played.shown == list(range(90))
+
+
+def test_the_recording_gets_the_packets_in_order(played: Played) -> None:
+    send(played, 10)
+    sent = [payload for _, _, payload in played.packets]
+    played.packets[3], played.packets[4] = (
+        (played.packets[3][0], *played.packets[4][1:]),
+        (played.packets[4][0], *played.packets[3][1:]),
+    )
+    played.run()
+    assert played.payloads == sent
+
+
+def test_figures_of_earlier_connections_are_kept(played: Played) -> None:
+    totals = Delivery(kind=DeliveryChoice.DIRECT, lost=10, given_up=2, dropped_frames=5, rejoins=1)
+    send(played, 3)
+    Reception(played, played, ReceiverOptions(), totals, played.reports.append).run(played.stopping)
+    found = played.reports[-1]
+    assert (found.lost, found.given_up, found.dropped_frames, found.rejoins) == (13, 2, 5, 1)
+
+
+@pytest.mark.parametrize(("rtt_ms", "expected_s"), [(0, 0.2), (20, 0.25), (80, 0.55), (1000, 0.6)])
+def test_the_wait_follows_the_round_trip_within_bounds(rtt_ms: float, expected_s: float) -> None:
+    assert wait_s(rtt_ms) == pytest.approx(expected_s)
