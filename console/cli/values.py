@@ -4,7 +4,9 @@ Typer checks each value by pydantic, whose import takes as long as a whole statu
 for programmers. The few types that robotctl has are read here instead.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any, get_args
 
@@ -45,7 +47,13 @@ class PlainValue:
             return Path(value)
         if kind in (int, float):
             return self._number(kind, value, param, ctx)
-        if value in (words := get_args(kind)):
+        if isinstance(kind, type) and issubclass(kind, Enum):
+            words = [str(member.value) for member in kind]
+            return value if isinstance(value, kind) else kind(self._word(value, words, param, ctx))
+        return self._word(value, get_args(kind), param, ctx)
+
+    def _word(self, value: Any, words: Sequence[str], param: Any, ctx: Any) -> Any:
+        if value in words:
             return value
         raise typer.BadParameter(f"'{value}' is not one of {', '.join(words)}", ctx=ctx, param=param)
 
