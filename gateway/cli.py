@@ -16,7 +16,6 @@ from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
 from gateway.credentials_cli import app as credentials_app
 from gateway.doctor.examination import examine
-from gateway.ros.readers import reader_for
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 app.add_typer(credentials_app, name="credentials")
@@ -57,6 +56,9 @@ def check(
         typer.echo(json.dumps(json_schema(GatewaySettings), indent=2))
         return
     settings = load_settings(config)
+    # Late: importing it checks the middleware, which an error at the import could not report in one line.
+    from gateway.ros.readers import reader_for  # noqa: PLC0415
+
     for source in settings.sources:
         reader_for(source)
     if access_files := settings.security.access_files():

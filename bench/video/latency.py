@@ -54,7 +54,8 @@ class Cell:
     def receiver(self, port: int) -> AbstractContextManager[Viewer]:
         """Connects a receiver until the block ends."""
         if self.our_receiver:
-            return Receiver(StreamAddress(product.HOST, port, LATENCY_MS), queue_size=4)
+            address = StreamAddress(product.HOST, port, LATENCY_MS)
+            return Receiver(address, queue_size=4, options=product.SRT_DELIVERY)
         return reference.viewer(port, LATENCY_MS)
 
 

@@ -2,6 +2,7 @@
 
 import socket
 import threading
+import time
 from contextlib import closing
 from typing import Final
 
@@ -17,6 +18,9 @@ from console.receiver.unit_decoder import UnitDecoder
 
 _HANDSHAKE_POLL_S: Final = 0.002
 """Period of looking whether the handshake, which takes two round trips, is done."""
+_UNEXPLAINED_S: Final = 3.0
+"""As long as SRT tries one handshake (SRTO_CONNTIMEO)."""
+_UNEXPLAINED_PAUSE_S: Final = 0.1
 
 
 class DirectConnection:
@@ -42,6 +46,7 @@ class DirectConnection:
         self._options = options
         self._decoder = UnitDecoder(address, queue, options)
         self._had_data = False
+        self._give_up_s: float | None = None
         self.delivery = Delivery(kind=DeliveryChoice.DIRECT)
         """Figures of the delivery; replaced a few times per second."""
         self._stopping = threading.Event()
@@ -79,13 +84,23 @@ class DirectConnection:
             raise from_srt(address, reason, had_data=self._had_data) from error
 
     def _is_established(self, connection: SrtSocket) -> bool:
-        """Waits for the end of the handshake; returns whether there is one, or raises why it failed."""
+        """Waits for the end of the handshake; returns whether it succeeded, or raises why it failed.
+
+        One that failed without a reason is made again for a while: a listener that is busy with other callers
+        breaks a handshake off and gives none.
+        """
         while connection.connecting:
             if self._stopping.wait(_HANDSHAKE_POLL_S):
                 return False
-        if not connection.connected:
+        if connection.connected:
+            self._give_up_s = None
+            return True
+        now_s = time.monotonic()
+        self._give_up_s = self._give_up_s or now_s + _UNEXPLAINED_S
+        if not connection.failed_unexplained or now_s > self._give_up_s:
             raise SrtError(connection.reject_reason())
-        return True
+        self._stopping.wait(_UNEXPLAINED_PAUSE_S)
+        return False
 
     def _take_packets(self, connection: SrtSocket) -> None:
         reception = Reception(connection, self._decoder, self._options, self.delivery, self._report)

@@ -30,6 +30,8 @@ _CONNECTING: Final = 4
 _CONNECTED: Final = 5
 _EPOLL_IN: Final = 1
 _ERROR: Final = -1
+_REJ_UNKNOWN: Final = 0
+"""SRT_REJ_UNKNOWN: no reason is known."""
 
 
 class LibsrtMissingError(Exception):
@@ -164,6 +166,11 @@ class SrtSocket:
     def connected(self) -> bool:
         """Whether the connection is established and not broken."""
         return int(self._srt.srt_getsockstate(self._socket)) == _CONNECTED
+
+    @property
+    def failed_unexplained(self) -> bool:
+        """Whether the handshake failed without a reason, as when the listener is busy with another one."""
+        return int(self._srt.srt_getrejectreason(self._socket)) == _REJ_UNKNOWN
 
     def reject_reason(self) -> str:
         """Returns why the handshake failed."""

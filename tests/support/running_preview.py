@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -69,8 +70,9 @@ class RunningPreview:
         self.stub = pb_grpc.PreviewServiceStub(self.channel)
 
     def __enter__(self) -> Self:
+        # Not the file alone: whether it can be bound at all is tried with a socket that is gone again.
         wait_until(
-            lambda: self.socket.exists() or self.process.poll() is not None, "the service is up", PATIENCE_S
+            lambda: _listens(self.socket) or self.process.poll() is not None, "the service is up", PATIENCE_S
         )
         assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
         return self
@@ -183,3 +185,8 @@ def _merged(base: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, Mapping) and isinstance(base.get(key), dict) and key != "source"
         merged[key] = _merged(base[key], value) if both else value
     return merged
+
+
+def _listens(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        return probe.connect_ex(str(path)) == 0
