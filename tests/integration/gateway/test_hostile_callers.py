@@ -78,11 +78,20 @@ def descriptors(gateway: GatewayProgram) -> int:
     return int(psutil.Process(gateway.process.pid).num_fds())
 
 
-def unary(gateway: GatewayProgram, method: str, request: bytes, **options: Any) -> bytes:
-    """One call with a body as it is, over a connection of its own."""
+def unary(
+    gateway: GatewayProgram, method: str, request: bytes, *, after_a_good_one: bool = False, **options: Any
+) -> bytes:
+    """One call with a body as it is, over a connection of its own.
+
+    After a good one the connection is known; a stranger that sends megabytes is not answered at all.
+    """
     no_limit = (("grpc.max_send_message_length", -1), ("grpc.use_local_subchannel_pool", 1))
     with grpc.insecure_channel(f"127.0.0.1:{gateway.port}", options=no_limit) as channel:
-        call: grpc.UnaryUnaryMultiCallable[bytes, bytes] = channel.unary_unary(method)
+        call: grpc.UnaryUnaryMultiCallable[bytes, bytes]
+        if after_a_good_one:
+            call = channel.unary_unary(STATUS)
+            call(b"", timeout=PATIENCE_S)
+        call = channel.unary_unary(method)
         return call(request, timeout=PATIENCE_S, **options)
 
 
@@ -108,7 +117,7 @@ def test_a_message_far_too_large(
     small = resident_mib(gateway)
     for _ in range(3):
         with pytest.raises(grpc.RpcError) as refused:
-            unary(gateway, method, bomb, compression=compression)
+            unary(gateway, method, bomb, compression=compression, after_a_good_one=True)
         assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
     good.still_served()
     assert resident_mib(gateway) - small < MAY_GROW_MIB

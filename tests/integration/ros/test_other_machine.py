@@ -19,6 +19,8 @@ from tests.support.waiting import wait_until
 
 pytestmark = [
     pytest.mark.ros,
+    # Alone: beside running containers, whose bridges are interfaces of this machine, it is not heard at all.
+    pytest.mark.timed,
     pytest.mark.skipif(
         os.geteuid() != 0 or shutil.which("ip") is None, reason="network namespaces need root"
     ),
@@ -77,7 +79,7 @@ def test_a_robot_of_another_machine_is_not_heard(tmp_path: Path, monkeypatch: py
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
         board, began_s = Board(), time.monotonic()
         with intake(DEFAULT_SOURCES, board):
-            wait_until(lambda: heard(board), "it is heard where that is permitted", 60)
+            wait_until(lambda: heard(board), "it is heard where that is permitted", 20)
         took_s = time.monotonic() - began_s
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         board = Board()
