@@ -206,5 +206,7 @@ def writable(pid: int) -> set[str]:
 
 def udp_ports(deployment: Deployment, service: str) -> set[int]:
     """The UDP ports that are bound in a service's network."""
-    table = Path(f"/proc/{deployment.program_pid(service)}/net/udp").read_text(encoding="ascii")
+    # The first process, which outlives the program: the network is the same.
+    first = deployment.inspect(service)["State"]["Pid"]
+    table = Path(f"/proc/{first}/net/udp").read_text(encoding="ascii")
     return {int(line.split()[1].rpartition(":")[2], 16) for line in table.splitlines()[1:]}

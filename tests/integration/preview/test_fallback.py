@@ -20,7 +20,7 @@ from tests.support.watcher import Watcher
 
 pytestmark = pytest.mark.gst
 
-ORDER = {"encoders": {"order": ["mpp-h265", "va-h265", "x264"], "probe_timeout_s": 4}}
+ORDER = {"encoders": {"order": ["mpp-h265", "va-h265", "x264"], "probe_timeout_s": 8}}
 MAX_OUTAGE_S = 2.0
 EXIT_HUNG = 70
 STOP_WITHIN_S = 5.0
