@@ -110,7 +110,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     event_stream = EventStream(state.events, state.event_added)
     services = Services(
         status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
-        preview=PreviewService(control, feedback, state, state, recipients),
+        preview=PreviewService(control, feedback, state, recipients),
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
     )

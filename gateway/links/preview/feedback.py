@@ -6,12 +6,10 @@ from collections.abc import AsyncIterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Final, NoReturn, Protocol
 
-from common.broadcast import Broadcast
 from common.errors import NotRunningError
 from gateway.links.link import LinkLostError, RefusedError, ServiceClient
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.status.preview import PreviewState, PreviewView
-from gateway.status.values import Received
 
 _log = logging.getLogger(__name__)
 
@@ -52,8 +50,8 @@ class Feedback:
         self._connector = connector
         self._client: PreviewServiceClient | None = None
         """None while there is no connection."""
-        self._age: Received[int] | None = None
-        self._reported = Broadcast()
+        self._age_ms = 0
+        self._reported = asyncio.Event()
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[PreviewServiceClient]:
@@ -94,20 +92,19 @@ class Feedback:
         except RefusedError as error:
             raise NotRunningError(f"the preview service refused: {error}") from None
 
-    def pass_on(self, age: Received[int]) -> None:
+    def pass_on(self, age_ms: int) -> None:
         """Has an age passed on; a newer one replaces it. Never waits."""
-        self._age = age
-        self._reported.notify_all()
+        self._age_ms = age_ms
+        self._reported.set()
 
     async def _pass_ages_on(self, client: PreviewServiceClient) -> NoReturn:
-        # Each is passed on, also an equal one: the service forgets it after a while.
-        passed_on = self._age
+        self._reported.clear()  # What was reported without a connection is of no use by now.
         while True:
-            await self._reported.wait_until(lambda: self._age is not passed_on)  # noqa: B023
-            passed_on = self._age
-            assert passed_on is not None  # noqa: S101  # it was None at the beginning at most
+            # Each is passed on, also an equal one: the service forgets it after a while.
+            await self._reported.wait()
+            self._reported.clear()
             try:
-                await client.report_picture_age(passed_on.value)
+                await client.report_picture_age(self._age_ms)
             except (LinkLostError, RefusedError) as error:
                 # The link finds out by itself whether the connection is lost.
                 _log.debug("the age of pictures was not passed on: %s", error)

@@ -23,8 +23,8 @@ class StatusSource(SnapshotSource, Protocol):
         """The preview at this instant; a new object whenever it changed."""
 
 
-class PictureSink(Protocol):
-    """Where viewers' reports go."""
+class PictureSink(SnapshotSource, Protocol):
+    """The same, where viewers' reports go as well."""
 
     def take_picture(self, caller: str, viewer_id: str, report: PictureReport) -> Pictures:
         """Takes a report of this instant; returns what all say that count now."""

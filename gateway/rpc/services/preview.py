@@ -1,16 +1,14 @@
 """The live preview: switched on and off; what its viewers request and report."""
 
-import time
 from dataclasses import dataclass
 
 from gateway.links.preview.control import PreviewControl
 from gateway.links.preview.feedback import Feedback
 from gateway.rpc.calls.call import CallContext
-from gateway.rpc.calls.ports import PictureSink, SnapshotSource
+from gateway.rpc.calls.ports import PictureSink
 from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.mapping.enums import profile_from
 from gateway.rpc.mapping.preview import picture_report, preview_status
-from gateway.status.values import Received
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     ReportPictureRequest,
     ReportPictureResponse,
@@ -28,15 +26,13 @@ class PreviewService:
     Attributes:
         control: sets the desired state.
         feedback: speaks to the preview service for viewers.
-        state: where the resulting status comes from.
-        pictures: where viewers' reports go.
+        state: where the resulting status comes from, and viewers' reports go.
         recipients: finds out what a caller may see.
     """
 
     control: PreviewControl
     feedback: Feedback
-    state: SnapshotSource
-    pictures: PictureSink
+    state: PictureSink
     recipients: Recipients
 
     async def set_preview_mode(
@@ -62,7 +58,7 @@ class PreviewService:
     async def report_picture(self, request: ReportPictureRequest, call: CallContext) -> ReportPictureResponse:
         """Takes a viewer's report, and has the worst age of all passed on."""
         caller = call.principal.name if call.principal else call.peer.address_prefix
-        pictures = self.pictures.take_picture(caller, request.viewer_id, picture_report(request))
+        pictures = self.state.take_picture(caller, request.viewer_id, picture_report(request))
         if pictures.link_age_ms is not None:
-            self.feedback.pass_on(Received(pictures.link_age_ms, time.monotonic()))
+            self.feedback.pass_on(pictures.link_age_ms)
         return ReportPictureResponse()
