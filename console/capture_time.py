@@ -40,6 +40,19 @@ def nearest(pts_ticks: int, reference_ticks: int) -> int:
     return reference_ticks + (pts_ticks - reference_ticks + half) % WRAP_TICKS - half
 
 
+class Unwrapped:
+    """Follows the PTS of one stream over its wraps."""
+
+    def __init__(self) -> None:
+        self._latest: int | None = None
+
+    def ticks(self, pts_ticks: int) -> int:
+        """Returns a PTS without the wrap, in ticks above 0; nearest to the one before it."""
+        reference = pts_ticks + WRAP_TICKS if self._latest is None else self._latest
+        self._latest = nearest(pts_ticks, reference)
+        return self._latest
+
+
 @dataclass(frozen=True, slots=True)
 class CaptureClock:
     """Capture times of one stream.

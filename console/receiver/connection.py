@@ -1,10 +1,8 @@
 """Connects to a stream by the delivery that is asked for, or possible."""
 
-from typing import Protocol
-
 from common.errors import UserError
 from console.receiver.address import StreamAddress
-from console.receiver.delivery import Delivery, DeliveryChoice
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.direct import DirectConnection
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
@@ -12,18 +10,9 @@ from console.receiver.options import ReceiverOptions
 from console.receiver.srt import SrtConnection
 
 
-class Connection(Protocol):
-    """A connection that is established or under way."""
-
-    @property
-    def delivery(self) -> Delivery:
-        """The delivery in use, with its figures."""
-
-    def close(self) -> None:
-        """Disconnects; afterwards nothing reaches the queue."""
-
-
-def connect(address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> Connection:
+def connect(
+    address: StreamAddress, queue: FrameQueue, options: ReceiverOptions
+) -> DirectConnection | SrtConnection:
     """Connects to the robot, fills a frame queue, and ends the queue with the reason of a failure.
 
     Args:

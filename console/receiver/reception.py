@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final, Protocol
 
-from console.capture_time import WRAP_TICKS, nearest, ticks_to_ns
+from console.capture_time import Unwrapped, ticks_to_ns
 from console.receiver.age import AgeBound
 from console.receiver.delivery import Delivery, LinkStatistics
 from console.receiver.options import ReceiverOptions
@@ -99,7 +99,7 @@ class Reception:
         self._reorder = Reorder(connection.first_number(), _LONGEST_WAIT_S)
         self._stream = TransportStream()
         self._age = AgeBound(options.max_age_s)
-        self._ticks: int | None = None
+        self._pts = Unwrapped()
         self._newest: AccessUnit | None = None
         self._statistics: LinkStatistics | None = None
         self._report_s = 0.0
@@ -159,11 +159,9 @@ class Reception:
         unit, self._newest = self._newest, None
         if unit is None or unit.pts_ticks is None:
             return False
-        self._ticks = nearest(
-            unit.pts_ticks, unit.pts_ticks + WRAP_TICKS if self._ticks is None else self._ticks
-        )
+        time_s = ticks_to_ns(self._pts.ticks(unit.pts_ticks)) / _NS_PER_S
         age_s = self._options.capture.age_s(unit.pts_ticks) if self._options.capture else None
-        return self._age.exceeded(now_s, ticks_to_ns(self._ticks) / _NS_PER_S, age_s)
+        return self._age.exceeded(now_s, time_s, age_s)
 
     def _needs_rejoin(self, now_s: float) -> bool:
         """Requests a key frame while no frame can be shown; returns whether only a new connection helps."""

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.gst import GLib, Gst, stop
-from console.capture_time import WRAP_TICKS, nearest, ns_to_ticks, ticks_to_ns
+from console.capture_time import Unwrapped, ns_to_ticks, ticks_to_ns
 from console.receiver.address import StreamAddress
 from console.receiver.decoding import DecodingBranch, element
 from console.receiver.errors import UndecodableError, undecodable
@@ -38,7 +38,8 @@ class UnitDecoder:
         self._codec = ""
         self._source: Any = None
         self._branch: DecodingBranch | None = None
-        self._latest_ticks: int | None = None
+        self._pts = Unwrapped()
+        """Over all connections: the decoder's time must not go back."""
         self._pipeline = Gst.Pipeline.new(None)
         self._recorder: Any = None
         self._release = ExitStack()
@@ -69,7 +70,7 @@ class UnitDecoder:
             return False
         buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
         if unit.pts_ticks is not None:
-            buffer.pts = ticks_to_ns(self._unwrapped(unit.pts_ticks))
+            buffer.pts = ticks_to_ns(self._pts.ticks(unit.pts_ticks))
         if unit.first:
             buffer.set_flags(Gst.BufferFlags.DISCONT)
         self._source.emit("push-buffer", buffer)
@@ -107,12 +108,6 @@ class UnitDecoder:
             self._branch.detach(self._pipeline)
             # It holds a method of ours: without this only a collector frees both, and GStreamer's sockets.
             self._branch = None
-
-    def _unwrapped(self, pts_ticks: int) -> int:
-        """Returns a PTS without the wrap, above 0: the decoder's time must not go back."""
-        reference = pts_ticks + WRAP_TICKS if self._latest_ticks is None else self._latest_ticks
-        self._latest_ticks = nearest(pts_ticks, reference)
-        return self._latest_ticks
 
     def _capture_ns(self, pts_ns: int) -> int | None:
         """Returns the capture time for the decoder's time. On GStreamer's thread."""
