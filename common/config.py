@@ -1,5 +1,6 @@
 """Loads and validates a program's YAML configuration file; environment variables override it."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -69,10 +70,10 @@ def as_yaml(settings: Settings) -> str:
     return yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
-def json_schema(settings_type: type[Settings]) -> dict[str, Any]:
-    """Returns the JSON schema of a configuration file, for editors."""
+def json_schema(settings_type: type[Settings]) -> str:
+    """Returns the JSON schema of a configuration file, for editors, as text."""
     # As a plain adapter: the schema of settings would be the same, but typed as an instance method.
-    return TypeAdapter(settings_type).json_schema()
+    return json.dumps(TypeAdapter(settings_type).json_schema(), indent=2)
 
 
 class _KeyTwiceError(yaml.MarkedYAMLError):

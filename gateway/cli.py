@@ -1,6 +1,5 @@
 """`robot-gateway`: serve, check the configuration, or find out what is wrong with this machine."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +7,7 @@ import typer
 from rich.console import Console
 
 from common import logs
+from common.check_options import PrintOption, SchemaOption
 from common.config import as_yaml, json_schema
 from common.findings import exit_code, print_findings
 from common.program import bound_arenas, run, run_to_exit
@@ -39,21 +39,13 @@ def serve(config: Config = None) -> None:
 
 
 @app.command()
-def check(
-    config: Config = None,
-    in_effect: Annotated[
-        bool, typer.Option("--print", help="Print the configuration in effect, with all defaults.")
-    ] = False,
-    schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
-    ] = False,
-) -> None:
+def check(config: Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
     """Check the configuration, and the credentials and certificates that it names, and end.
 
     What passes is accepted by serve; a message type that is not installed shows only on the robot (doctor).
     """
     if schema:
-        typer.echo(json.dumps(json_schema(GatewaySettings), indent=2))
+        typer.echo(json_schema(GatewaySettings))
         return
     settings = load_settings(config)
     # Late: importing it checks the middleware, which an error at the import could not report in one line.

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
+from common.check_options import PrintOption, SchemaOption
 from preview.config import PreviewSettings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Serves the robot's live video.")
@@ -38,18 +39,10 @@ def serve(config_file: _Config = None) -> None:
 
 
 @app.command()
-def check(
-    config_file: _Config = None,
-    in_effect: Annotated[
-        bool, typer.Option("--print", help="Print the configuration in effect, with all defaults.")
-    ] = False,
-    schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
-    ] = False,
-) -> None:
+def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
     """Checks the configuration and exits."""
     if schema:
-        print(json.dumps(config.json_schema(PreviewSettings), indent=2))
+        print(config.json_schema(PreviewSettings))
         return
     settings = config.load(PreviewSettings, config_file)
     if in_effect:

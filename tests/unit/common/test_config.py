@@ -107,7 +107,7 @@ def test_what_is_in_effect_reads_back(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_the_schema_forbids_unknown_keys() -> None:
-    schema = json_schema(_Settings)
+    schema = json.loads(json_schema(_Settings))
     assert schema["additionalProperties"] is False
     assert schema["properties"]["name"]["maxLength"] == 5
     json.dumps(schema)
