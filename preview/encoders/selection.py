@@ -54,7 +54,8 @@ class Selection:
     @property
     def order_of_trials(self) -> list[Encoder]:
         """All encoders, those last that are passed over: a process that follows a crash needs the others."""
-        return sorted(self._order, key=lambda encoder: encoder.name in self._recent_failures())
+        recent = self._recent_failures()
+        return sorted(self._order, key=lambda encoder: encoder.name in recent)
 
     async def probe(self) -> bool:
         """Runs trials until an encoder is proven that has not failed; False when there is none."""

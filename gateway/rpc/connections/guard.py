@@ -28,17 +28,18 @@ class _Watched:
     """What is known of a connection.
 
     Attributes:
+        placed: whether it has a place.
         before: bytes that it had sent when it became pending.
     """
 
+    placed: bool = False
     before: int = 0
     throttled: bool = False
     cut_off: bool = False
 
 
 _FRESH: Final = _Watched()
-_PLACED: Final = _Watched()
-"""Of a connection that has a place."""
+_PLACED: Final = _Watched(placed=True)
 
 
 class ConnectionGuard:
@@ -100,8 +101,8 @@ class ConnectionGuard:
                 watched[address] = _PLACED
                 continue
             received = sockets.received_bytes(address)
-            if state is _PLACED:
-                state = _Watched(received)
+            if state.placed:
+                state = _Watched(before=received)
             sent = received - state.before
             if sent > PENDING_BYTES and not state.cut_off:
                 self._cut_off(sockets, address)

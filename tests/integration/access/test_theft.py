@@ -98,8 +98,8 @@ def test_after_a_theft_a_new_ca_makes_the_thief_a_stranger_to_the_laptop(tmp_pat
             wait_until(
                 lambda: not trusts(robot.target, robot.stored()), "the robot shows its new certificate"
             )
-            told = robotctl_process("--robot", ROBOT, "status", XDG_CONFIG_HOME=str(home))
-            assert told.returncode != 0
+            refused = robotctl_process("--robot", ROBOT, "status", XDG_CONFIG_HOME=str(home))
+            assert refused.returncode != 0
             ca = str(tmp_path / "credentials/ca.pem")
             done = robot.robotctl("login", ROBOT, robot.target, "--ca", ca)
             assert done.returncode == 0, done.stderr
