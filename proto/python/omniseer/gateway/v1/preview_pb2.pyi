@@ -239,8 +239,9 @@ class StreamEndpoint(_message.Message):
     port: _builtins.int
     """The UDP port the robot listens on while the preview is running."""
     uri: _builtins.str
-    """The whole address in one string, ready for a player (ffplay, VLC, srtsrc).
-    It never carries the passphrase.
+    """The whole address in one string, as GStreamer's srtsrc and srt-live-transmit take it: its latency is
+    in ms. FFmpeg and its players (ffplay, mpv) count the latency in microseconds, so it has to be
+    multiplied by 1000 for them. It never carries the passphrase.
     """
     latency_ms: _builtins.int
     """The robot's SRT latency in ms: how long a receiver may wait for a lost packet. The larger one

@@ -105,7 +105,7 @@ class GetGatewayInfoResponse(_message.Message):
 
     @_builtins.property
     def methods(self) -> _containers.RepeatedCompositeFieldContainer[_gateway_info_pb2.MethodCounts]:
-        """Calls of every method of this service, by name."""
+        """Calls of every method of this package's services, by name."""
 
     def __init__(
         self,
@@ -497,3 +497,119 @@ class ReportPictureResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___ReportPictureResponse: _TypeAlias = ReportPictureResponse  # noqa: Y015
+
+@_typing.final
+class SetTeleopEnabledRequest(_message.Message):
+    """Enables or disables driving."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ENABLED_FIELD_NUMBER: _builtins.int
+    enabled: _builtins.bool
+    """The desired state."""
+    def __init__(
+        self,
+        *,
+        enabled: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SetTeleopEnabledRequest: _TypeAlias = SetTeleopEnabledRequest  # noqa: Y015
+
+@_typing.final
+class SetTeleopEnabledResponse(_message.Message):
+    """The outcome of the request."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ACCEPTED_FIELD_NUMBER: _builtins.int
+    MESSAGE_FIELD_NUMBER: _builtins.int
+    TELEOP_FIELD_NUMBER: _builtins.int
+    accepted: _builtins.bool
+    """Whether the robot has carried it out."""
+    message: _builtins.str
+    """What happened and what to do next, for a person to read."""
+    @_builtins.property
+    def teleop(self) -> _system_status_pb2.TeleopStatus:
+        """Driving after the request."""
+
+    def __init__(
+        self,
+        *,
+        accepted: _builtins.bool = ...,
+        message: _builtins.str = ...,
+        teleop: _system_status_pb2.TeleopStatus | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["teleop", b"teleop"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["accepted", b"accepted", "message", b"message", "teleop", b"teleop"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SetTeleopEnabledResponse: _TypeAlias = SetTeleopEnabledResponse  # noqa: Y015
+
+@_typing.final
+class SendTeleopCommandRequest(_message.Message):
+    """A velocity, in the robot's body frame (REP 103)."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LINEAR_X_MPS_FIELD_NUMBER: _builtins.int
+    LINEAR_Y_MPS_FIELD_NUMBER: _builtins.int
+    ANGULAR_Z_RAD_S_FIELD_NUMBER: _builtins.int
+    linear_x_mps: _builtins.float
+    """Velocity forward (x), in m/s."""
+    linear_y_mps: _builtins.float
+    """Velocity to the left (y), in m/s."""
+    angular_z_rad_s: _builtins.float
+    """Turning rate counter-clockwise seen from above (about z up), in rad/s."""
+    def __init__(
+        self,
+        *,
+        linear_x_mps: _builtins.float = ...,
+        linear_y_mps: _builtins.float = ...,
+        angular_z_rad_s: _builtins.float = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["angular_z_rad_s", b"angular_z_rad_s", "linear_x_mps", b"linear_x_mps", "linear_y_mps", b"linear_y_mps"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SendTeleopCommandRequest: _TypeAlias = SendTeleopCommandRequest  # noqa: Y015
+
+@_typing.final
+class SendTeleopCommandResponse(_message.Message):
+    """The outcome of the command."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ACCEPTED_FIELD_NUMBER: _builtins.int
+    MESSAGE_FIELD_NUMBER: _builtins.int
+    TELEOP_FIELD_NUMBER: _builtins.int
+    accepted: _builtins.bool
+    """Whether the command was passed on to the robot."""
+    message: _builtins.str
+    """What happened and what to do next, for a person to read."""
+    @_builtins.property
+    def teleop(self) -> _system_status_pb2.TeleopStatus:
+        """Driving after the command."""
+
+    def __init__(
+        self,
+        *,
+        accepted: _builtins.bool = ...,
+        message: _builtins.str = ...,
+        teleop: _system_status_pb2.TeleopStatus | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["teleop", b"teleop"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["accepted", b"accepted", "message", b"message", "teleop", b"teleop"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SendTeleopCommandResponse: _TypeAlias = SendTeleopCommandResponse  # noqa: Y015

@@ -82,6 +82,16 @@ class RobotGatewayStub:
                 request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.SerializeToString,
                 response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.FromString,
                 _registered_method=True)
+        self.SetTeleopEnabled = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/SetTeleopEnabled',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledResponse.FromString,
+                _registered_method=True)
+        self.SendTeleopCommand = channel.unary_unary(
+                '/omniseer.gateway.v1.RobotGateway/SendTeleopCommand',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandResponse.FromString,
+                _registered_method=True)
 
 
 class RobotGatewayServicer:
@@ -177,6 +187,29 @@ class RobotGatewayServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def SetTeleopEnabled(self, request, context):
+        """Enables or disables driving, for all. Disabling stops the robot and ends the lease of its driver.
+
+        accepted is false when the robot has not carried it out; message says why and what to do.
+        FAILED_PRECONDITION: the robot is not set up for driving.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def SendTeleopCommand(self, request, context):
+        """Drives for at most 500 ms, slowly (0.15 m/s and 0.4 rad/s at most), for tools without TeleopService.Drive; all
+        velocities zero stop. Only where the robot's configuration permits such tools.
+
+        accepted is false, and nothing moves by the command, when driving is disabled, such tools are not permitted,
+        another driver has the lease, or a velocity is not finite or beyond max_linear_mps and max_angular_rad_s of
+        TeleopStatus; message says which.
+        FAILED_PRECONDITION: the robot is not set up for driving.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RobotGatewayServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -224,6 +257,16 @@ def add_RobotGatewayServicer_to_server(servicer, server):
                     servicer.ReportPicture,
                     request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.FromString,
                     response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.SerializeToString,
+            ),
+            'SetTeleopEnabled': grpc.unary_unary_rpc_method_handler(
+                    servicer.SetTeleopEnabled,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledResponse.SerializeToString,
+            ),
+            'SendTeleopCommand': grpc.unary_unary_rpc_method_handler(
+                    servicer.SendTeleopCommand,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -470,6 +513,60 @@ class RobotGateway:
             '/omniseer.gateway.v1.RobotGateway/ReportPicture',
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureRequest.SerializeToString,
             omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.ReportPictureResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SetTeleopEnabled(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/SetTeleopEnabled',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SetTeleopEnabledResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SendTeleopCommand(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RobotGateway/SendTeleopCommand',
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_robot__gateway__pb2.SendTeleopCommandResponse.FromString,
             options,
             channel_credentials,
             insecure,

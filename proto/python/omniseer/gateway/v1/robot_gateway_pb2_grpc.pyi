@@ -86,6 +86,21 @@ class RobotGatewayStub:
     INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
     RESOURCE_EXHAUSTED: called too often.
     """
+    SetTeleopEnabled: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.SetTeleopEnabledRequest, _robot_gateway_pb2.SetTeleopEnabledResponse]
+    """Enables or disables driving, for all. Disabling stops the robot and ends the lease of its driver.
+
+    accepted is false when the robot has not carried it out; message says why and what to do.
+    FAILED_PRECONDITION: the robot is not set up for driving.
+    """
+    SendTeleopCommand: _grpc.UnaryUnaryMultiCallable[_robot_gateway_pb2.SendTeleopCommandRequest, _robot_gateway_pb2.SendTeleopCommandResponse]
+    """Drives for at most 500 ms, slowly (0.15 m/s and 0.4 rad/s at most), for tools without TeleopService.Drive; all
+    velocities zero stop. Only where the robot's configuration permits such tools.
+
+    accepted is false, and nothing moves by the command, when driving is disabled, such tools are not permitted,
+    another driver has the lease, or a velocity is not finite or beyond max_linear_mps and max_angular_rad_s of
+    TeleopStatus; message says which.
+    FAILED_PRECONDITION: the robot is not set up for driving.
+    """
 
 @_typing.type_check_only
 class RobotGatewayAsyncStub(RobotGatewayStub):
@@ -142,6 +157,21 @@ class RobotGatewayAsyncStub(RobotGatewayStub):
     3 s; one to four a second are enough. A connection may call it 8 times a second.
     INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
     RESOURCE_EXHAUSTED: called too often.
+    """
+    SetTeleopEnabled: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.SetTeleopEnabledRequest, _robot_gateway_pb2.SetTeleopEnabledResponse]  # type: ignore[assignment]
+    """Enables or disables driving, for all. Disabling stops the robot and ends the lease of its driver.
+
+    accepted is false when the robot has not carried it out; message says why and what to do.
+    FAILED_PRECONDITION: the robot is not set up for driving.
+    """
+    SendTeleopCommand: _aio.UnaryUnaryMultiCallable[_robot_gateway_pb2.SendTeleopCommandRequest, _robot_gateway_pb2.SendTeleopCommandResponse]  # type: ignore[assignment]
+    """Drives for at most 500 ms, slowly (0.15 m/s and 0.4 rad/s at most), for tools without TeleopService.Drive; all
+    velocities zero stop. Only where the robot's configuration permits such tools.
+
+    accepted is false, and nothing moves by the command, when driving is disabled, such tools are not permitted,
+    another driver has the lease, or a velocity is not finite or beyond max_linear_mps and max_angular_rad_s of
+    TeleopStatus; message says which.
+    FAILED_PRECONDITION: the robot is not set up for driving.
     """
 
 class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
@@ -250,6 +280,33 @@ class RobotGatewayServicer(metaclass=_abc_1.ABCMeta):
         3 s; one to four a second are enough. A connection may call it 8 times a second.
         INVALID_ARGUMENT: a value out of its bounds; the report is not taken.
         RESOURCE_EXHAUSTED: called too often.
+        """
+
+    @_abc_1.abstractmethod
+    def SetTeleopEnabled(
+        self,
+        request: _robot_gateway_pb2.SetTeleopEnabledRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.SetTeleopEnabledResponse, _abc.Awaitable[_robot_gateway_pb2.SetTeleopEnabledResponse]]:
+        """Enables or disables driving, for all. Disabling stops the robot and ends the lease of its driver.
+
+        accepted is false when the robot has not carried it out; message says why and what to do.
+        FAILED_PRECONDITION: the robot is not set up for driving.
+        """
+
+    @_abc_1.abstractmethod
+    def SendTeleopCommand(
+        self,
+        request: _robot_gateway_pb2.SendTeleopCommandRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_robot_gateway_pb2.SendTeleopCommandResponse, _abc.Awaitable[_robot_gateway_pb2.SendTeleopCommandResponse]]:
+        """Drives for at most 500 ms, slowly (0.15 m/s and 0.4 rad/s at most), for tools without TeleopService.Drive; all
+        velocities zero stop. Only where the robot's configuration permits such tools.
+
+        accepted is false, and nothing moves by the command, when driving is disabled, such tools are not permitted,
+        another driver has the lease, or a velocity is not finite or beyond max_linear_mps and max_angular_rad_s of
+        TeleopStatus; message says which.
+        FAILED_PRECONDITION: the robot is not set up for driving.
         """
 
 def add_RobotGatewayServicer_to_server(servicer: RobotGatewayServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -13,6 +13,7 @@ from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 from omniseer.gateway.v1 import source_pb2 as _source_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
+from omniseer.gateway.v1 import teleop_pb2 as _teleop_pb2
 import builtins as _builtins
 import sys
 import typing as _typing
@@ -253,6 +254,10 @@ class TeleopStatus(_message.Message):
     LAST_COMMAND_WZ_RAD_S_FIELD_NUMBER: _builtins.int
     LAST_COMMAND_AVAILABLE_FIELD_NUMBER: _builtins.int
     LAST_COMMAND_STALE_FIELD_NUMBER: _builtins.int
+    PHASE_FIELD_NUMBER: _builtins.int
+    INHIBITS_FIELD_NUMBER: _builtins.int
+    HOLDER_FIELD_NUMBER: _builtins.int
+    STOP_FIELD_NUMBER: _builtins.int
     state: _states_pb2.TeleopState.ValueType
     """Whether the robot takes commands."""
     enabled: _builtins.bool
@@ -275,6 +280,20 @@ class TeleopStatus(_message.Message):
     """Whether one command has been accepted."""
     last_command_stale: _builtins.bool
     """Whether the newest accepted command is older than the limit (500 ms by default)."""
+    phase: _teleop_pb2.DrivePhase.ValueType
+    """Phase of driving."""
+    holder: _builtins.str
+    """Who has the lease, for people: the name on the credential, or the address where callers are not authenticated.
+    Empty when no one drives.
+    """
+    @_builtins.property
+    def inhibits(self) -> _containers.RepeatedScalarFieldContainer[_teleop_pb2.DriveInhibit.ValueType]:
+        """Why the robot does not move for its driver. Empty when nothing is in the way, and without a driver."""
+
+    @_builtins.property
+    def stop(self) -> _teleop_pb2.StopLatch:
+        """The stop, in DRIVE_PHASE_STOPPED."""
+
     def __init__(
         self,
         *,
@@ -289,10 +308,14 @@ class TeleopStatus(_message.Message):
         last_command_wz_rad_s: _builtins.float = ...,
         last_command_available: _builtins.bool = ...,
         last_command_stale: _builtins.bool = ...,
+        phase: _teleop_pb2.DrivePhase.ValueType = ...,
+        inhibits: _abc.Iterable[_teleop_pb2.DriveInhibit.ValueType] | None = ...,
+        holder: _builtins.str = ...,
+        stop: _teleop_pb2.StopLatch | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["stop", b"stop"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled", "last_command_age_ms", b"last_command_age_ms", "last_command_available", b"last_command_available", "last_command_stale", b"last_command_stale", "last_command_vx_mps", b"last_command_vx_mps", "last_command_vy_mps", b"last_command_vy_mps", "last_command_wz_rad_s", b"last_command_wz_rad_s", "last_error", b"last_error", "max_angular_rad_s", b"max_angular_rad_s", "max_linear_mps", b"max_linear_mps", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled", "holder", b"holder", "inhibits", b"inhibits", "last_command_age_ms", b"last_command_age_ms", "last_command_available", b"last_command_available", "last_command_stale", b"last_command_stale", "last_command_vx_mps", b"last_command_vx_mps", "last_command_vy_mps", b"last_command_vy_mps", "last_command_wz_rad_s", b"last_command_wz_rad_s", "last_error", b"last_error", "max_angular_rad_s", b"max_angular_rad_s", "max_linear_mps", b"max_linear_mps", "phase", b"phase", "state", b"state", "stop", b"stop"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
