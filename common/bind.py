@@ -55,6 +55,24 @@ def bind_unix(server: grpc.aio.Server, path: Path) -> None:
         raise UserError(f"socket {path} can't be bound ({error})", "Choose another path") from error
 
 
+def packet_socket(path: Path) -> socket.socket:
+    """Returns a listening Unix socket of packets (SOCK_SEQPACKET), not blocking, with mode 0660.
+
+    Raises:
+        UserError: another program serves at this path, or the path can't be used.
+    """
+    _try_unix(path, socket.SOCK_SEQPACKET)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+    try:
+        listener.bind(str(path))
+        path.chmod(_SOCKET_MODE)
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        raise UserError(f"socket {path} can't be bound ({error})", "Choose another path") from error
+    return listener
+
+
 def bracketed(host: str) -> str:
     """Returns the host as it precedes ":PORT": an IPv6 address in brackets (RFC 3986 3.2.2)."""
     return f"[{host}]" if ":" in host and not host.startswith("[") else host
@@ -94,7 +112,7 @@ def _why_not(error: OSError, host: str, port: int) -> tuple[str, str]:
             )
 
 
-def _try_unix(path: Path) -> None:
+def _try_unix(path: Path, kind: int = socket.SOCK_STREAM) -> None:
     if len(bytes(path)) > _MAX_SOCKET_PATH:
         raise UserError(
             f"the path of socket {path} has {len(bytes(path))} bytes; Linux takes {_MAX_SOCKET_PATH}",
@@ -102,8 +120,8 @@ def _try_unix(path: Path) -> None:
         )
     try:
         if path.exists():
-            _remove_dead(path)
-        with socket.socket(socket.AF_UNIX) as probe:
+            _remove_dead(path, kind)
+        with socket.socket(socket.AF_UNIX, kind) as probe:
             probe.bind(str(path))
         path.unlink()
     except OSError as error:
@@ -113,10 +131,10 @@ def _try_unix(path: Path) -> None:
         ) from error
 
 
-def _remove_dead(path: Path) -> None:
+def _remove_dead(path: Path, kind: int) -> None:
     if not stat.S_ISSOCK(path.stat().st_mode):
         raise UserError(f"{path} exists and is not a socket", "Remove it or choose another path")
-    with socket.socket(socket.AF_UNIX) as probe:
+    with socket.socket(socket.AF_UNIX, kind) as probe:
         probe.settimeout(_CONNECT_TIMEOUT_S)
         try:
             probe.connect(str(path))

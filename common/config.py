@@ -1,13 +1,18 @@
 """Loads and validates a program's YAML configuration file; environment variables override it."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import (
+    BaseSettings,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    SettingsError,
+)
 
 from common.config_problems import first_problem
 from common.errors import ExitCode, UserError
@@ -29,6 +34,8 @@ class Settings(BaseSettings):
     model_config: ClassVar[SettingsConfigDict] = SettingsConfigDict(
         extra="forbid", frozen=True, env_nested_delimiter="__", nested_model_default_partial_update=True
     )
+    spellings: ClassVar[Mapping[str, str]] = {}
+    """Keys of a file that Python spells in another way, as environment variables do."""
 
     @classmethod
     def settings_customise_sources(
@@ -46,34 +53,80 @@ class Settings(BaseSettings):
 SettingsT = TypeVar("SettingsT", bound=Settings)
 
 
-def load(settings_type: type[SettingsT], path: Path | None) -> SettingsT:
+class ConflictError(Exception):
+    """Values that are valid each, but not together.
+
+    Args:
+        location: the keys and list positions that lead to the one to change.
+        what: what is wrong.
+        remedy: what to do.
+    """
+
+    def __init__(self, location: tuple[int | str, ...], what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.location = location
+        self.what = what
+        self.remedy = remedy
+
+
+def load(
+    settings_type: type[SettingsT], path: Path | None, *checks: Callable[[SettingsT], None]
+) -> SettingsT:
     """Reads and validates a configuration file; without a path, defaults and environment apply alone.
+
+    Args:
+        settings_type: what it is read into.
+        path: the file.
+        checks: of the whole; they raise `ConflictError`.
 
     Raises:
         UserError: the file can't be read, is not YAML, or has an unknown key, a key twice or a wrong value.
             The text names the file, the line, the key, the value and what is expected.
     """
     values, line_of = _read(path) if path else ({}, _no_line)
+    prefix = settings_type.model_config.get("env_prefix", "")
     try:
-        return settings_type(**values)
+        settings = settings_type(**_respelled(values, settings_type.spellings))
+    except SettingsError as error:
+        # A list or a section in a variable that is no JSON; the sentence has the name in quotation marks.
+        key = str(error).partition('"')[2].partition('"')[0]
+        raise _error(
+            f"from the environment: key '{key}' is not JSON",
+            f'Write lists and sections as JSON: {prefix}{key.upper()}=["a", "b"] for example',
+        ) from error
     except ValidationError as error:
-        prefix = settings_type.model_config.get("env_prefix", "")
         problem = first_problem(error, settings_type)
         raise _error(
             f"{path or 'from the environment'}{line_of(problem.location)}: {problem.text}",
             f"Correct it in the file or in the {prefix}* environment variable",
         ) from error
+    try:
+        for check in checks:
+            check(settings)
+    except ConflictError as error:
+        where = f"{path or 'from the environment'}{line_of(error.location)}"
+        raise _error(f"{where}: {error.what}", error.remedy) from error
+    return settings
 
 
 def as_yaml(settings: Settings) -> str:
     """Returns the settings as they are in effect, with all defaults and environment variables."""
-    return yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    return yaml.safe_dump(
+        settings.model_dump(mode="json", by_alias=True), sort_keys=False, allow_unicode=True
+    )
 
 
 def json_schema(settings_type: type[Settings]) -> str:
     """Returns the JSON schema of a configuration file, for editors, as text."""
     # As a plain adapter: the schema of settings would be the same, but typed as an instance method.
     return json.dumps(TypeAdapter(settings_type).json_schema(), indent=2)
+
+
+def _respelled(value: Any, spellings: Mapping[str, str]) -> Any:
+    """Returns a file's content with Python's spelling of its keys, so that variables override them."""
+    if isinstance(value, dict):
+        return {spellings.get(key, key): _respelled(inner, spellings) for key, inner in value.items()}
+    return value
 
 
 class _KeyTwiceError(yaml.MarkedYAMLError):
@@ -136,7 +189,10 @@ def _line(node: yaml.Node, location: tuple[int | str, ...]) -> str:
     line = None
     for part in location:
         if isinstance(node, yaml.MappingNode):
-            found = next(((key, value) for key, value in node.value if key.value == str(part)), None)
+            spelled = str(part).replace("_", "-")
+            found = next(
+                (pair for pair in node.value if str(pair[0].value).replace("_", "-") == spelled), None
+            )
             if found is None:
                 continue  # A part that pydantic adds, such as the kind of a union's member.
             line, node = found[0].start_mark.line, found[1]

@@ -39,7 +39,8 @@ class UserError(Exception):
 
     def __str__(self) -> str:
         """Returns both parts as one line; unprintable characters, which either may quote, become spaces."""
-        text = f"{self.what}. {self.remedy}" if self.remedy else self.what
+        stop = "" if self.what.endswith("?") else "."
+        text = f"{self.what}{stop} {self.remedy}" if self.remedy else self.what
         return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
@@ -105,6 +106,38 @@ class NotRunningError(DomainError):
     """The preview is not running: there is no stream to act on."""
 
     reason = Reason.PREVIEW_NOT_RUNNING
+
+
+class PreconditionError(DomainError):
+    """The robot's state does not permit the request.
+
+    Args:
+        text: why, and what to do.
+        reason: why, for programs.
+    """
+
+    def __init__(self, text: str, reason: Reason) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+class ConflictError(DomainError):
+    """Another caller has what the request needs.
+
+    Args:
+        text: who, and what to do.
+        reason: why, for programs.
+    """
+
+    def __init__(self, text: str, reason: Reason) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+class DriveUnreachableError(DomainError):
+    """The drive program does not answer."""
+
+    reason = Reason.DRIVE_UNREACHABLE
 
 
 class NotAuthenticatedError(DomainError):

@@ -11,12 +11,15 @@ from google.rpc.status_pb2 import Status
 from grpc_status.rpc_status import to_status
 
 from common.errors import (
+    ConflictError,
     DefectError,
     DomainError,
+    DriveUnreachableError,
     InvalidRequestError,
     NotAllowedError,
     NotAuthenticatedError,
     NotRunningError,
+    PreconditionError,
     TooMuchError,
     UnknownServiceError,
 )
@@ -31,6 +34,9 @@ STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
     NotAllowedError: grpc.StatusCode.PERMISSION_DENIED,
     NotRunningError: grpc.StatusCode.FAILED_PRECONDITION,
+    PreconditionError: grpc.StatusCode.FAILED_PRECONDITION,
+    ConflictError: grpc.StatusCode.ABORTED,
+    DriveUnreachableError: grpc.StatusCode.UNAVAILABLE,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
     DefectError: grpc.StatusCode.INTERNAL,

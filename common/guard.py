@@ -13,11 +13,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from common.child import end_with_parent
+from common.child import adopt_orphans, end_with_parent
 
 EXIT_SILENT: Final = 70
 """EX_SOFTWARE of sysexits.h: the program sent no heartbeat and was killed."""
@@ -27,6 +28,9 @@ _START_S: Final = 60
 """Until the first heartbeat; GStreamer's first scan of its plugins takes many seconds on a robot."""
 _TICK_S: Final = 1.0
 _ABORT_S: Final = 0.5
+_ORPHANS_S: Final = 1.0
+"""For what an ended program has left running; longer than its last words take."""
+_POLL_S: Final = 0.02
 _KILL_S: Final = 5.0
 """For the end of a killed program; past it, the end of the container must do."""
 
@@ -42,6 +46,7 @@ def guard(command: Sequence[str], start_s: int = _START_S, silence_s: int = SILE
     Raises:
         OSError: the program can't be started.
     """
+    adopt_orphans()
     with (
         tempfile.TemporaryDirectory(prefix="guard-") as directory,
         socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heartbeats,
@@ -57,9 +62,12 @@ def guard(command: Sequence[str], start_s: int = _START_S, silence_s: int = SILE
         signal.signal(signal.SIGTERM, lambda number, _: guarded.send_signal(number))
         # A terminal sends it to the program, too.
         signal.signal(signal.SIGINT, lambda *_: None)
-        if not _ends(guarded, heartbeats, start_s, silence_s):
-            return EXIT_SILENT
+        spoke = _ends(guarded, heartbeats, start_s, silence_s)
+    if not spoke:
+        _await_orphans()
+        return EXIT_SILENT
     code = guarded.wait()
+    _await_orphans()
     return code if code >= 0 else 128 - code
 
 
@@ -96,6 +104,22 @@ def _ends(
         return False
     print("error: it does not end, not even when killed", file=sys.stderr, flush=True)
     return False
+
+
+def _await_orphans() -> None:
+    """Waits for processes that the program has left behind: with this one, a container ends them at once.
+
+    The drive program's worker, for one, still has to send zeros to the robot.
+    """
+    end_s = time.monotonic() + _ORPHANS_S
+    while time.monotonic() < end_s:
+        try:
+            pid, _ = os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            return
+        if not pid:
+            # Polled: only SIGCHLD announces the end of a process that another one started.
+            time.sleep(_POLL_S)
 
 
 def main() -> None:

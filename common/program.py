@@ -9,10 +9,12 @@ from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from typing import Any, Final, NoReturn
 
+import typer
 import uvloop
 
 from common import heartbeat
-from common.errors import UserError
+from common.command_line import read_plainly, usage_error
+from common.errors import ExitCode, UserError
 from common.output import tolerate_encoding
 
 _DESCRIPTORS: Final = 65_536
@@ -29,6 +31,28 @@ def run_to_exit(work: Callable[[], None]) -> None:
         work()
     except UserError as error:
         end_with(error)
+
+
+def run_command_line(app: typer.Typer, name: str) -> None:
+    """Runs a program's command line and ends the process; every mistake is one line.
+
+    Args:
+        app: Of the program.
+        name: Of the program.
+    """
+    command = typer.main.get_command(app)
+    read_plainly(command)
+
+    def work() -> None:
+        try:
+            code = command.main(prog_name=name, standalone_mode=False)
+        except typer.TyperException as error:
+            raise usage_error(error, name) from error
+        except typer.Abort:
+            code = ExitCode.FAILED
+        sys.exit(code if isinstance(code, int) else ExitCode.DONE)
+
+    run_to_exit(work)
 
 
 def end_with(error: UserError) -> NoReturn:

@@ -23,7 +23,7 @@ async def server() -> AsyncIterator[Server]:
     await server.stop(None)
 
 
-async def test_any_free_port_is_told(server: Server) -> None:
+async def test_any_free_port_is_returned(server: Server) -> None:
     assert bind_tcp(server, "127.0.0.1", 0) > 0
 
 

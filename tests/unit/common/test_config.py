@@ -1,15 +1,19 @@
 """Mistakes in a configuration file: the line, the key, what is there and what is expected."""
 
 import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Final, Literal
 
 import pytest
-from pydantic import Field
+from pydantic import BaseModel, Field
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, as_yaml, json_schema, load
 from common.errors import ExitCode, UserError
+from gateway.config import GatewaySettings
+from preview.config import PreviewSettings
 
 
 class _Item(Section):
@@ -95,6 +99,65 @@ def test_a_mistake_in_the_environment_has_no_line(monkeypatch: pytest.MonkeyPatc
     with pytest.raises(UserError) as raised:
         load(_Settings, None)
     assert raised.value.what.startswith("configuration from the environment: key 'server.port' is 'many'")
+
+
+@pytest.mark.parametrize("variable", ["TESTED__ITEMS", "TESTED__SERVER__NAMES", "TESTED__SERVER"])
+def test_a_variable_that_is_no_json_is_one_line(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
+    monkeypatch.setenv(variable, "[")
+    with pytest.raises(UserError) as raised:
+        load(_Settings, None)
+    assert str(raised.value).startswith("configuration from the environment: key ")
+    assert str(raised.value).endswith('=["a", "b"] for example')
+
+
+WRONG: Final[tuple[Any, ...]] = (
+    None,
+    "",
+    "x",
+    -1,
+    0,
+    1.5,
+    1e99,
+    10**30,
+    float("nan"),
+    True,
+    [],
+    [1],
+    ["x"],
+    {},
+    {"a": 1},
+    "x" * 5000,
+)
+
+
+def keys_of(model: type[BaseModel]) -> Iterator[tuple[str, ...]]:
+    for name, field in model.model_fields.items():
+        yield (name,)
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from ((name, *inner) for inner in keys_of(annotation))
+
+
+@pytest.mark.parametrize("settings_type", [GatewaySettings, PreviewSettings])
+def test_no_mistake_is_explained_in_the_librarys_words(settings_type: type[Settings], tmp_path: Path) -> None:
+    """Whatever is written in place of any value."""
+    file = tmp_path / "x.yaml"
+    sentences = []
+    for keys in keys_of(settings_type):
+        for wrong in WRONG:
+            values: Any = wrong
+            for key in reversed(keys):
+                values = {key: values}
+            file.write_text(json.dumps(values), encoding="utf-8")
+            try:
+                load(settings_type, file)
+            except UserError as error:
+                sentences.append(error.what)
+    assert len(sentences) > 200
+    library = re.compile(
+        "[Ii]nput should|[Vv]alue error|valid (dict|tuple|string|number|integer)|another value"
+    )
+    assert [each for each in sentences if library.search(each)] == []
 
 
 def test_what_is_in_effect_reads_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,6 +49,23 @@ def test_the_exit_code_is_that_of_the_program(ends: str, code: int) -> None:
         assert guard.wait(20) == code
 
 
+def test_what_a_killed_program_leaves_behind_may_finish() -> None:
+    """In a container, its first process ends with the guard, and everything else with that."""
+    child = "import time; time.sleep(0.5); print('last words', flush=True)"
+    program = (
+        "import os, subprocess, sys;"
+        f"subprocess.Popen([sys.executable, '-c', {child!r}]);"
+        "print(os.getpid(), flush=True);"
+        "os.kill(os.getpid(), 9)"
+    )
+    with guarded(program) as guard:
+        first_line(guard)
+        assert guard.wait(20) == 137
+        assert guard.stdout
+        os.set_blocking(guard.stdout.fileno(), False)
+        assert guard.stdout.read() == "last words\n"
+
+
 def test_a_program_that_sends_heartbeats_lives_until_it_is_asked_to_end() -> None:
     with guarded(BEATS.format("")) as guard:
         first_line(guard)

@@ -1,0 +1,89 @@
+"""A program's node in the ROS 2 graph, exactly as long as a `with` block, and message types by name.
+
+Domain, middleware and discovery range come from the environment (ROS_DOMAIN_ID, RMW_IMPLEMENTATION,
+ROS_AUTOMATIC_DISCOVERY_RANGE), as everywhere in ROS 2. The process is left alone: own context, no signal
+handlers, no log files, none of the services of an ordinary node.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from common.errors import UserError
+from common.ros_environment import check_domain
+
+# Programs import this module before others that need rclpy, so that its absence ends in this error.
+try:
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
+    from rclpy.utilities import get_rmw_implementation_identifier
+except ImportError as error:
+    raise UserError(
+        f"ROS 2 can't be used from Python ({error})",
+        "Type: scripts/setup, or source the setup.bash of a ROS 2 installation first",
+    ) from error
+
+
+class TypeMissingError(Exception):
+    """A message type is not installed; the text names the package to install."""
+
+
+def message_class(type_name: str) -> Any:
+    """Returns the Python class of "package/msg/Name".
+
+    Raises:
+        TypeMissingError: the package is not installed, or has no such message.
+    """
+    package, _, name = type_name.split("/")
+    try:
+        return getattr(import_module(f"{package}.msg"), name)
+    except ImportError as error:
+        raise TypeMissingError(
+            f"message type {type_name} is not installed ({error}); install the ROS package {package}"
+        ) from error
+    except AttributeError as error:
+        raise TypeMissingError(f"the installed package {package} has no message {name}") from error
+
+
+def middleware_name() -> str:
+    """Returns the name of the middleware in use: "rmw_fastrtps_cpp" for example."""
+    return str(get_rmw_implementation_identifier())
+
+
+@contextmanager
+def ros_node(name: str, *, parameters: bool = False) -> Iterator[Any]:
+    """Yields a node without services and rosout; it leaves the graph when the block ends.
+
+    Args:
+        name: of the node.
+        parameters: whether others may ask for its parameters, by the usual services.
+
+    Raises:
+        UserError: the environment names an impossible domain, or the middleware can't start.
+    """
+    check_domain()
+    context = Context()
+    try:
+        context.init(args=[], initialize_logging=False)
+    except RuntimeError as error:
+        raise UserError(
+            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION in the environment"
+        ) from error
+    try:
+        node = Node(
+            name,
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=parameters,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
+        try:
+            yield node
+        finally:
+            node.destroy_node()
+    finally:
+        context.shutdown()
+        context.destroy()
