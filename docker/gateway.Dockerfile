@@ -1,4 +1,4 @@
-# The gateway. One switch, ROS: where rclpy comes from.
+# The gateway, and as the target "drive" the drive program. One switch, ROS: where rclpy comes from.
 #   packages  the official ROS 2 image, arm64 and amd64: the robot
 #   wheels    Debian 12 and the Python index's wheels, amd64: tests, and machines without a ROS image
 # Everything above rclpy is the same.
@@ -68,6 +68,7 @@ FROM rclpy-${ROS} AS built
 COPY pyproject.toml README.md LICENSE ./
 COPY common common
 COPY console console
+COPY drive drive
 COPY gateway gateway
 COPY preview preview
 COPY simrobot simrobot
@@ -76,27 +77,50 @@ RUN .cache/tools/bin/python -m hatchling build -t wheel \
  && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
  && .venv/bin/robot-gateway --help > /dev/null
 
-FROM system
+FROM system AS installed
 # What is in the image, for a look at advisories: package and version, one line each.
 RUN dpkg-query --show --showformat '${Package} ${Version}\n' > /usr/share/robot-gateway-packages.txt
 COPY --from=built /opt/robot-gateway/ros /opt/robot-gateway/ros
 COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
+ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    HOME=/tmp
+STOPSIGNAL SIGTERM
+ENTRYPOINT ["tini", "--"]
+
+# The drive program: the same layers, another user and another command.
+FROM installed AS drive
+RUN install -d -m 0700 -o 10003 -g 10000 /tmp /var/lib/robot-drive
+ENV ROBOT_DRIVE_CONFIG=/etc/robot-gateway/drive.yaml \
+    DRIVE__LOG_FORMAT=json \
+    DRIVE__SOCKET=/run/robot-drive/drive.sock \
+    DRIVE__STATE_DIR=/var/lib/robot-drive
+# The group is shared with the gateway, which connects to the socket.
+USER 10003:10000
+HEALTHCHECK --interval=30s --timeout=5s --start-period=30s --retries=3 \
+  CMD ["python", "-m", "drive.health"]
+# The drive program has a guard of its own, which ends its worker; this one ends that guard when it hangs.
+CMD ["python", "-m", "common.guard", "robot-drive", "serve", "--config", "/etc/robot-gateway/drive.yaml"]
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-drive" \
+      org.opencontainers.image.description="Moves a robot for an operator, and stops it on any doubt" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"
+
+FROM installed AS gateway
 # Volumes take over whose these are; so does a tmpfs on /tmp, whatever mode it is given, before runc 1.1.8.
 RUN install -d -m 0700 -o 10001 -g 10000 /tmp /var/lib/robot-gateway/credentials /var/lib/robot-gateway/audit
-ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
-    ROBOT_GATEWAY_CONFIG=/etc/robot-gateway/gateway.yaml \
+ENV ROBOT_GATEWAY_CONFIG=/etc/robot-gateway/gateway.yaml \
     GATEWAY__LOG_FORMAT=json \
     GRPC_VERBOSITY=ERROR \
-    PYTHONDONTWRITEBYTECODE=1 \
-    HOME=/tmp \
     HEALTH_TARGET=127.0.0.1:50051 \
     HEALTH_SERVICE=omniseer.gateway.v1.RobotGateway
 # The group is shared with the preview: it owns the socket between the two.
 USER 10001:10000
-STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=10s --timeout=5s --start-period=20s --retries=3 \
   CMD ["python", "-m", "common.healthcheck"]
-ENTRYPOINT ["tini", "--"]
 # Docker restarts what has ended, not what is unhealthy: the guard ends a program that hangs.
 CMD ["python", "-m", "common.guard", "robot-gateway", "serve", "--config", "/etc/robot-gateway/gateway.yaml"]
 # Last, because they change with every commit and nothing above does.

@@ -33,6 +33,7 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
 COPY pyproject.toml README.md LICENSE ./
 COPY common common
 COPY console console
+COPY drive drive
 COPY gateway gateway
 COPY preview preview
 COPY simrobot simrobot

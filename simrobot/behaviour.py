@@ -5,6 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from common.config_problems import first_problem
 from common.errors import ExitCode, UserError
 
 
@@ -99,11 +100,5 @@ class Behaviour(BaseModel):
         try:
             return Behaviour.model_validate(self.model_dump(mode="json") | fields)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            field = ".".join(str(part) for part in first["loc"])
-            raise UserError(
-                f"behaviour '{field}': {first['msg']}",
-                f"Fields are {', '.join(Behaviour.model_fields)}; "
-                f"topics are {', '.join(topic.value for topic in Topic)}",
-                exit_code=ExitCode.USAGE,
-            ) from error
+            problem = first_problem(error, Behaviour, noun="field").text
+            raise UserError(f"behaviour: {problem}", exit_code=ExitCode.USAGE) from error

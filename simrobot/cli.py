@@ -37,6 +37,14 @@ def run(  # noqa: PLR0917 - typer makes the command line from the signature
         float,
         typer.Option(min=0.0, max=100.0, help="How often a change of the mode is checked for; 0: never."),
     ] = DEFAULT_RATES_HZ[Topic.MODE],
+    base: Annotated[
+        bool,
+        typer.Option(
+            "--base",
+            envvar="SIMROBOT_BASE",
+            help="Follow the velocity commands of the graph, through a mux and a base.",
+        ),
+    ] = False,
     behaviour: Annotated[
         list[str] | None,
         typer.Argument(
@@ -56,16 +64,14 @@ def run(  # noqa: PLR0917 - typer makes the command line from the signature
         **dict.fromkeys(COMMANDS, commands_hz),
     }
 
-    def work() -> None:
-        start = Behaviour().changed(_fields(behaviour or []))
-        check_domain()
-        check_middleware()
-        # Late, so that --help and a wrong option need no ROS 2.
-        from simrobot.app import run_robot  # noqa: PLC0415
+    start = Behaviour().changed(_fields(behaviour or []))
+    check_domain()
+    check_middleware()
+    # Late, so that --help and a wrong option need no ROS 2.
+    from simrobot.app import run_robot  # noqa: PLC0415
 
-        program.run(lambda stop: run_robot(stop, start, rates_hz, control or control_socket.default_path()))
-
-    program.run_to_exit(work)
+    path = control or control_socket.default_path()
+    program.run(lambda stop: run_robot(stop, start, rates_hz, path, with_base=base))
 
 
 class Action(Enum):
@@ -89,12 +95,8 @@ def change(
     detection_count, battery_percent, battery_drain_percent_per_s, commander (keyboard, autonomy, navigation,
     unseen, nobody), mode, components (drive:error,lidar:stale).
     """
-
-    def work() -> None:
-        path = control or control_socket.default_path()
-        print(json.dumps(control_socket.ask(path, _request(action, arguments or [], path)), indent=2))
-
-    program.run_to_exit(work)
+    path = control or control_socket.default_path()
+    print(json.dumps(control_socket.ask(path, _request(action, arguments or [], path)), indent=2))
 
 
 def _request(action: Action, arguments: list[str], path: Path) -> dict[str, Any]:
@@ -135,4 +137,4 @@ def _json_value(name: str, text: str) -> Any:
 
 def main() -> None:
     """Runs the command line."""
-    app()
+    program.run_command_line(app, "simrobot")

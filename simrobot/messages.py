@@ -63,8 +63,10 @@ def odometry(robot: Robot, now_s: float) -> Any:
     pose.orientation.z = math.sin(robot.pose.heading_rad / 2)
     pose.orientation.w = math.cos(robot.pose.heading_rad / 2)
     lost = _nan_if_lost(robot, Topic.ODOMETRY)
-    twist.linear.x = robot.behaviour.speed_mps + lost
-    twist.angular.z = robot.behaviour.turn_rad_s + lost
+    velocity = robot.velocity(now_s)
+    twist.linear.x = velocity.vx_mps + lost
+    twist.linear.y = velocity.vy_mps + lost
+    twist.angular.z = velocity.wz_rad_s + lost
     return message
 
 

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from simrobot.base import Twist
+
 FRAME_WIDTH_PX = 1280
 FRAME_HEIGHT_PX = 720
 
@@ -18,12 +20,13 @@ class Pose:
     y_m: float = 0.0
     heading_rad: float = 0.0
 
-    def drive(self, speed_mps: float, turn_rad_s: float, duration_s: float) -> None:
-        """Moves by `duration_s` at both rates: the midpoint rule, with the heading of half the time."""
-        middle = self.heading_rad + turn_rad_s * duration_s / 2
-        self.x_m += speed_mps * math.cos(middle) * duration_s
-        self.y_m += speed_mps * math.sin(middle) * duration_s
-        self.heading_rad = math.remainder(self.heading_rad + turn_rad_s * duration_s, math.tau)
+    def drive(self, velocity: Twist, duration_s: float) -> None:
+        """Moves by `duration_s` at this velocity: the midpoint rule, with the heading of half the time."""
+        middle = self.heading_rad + velocity.wz_rad_s * duration_s / 2
+        forward_m, left_m = velocity.vx_mps * duration_s, velocity.vy_mps * duration_s
+        self.x_m += forward_m * math.cos(middle) - left_m * math.sin(middle)
+        self.y_m += forward_m * math.sin(middle) + left_m * math.cos(middle)
+        self.heading_rad = math.remainder(self.heading_rad + velocity.wz_rad_s * duration_s, math.tau)
 
 
 @dataclass(frozen=True, slots=True)

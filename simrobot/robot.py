@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from simrobot.base import Base, Twist
 from simrobot.behaviour import Behaviour
 from simrobot.motion import Box, Pose, boxes_at
 
@@ -21,10 +22,12 @@ class Robot:
     Args:
         behaviour: at the start.
         now_s: time of the start.
+        base: that moves it; without one it moves as its behaviour says.
     """
 
-    def __init__(self, behaviour: Behaviour, now_s: float) -> None:
+    def __init__(self, behaviour: Behaviour, now_s: float, base: Base | None = None) -> None:
         self.behaviour = behaviour
+        self._base = base
         self.pose = Pose()
         self._started_s = self._moved_s = now_s
         self._charge_set_s = now_s
@@ -47,9 +50,15 @@ class Robot:
     def advance(self, now_s: float) -> None:
         """Integrates pose and counters up to `now_s`."""
         passed_s = max(0.0, now_s - self._moved_s)
-        self.pose.drive(self.behaviour.speed_mps, self.behaviour.turn_rad_s, passed_s)
+        self.pose.drive(self.velocity(now_s), passed_s)
         self._infer_errors += self.behaviour.infer_errors_per_s * passed_s
         self._moved_s += passed_s
+
+    def velocity(self, now_s: float) -> Twist:
+        """Returns how it moves."""
+        if self._base:
+            return self._base.velocity(now_s)
+        return Twist(vx_mps=self.behaviour.speed_mps, wz_rad_s=self.behaviour.turn_rad_s)
 
     def battery_percent(self, now_s: float) -> float:
         """Returns the remaining charge, 0 to 100."""

@@ -1,0 +1,114 @@
+"""Assembles the guard and the worker, each of them a process."""
+
+import logging
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+from common.ros_node import ros_node
+from drive.base import VelocityPublisher, base
+from drive.config import DriveSettings
+from drive.endpoint import Endpoint
+from drive.guard import Guard, worker_heartbeats, worker_kills, worker_stops
+from drive.machine import OnLoss, State
+from drive.stop_file import StopFile, Stops, read_stops
+from drive.transport import use_udp
+from drive.values import Latch
+from drive.wire import welcome
+from drive.worker import Worker, new_instance_id
+
+_log = logging.getLogger(__name__)
+
+_STOP_FILE: Final = "stop.json"
+_REAL_TIME: Final = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+"""Not for the children: a worker that starts has no deadline to keep."""
+_WORKER_PRIORITY: Final = 10
+_GUARD_PRIORITY: Final = 11
+"""Above the worker's, which it has to end."""
+
+
+def serve(settings: DriveSettings, config_file: Path | None) -> int:
+    """Runs the guard until SIGTERM or SIGINT; returns the exit code.
+
+    Raises:
+        UserError: ROS 2 or the state directory can't be used.
+    """
+    command = [sys.executable, "-m", "drive.cli", "worker"]
+    if config_file:
+        command += ["--config", str(config_file)]
+    path = settings.state_dir / _STOP_FILE
+    stop_file = StopFile(path)
+    use_udp(settings.state_dir)
+    with ros_node("robot_drive_guard") as node:
+        velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
+        guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: guard.stop())
+        _raise_priority(_GUARD_PRIORITY)
+        code = guard.run()
+    stop_file.close()
+    return code
+
+
+def work(settings: DriveSettings) -> None:
+    """Runs the worker, which the guard has started, until SIGTERM.
+
+    Raises:
+        UserError: ROS 2 or the socket can't be used.
+    """
+    rules = settings.rules
+    stops = worker_stops()
+    # Whether anyone may drive is the gateway's to say; until it does, there is no driver.
+    state = State.at_start(time.monotonic_ns(), enabled=False, latch=stops.latch, last_stop_id=stops.last_id)
+    with (
+        worker_heartbeats() as heartbeats,
+        base(settings) as robot_base,
+        Endpoint(settings.socket, welcome(new_instance_id(), rules)) as endpoint,
+    ):
+        worker = Worker(robot_base, endpoint, heartbeats, rules, state, worker_kills=worker_kills())
+
+        def stop(_number: int, _frame: FrameType | None) -> None:
+            worker.stopping = True
+
+        # A terminal sends SIGINT to the worker, too; the guard decides.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, stop)
+        _raise_priority(_WORKER_PRIORITY)
+        _log.info("listening on %s", settings.socket)
+        worker.run()
+    if worker.orphaned:
+        _keep_loss(settings, worker.state)
+
+
+def _keep_loss(settings: DriveSettings, state: State) -> None:
+    """Has the next start find a stop, where a driver lost the robot by the end of the guard.
+
+    Otherwise the guard keeps stops; it has gone.
+    """
+    latch = state.latch
+    if latch is None and state.held_last and settings.on_loss is OnLoss.HOLD:
+        reason = "the guard of robot-drive was lost while a driver had the robot"
+        latch = Latch(state.last_stop_id + 1, "robot-drive", reason)
+    if latch:
+        stop_file = StopFile(settings.state_dir / _STOP_FILE)
+        stop_file.keep(Stops(latch.stop_id, latch))
+        stop_file.close()
+
+
+def _raise_priority(priority: int) -> None:
+    """Asks for real-time priority, which RLIMIT_RTPRIO (`ulimit -r`) permits without privileges.
+
+    For all threads: this one waits for locks of the middleware's, and for the interpreter's lock.
+    """
+    for task in Path("/proc/self/task").iterdir():
+        try:
+            os.sched_setscheduler(int(task.name), _REAL_TIME, os.sched_param(priority))
+        except ProcessLookupError:
+            continue  # It has ended meanwhile.
+        except OSError as error:
+            _log.info("without real-time priority: %s", error.strerror)
+            return

@@ -1,0 +1,96 @@
+"""`robot-drive`: the command line of the drive program."""
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from common import config, logs, program
+from common.check_options import PrintOption, SchemaOption
+from common.findings import exit_code, print_findings
+from drive.config import DriveSettings
+from drive.log_thread import log_in_thread
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, help="Moves the robot for an operator.")
+
+_Config = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        envvar="ROBOT_DRIVE_CONFIG",
+        help="YAML file; default: built-in values and DRIVE__... variables.",
+    ),
+]
+
+# ROS 2 is imported late: without it, checking the configuration still works.
+
+
+@app.command()
+def serve(config_file: _Config = None) -> None:
+    """Serves the gateway until Ctrl-C."""
+    settings = _load(config_file)
+    from drive.app import serve as serve_app  # noqa: PLC0415
+
+    raise typer.Exit(serve_app(settings, config_file))
+
+
+@app.command(hidden=True)
+def worker(config_file: _Config = None) -> None:
+    """Runs the process that `serve` watches."""
+    settings = _load(config_file)
+    from drive.app import work  # noqa: PLC0415
+
+    work(settings)
+
+
+@app.command()
+def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
+    """Checks the configuration and exits."""
+    if schema:
+        print(config.json_schema(DriveSettings))
+        return
+    settings = config.load(DriveSettings, config_file)
+    if in_effect:
+        print(config.as_yaml(settings), end="")
+    else:
+        print(f"{config_file or 'the environment'}: ok")
+
+
+@app.command()
+def doctor(
+    config_file: _Config = None,
+    pulse: Annotated[
+        bool,
+        typer.Option(
+            "--pulse", help="Move the robot forward, by up to 20 cm, to see whether and how it stops."
+        ),
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+) -> None:
+    """Finds out what keeps this robot from being driven, and what stops it; exits 1 if something is wrong."""
+    from drive.doctor.examination import examine  # noqa: PLC0415
+
+    # So that a terminal that is closed ends a pulse with zeros.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    findings = list(examine(config_file, with_pulse=pulse))
+    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
+    raise typer.Exit(int(exit_code(findings)))
+
+
+def main() -> None:
+    """Entry point."""
+    program.run_command_line(app, "robot-drive")
+
+
+def _load(config_file: Path | None) -> DriveSettings:
+    settings = config.load(DriveSettings, config_file)
+    logs.configure(settings.log_level, settings.log_format)
+    log_in_thread()
+    return settings
+
+
+if __name__ == "__main__":
+    main()

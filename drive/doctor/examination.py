@@ -1,0 +1,59 @@
+"""`robot-drive doctor`: the program, the graph, and on request a short motion."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from common.config import load
+from common.errors import UserError
+from common.findings import Finding, good, note, wrong
+from drive.client import observed_state
+from drive.config import DriveSettings
+from drive.doctor.judgement import graph_findings, program_findings, pulse_findings
+from omniseer.drive.v1 import drive_pb2 as pb
+
+_AT_REST = frozenset({pb.PHASE_DISABLED, pb.PHASE_AVAILABLE})
+
+
+def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:
+    """Yields the findings on this machine.
+
+    Args:
+        config_file: of the program.
+        with_pulse: whether the robot may be moved, forward by a few centimetres.
+    """
+    try:
+        settings = load(DriveSettings, config_file)
+    except UserError as error:
+        yield wrong("config", error.what, "robot-drive does not start", error.remedy)
+        return
+    yield good("config", f"{config_file or 'the environment'}: ok")
+    state = None
+    try:
+        state = observed_state(settings.socket)
+        yield from program_findings(state)
+    except UserError as error:
+        yield note("drive", error.what, "Driving is impossible", error.remedy)
+    try:
+        yield from _graph(settings, state, with_pulse=with_pulse)
+    except UserError as error:
+        yield wrong("ros", error.what, "Without ROS 2 nothing can be driven", error.remedy)
+
+
+def _graph(settings: DriveSettings, state: pb.ActualState | None, *, with_pulse: bool) -> Iterator[Finding]:
+    # Late: without ROS 2 the rest is still examined.
+    from common.ros_node import ros_node  # noqa: PLC0415
+    from drive.doctor.graph import look, pulse  # noqa: PLC0415
+
+    with ros_node("robot_drive_doctor") as node:
+        yield from graph_findings(look(node, settings))
+        if not with_pulse:
+            return
+        if state and state.phase not in _AT_REST:
+            yield note(
+                "pulse",
+                "the pulse was left out: a driver has the robot, or it was stopped",
+                "Two sources on one input would mix",
+                "Try again when no driver has the robot and no stop is latched",
+            )
+            return
+        yield from pulse_findings(pulse(node, settings))

@@ -1,0 +1,135 @@
+"""Looks at the graph for the doctor, and moves the robot a little where that was asked for."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from rclpy.executors import SingleThreadedExecutor
+
+from drive.base import OBSERVERS, VelocityPublisher, is_still, newest, subscribe, velocity_of
+from drive.config import DriveSettings
+from drive.doctor.facts import GraphFacts, PulseFacts, TopicFacts
+from drive.values import ZERO, Velocity
+
+DISCOVERY_S: Final = 3.0
+_LISTEN_S: Final = 1.0
+_POLL_S: Final = 0.02
+_PARAMETER_S: Final = 1.0
+_TIMEOUTS: Final = ("reference_timeout", "cmd_vel_timeout")
+"""Of the mecanum and the differential drive controllers of ros2_controllers, in seconds; 0 is none."""
+PULSE_MPS: Final = 0.05
+_PULSE_S: Final = 0.5
+_SILENCE_S: Final = 3.0
+_DOUBLE: Final = 3
+"""rcl_interfaces/msg/ParameterType.PARAMETER_DOUBLE."""
+
+
+def look(node: Any, settings: DriveSettings) -> GraphFacts:
+    """Returns what the graph shows, after discovery and a second of listening at the base."""
+    mux_output = settings.mux_output
+    listening = subscribe(node, mux_output.type, mux_output.topic) if mux_output else None
+    time.sleep(DISCOVERY_S - _LISTEN_S)  # Polled as well, a missing node would take all of it.
+    motions = 0
+
+    def listen() -> bool:
+        nonlocal motions
+        message = newest(listening)
+        motions += message is not None and velocity_of(message) != ZERO
+        return False
+
+    _poll(listen, _LISTEN_S)
+    if listening:
+        node.destroy_subscription(listening)  # An executor spins the node below.
+    reaching = _topic(node, mux_output.topic, mux_output.type) if mux_output else None
+    return GraphFacts(
+        outputs=[_topic(node, output.topic, output.type) for output in settings.outputs],
+        mux_output=reaching,
+        lock=_topic(node, settings.lock_topic, "std_msgs/msg/Bool") if settings.lock_topic else None,
+        stops=[_topic(node, topic, "std_msgs/msg/Bool") for topic in settings.stop_topics],
+        odometry=_topic(node, settings.odometry, "nav_msgs/msg/Odometry") if settings.odometry else None,
+        timeouts=_timeouts(node, reaching.subscribers) if reaching else {},
+        foreign_motion=motions,
+    )
+
+
+def pulse(node: Any, settings: DriveSettings) -> PulseFacts:
+    """Moves the robot forward for half a second, then says nothing, and watches when it stops.
+
+    It ends with zeros, whatever happens: at the latest the silence ends with them.
+    """
+    odometry = subscribe(node, "nav_msgs/msg/Odometry", settings.odometry) if settings.odometry else None
+    velocities = VelocityPublisher(node, settings.outputs, lock_topic=None)
+    fastest: float | None = None
+    still = False
+
+    def watch() -> bool:
+        nonlocal fastest, still
+        if message := newest(odometry):
+            measured = velocity_of(message.twist)
+            fastest = max(fastest or 0.0, measured.linear_mps)
+            still = is_still(measured)
+        return still
+
+    def move() -> bool:
+        velocities.publish(Velocity(vx_mps=PULSE_MPS))
+        watch()
+        return False
+
+    _poll(lambda: velocities.matched() > 0, DISCOVERY_S)
+    try:
+        _poll(move, _PULSE_S)
+        last_s = time.monotonic()
+        stopped = _poll(watch, _SILENCE_S)
+        stopped_after_s = time.monotonic() - last_s if stopped else None
+    finally:
+        velocities.publish(ZERO)
+        velocities.wait_until_acknowledged()
+    return PulseFacts(PULSE_MPS, fastest, stopped_after_s)
+
+
+def _poll(done: Callable[[], bool], for_s: float) -> bool:
+    """Calls `done` until it returns true or time is up; returns which. Nothing here is spun."""
+    end_s = time.monotonic() + for_s
+    while time.monotonic() < end_s:
+        if done():
+            return True
+        time.sleep(_POLL_S)
+    return False
+
+
+def _topic(node: Any, name: str, type_name: str) -> TopicFacts:
+    publishers = _foreign(node.get_publishers_info_by_topic(name))
+    subscribers = _foreign(node.get_subscriptions_info_by_topic(name))
+    return TopicFacts(
+        name,
+        type_name,
+        publishers=tuple(dict.fromkeys(each.node_name for each in publishers)),
+        subscribers=tuple(dict.fromkeys(each.node_name for each in subscribers)),
+        types=frozenset(each.topic_type for each in (*publishers, *subscribers)),
+    )
+
+
+def _foreign(found: list[Any]) -> list[Any]:
+    return [each for each in found if each.node_name not in OBSERVERS]
+
+
+def _timeouts(node: Any, names: tuple[str, ...]) -> dict[str, float]:
+    """Asks the base's nodes for the parameters that name a timeout."""
+    from rcl_interfaces.srv import GetParameters  # noqa: PLC0415
+
+    found = {}
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    for name in names:
+        client = node.create_client(GetParameters, f"/{name}/get_parameters")
+        # One by one: a name that the node does not know leaves the whole answer empty.
+        for parameter in _TIMEOUTS if client.wait_for_service(timeout_sec=_PARAMETER_S) else ():
+            future = client.call_async(GetParameters.Request(names=[parameter]))
+            executor.spin_until_future_complete(future, timeout_sec=_PARAMETER_S)
+            for value in future.result().values if future.done() else ():
+                if value.type == _DOUBLE:
+                    found[f"{name}: {parameter}"] = value.double_value
+        node.destroy_client(client)
+    executor.remove_node(node)
+    executor.shutdown()
+    return found

@@ -1,0 +1,55 @@
+"""Times of motion, for the audit log: who, how long, how far, why it ended. Pure."""
+
+from dataclasses import dataclass, replace
+
+from drive.machine import State
+from drive.phases import Phase
+from drive.values import ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A time of motion, from a hold to its end.
+
+    Attributes:
+        episode_id: counts up from 1.
+        holder: who drove, for people.
+        ended_ns: 0 while it lasts.
+        distance_m, turned_rad: as commanded, which is not as measured.
+        ended_by: for people; empty while it lasts.
+    """
+
+    episode_id: int
+    holder: str
+    started_ns: int
+    ended_ns: int = 0
+    distance_m: float = 0.0
+    turned_rad: float = 0.0
+    ended_by: str = ""
+
+
+def followed(last: Episode | None, before: State, after: State, now_ns: int) -> Episode | None:
+    """Returns the newest episode after a step of the machine; None before the first."""
+    driving = after.phase is Phase.DRIVING
+    if driving and before.phase is not Phase.DRIVING:
+        holder = after.lease.holder if after.lease else ""
+        return Episode(last.episode_id + 1 if last else 1, holder, now_ns)
+    if before.phase is not Phase.DRIVING or last is None:
+        return last
+    velocity, elapsed_s = before.output or ZERO, (now_ns - before.output_ns) / 1e9
+    last = replace(
+        last,
+        distance_m=last.distance_m + velocity.linear_mps * elapsed_s,
+        turned_rad=last.turned_rad + abs(velocity.wz_rad_s) * elapsed_s,
+    )
+    return last if driving else replace(last, ended_ns=now_ns, ended_by=_why(after))
+
+
+def _why(after: State) -> str:
+    if after.latch:
+        return f"stopped by {after.latch.by}" + (f": {after.latch.reason}" if after.latch.reason else "")
+    if after.inhibits:
+        return "; ".join(sorted(inhibit.value for inhibit in after.inhibits))
+    if not after.enabled:
+        return "driving was disabled"
+    return "released" if after.lease else "the session ended"

@@ -1,0 +1,117 @@
+"""A stop that outlives the program, and the number of the last one: one small file.
+
+A latched stop may have locked the robot's multiplexer, which stays locked when the program ends; and a person
+who stops the robot does not mean "until the next restart". Numbers go on, so that a reset of an old stop
+never meets a new one.
+"""
+
+import json
+import logging
+import threading
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from common.errors import UserError
+from common.private_files import make_own_directory, write_private
+from drive.values import Latch
+
+_log = logging.getLogger(__name__)
+
+_CLOSE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stops:
+    """What is known of stops.
+
+    Attributes:
+        last_id: number of the newest, reset or not. 0 before the first.
+        latch: the stop in force; None without one.
+    """
+
+    last_id: int = 0
+    latch: Latch | None = None
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> "Stops":
+        """Returns the stops that `as_json` has described.
+
+        Raises:
+            ValueError, TypeError, KeyError: the text is no such description.
+        """
+        fields: Any = json.loads(text)
+        latch = fields["latch"] and Latch(
+            int(fields["latch"]["stop_id"]), str(fields["latch"]["by"]), str(fields["latch"]["reason"])
+        )
+        return cls(int(fields["last_id"]), latch or None)
+
+    def as_json(self) -> str:
+        """Returns the description for the file and for the worker."""
+        return json.dumps(asdict(self))
+
+
+def read_stops(path: Path) -> Stops:
+    """Returns what the file says; no stop if there is no file.
+
+    A file that can't be read counts as a stop: doubt stops the robot.
+    """
+    try:
+        return Stops.from_json(path.read_bytes())
+    except FileNotFoundError:
+        return Stops()
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        return Stops(
+            1, Latch(1, "robot-drive", f"{path} can't be read ({error}): there may have been a stop")
+        )
+
+
+class StopFile:
+    """Writes stops in a thread of its own: a slow disk delays nothing. Only the newest counts.
+
+    Args:
+        path: of the file; its directory is made this user's own.
+
+    Raises:
+        UserError: the directory can't be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            make_own_directory(path.parent)
+        except OSError as error:
+            raise UserError(
+                f"{path.parent} can't be used: {error.strerror}",
+                "Set `state_dir` to a directory of this user",
+            ) from error
+        self._path = path
+        self._changed = threading.Condition()
+        self._newest = self._taken = read_stops(path)
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="stop-file", daemon=True)
+        self._thread.start()
+
+    def keep(self, stops: Stops) -> None:
+        """Has the stops written, unless they are those that were written last."""
+        with self._changed:
+            self._newest = stops
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Waits until everything is written; a disk that hangs is given up."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join(_CLOSE_S)
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._newest != self._taken)
+                if self._newest == self._taken:
+                    return
+                self._taken = self._newest
+            try:
+                write_private(self._path, self._taken.as_json().encode())
+            except UserError as error:
+                _log.error("the stop is not kept over a restart: %s", error)

@@ -1,0 +1,70 @@
+"""How Fast DDS carries the velocities: over UDP, never through shared memory.
+
+The shared-memory transport of Fast DDS 2.14 waits for up to a second for the port of a process that has just
+joined or ended (SharedMemGlobal::open_port_internal), and holds a lock meanwhile that each message of this
+process needs. A node that starts anywhere on the robot would stop the robot.
+"""
+
+import os
+from pathlib import Path
+from typing import Final
+
+from common.errors import UserError
+
+_CHOSEN: Final = ("FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE")
+"""Environment variables by which others choose transports; their choice counts."""
+_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_PORTS: Final = 32
+"""Participants on this machine that are found; as with ROS 2's own range LOCALHOST."""
+_LOCALHOST_OVER_UDP: Final = f"""\
+<?xml version="1.0" encoding="UTF-8"?>
+<profiles xmlns="http://www.eprosima.com">
+  <transport_descriptors>
+    <transport_descriptor>
+      <transport_id>udp</transport_id>
+      <type>UDPv4</type>
+      <maxInitialPeersRange>{_PORTS}</maxInitialPeersRange>
+    </transport_descriptor>
+  </transport_descriptors>
+  <participant profile_name="localhost_over_udp" is_default_profile="true">
+    <rtps>
+      <builtin>
+        <metatrafficUnicastLocatorList><locator/></metatrafficUnicastLocatorList>
+        <initialPeersList>
+          <locator><udpv4><address>127.0.0.1</address></udpv4></locator>
+        </initialPeersList>
+      </builtin>
+      <userTransports><transport_id>udp</transport_id></userTransports>
+      <useBuiltinTransports>false</useBuiltinTransports>
+    </rtps>
+  </participant>
+</profiles>
+"""
+"""What rmw_fastrtps sets for the range LOCALHOST, without the shared memory that it adds to any profile."""
+
+
+def use_udp(directory: Path) -> None:
+    """Has the nodes of this process and of its children use UDP; must be called before the first.
+
+    Other middlewares ignore it.
+
+    Args:
+        directory: for a file of profiles.
+
+    Raises:
+        UserError: the file can't be written.
+    """
+    if any(os.environ.get(name) for name in _CHOSEN):
+        return
+    if os.environ.get(_RANGE, "").upper() != "LOCALHOST":
+        os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
+        return
+    profiles = directory / "fastdds.xml"
+    try:
+        profiles.write_text(_LOCALHOST_OVER_UDP, encoding="utf-8")
+    except OSError as error:
+        raise UserError(
+            f"{profiles} can't be written ({error.strerror})", "Make state_dir writable"
+        ) from error
+    os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profiles)
+    os.environ[_RANGE] = "SYSTEM_DEFAULT"

@@ -1,0 +1,92 @@
+"""robot-drive on the command line, against a real graph."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.driving import Driving
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+
+def robot_drive(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return run("drive.cli", *words, **environment)
+
+
+def health(**environment: str) -> subprocess.CompletedProcess[str]:
+    return run("drive.health", **environment)
+
+
+def run(module: str, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", module, *words],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def findings(done: subprocess.CompletedProcess[str]) -> dict[str, dict[str, str]]:
+    return {each["check"]: each for each in json.loads(done.stdout)["findings"]}
+
+
+def test_the_doctor_finds_mux_base_and_timeout_and_measures_what_a_pulse_does(robot: Driving) -> None:
+    robot.ready()
+    config = str(robot.directory / "drive.yaml")
+    done = robot_drive("doctor", "--config", config, "--pulse", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = findings(done)
+    assert "twist_mux" in found["mux/cmd_vel_keyboard"]["what"]
+    assert "mecanum_drive_controller" in found["base"]["what"]
+    assert "stops 1 s after" in found["base.timeout"]["what"]
+    assert found["pulse"]["verdict"] == "good"
+    measured_s = float(found["pulse.timeout"]["what"].split()[3])
+    assert 0.9 <= measured_s <= 1.5
+    robot.settled()
+    assert not robot.witness.moves(), "it ends with a zero"
+
+
+def test_the_doctor_moves_nothing_while_a_driver_has_the_robot(robot: Driving) -> None:
+    robot.drive()
+    done = robot_drive("doctor", "--config", str(robot.directory / "drive.yaml"), "--pulse", "--json")
+    assert "left out" in findings(done)["pulse"]["what"]
+    assert robot.state().phase
+
+
+def test_the_health_check_follows_the_program(robot: Driving) -> None:
+    robot.ready()
+    config = str(robot.directory / "drive.yaml")
+    healthy = health(ROBOT_DRIVE_CONFIG=config)
+    assert (healthy.returncode, healthy.stdout.split()[-1]) == (0, "available")
+    gone = health(DRIVE__SOCKET="/nonexistent/x")
+    assert gone.returncode == 1
+    assert "no drive program answers" in gone.stderr
+
+
+def test_without_a_robot_the_doctor_says_what_is_missing(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    done = robot_drive("doctor", "--json", DRIVE__SOCKET=str(tmp_path / "x.sock"))
+    assert done.returncode == 1
+    found = findings(done)
+    assert found["drive"]["verdict"] == "note"
+    assert found["mux/cmd_vel_keyboard"]["verdict"] == "wrong"
+    assert found["base"]["verdict"] == "wrong"
+
+
+def test_check_prints_what_is_in_effect(tmp_path: Path) -> None:
+    file = tmp_path / "drive.yaml"
+    file.write_text("limits: {vx_mps: 0.2}", encoding="utf-8")
+    assert "vx_mps: 0.2\n" in robot_drive("check", "--config", str(file), "--print").stdout
+    assert robot_drive("check", "--config", str(file), DRIVE__LIMITS__VX_MPS="fast").returncode == 2
+    refused = robot_drive("serve", DRIVE__SOCKET="/nonexistent/x.sock")
+    assert refused.returncode == 1
+    assert "/nonexistent" in refused.stderr
+    file.write_text("outputs: []", encoding="utf-8")
+    refused = robot_drive("serve", "--config", str(file))
+    assert refused.returncode == 2
+    assert len(refused.stderr.strip().splitlines()) == 1

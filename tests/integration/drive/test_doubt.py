@@ -1,0 +1,207 @@
+"""Old commands, other sources, a missing base, and every way that driving ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.drive_peer import Instants
+from tests.support.driving import Driving, driving
+from tests.support.promise import keeps
+from tests.support.waiting import wait_until
+
+# Timed: a machine that does other things makes the robot stop without need, which is right and fails a test.
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+VALID_MS = 250
+ON_THE_WAY_MS = 40
+"""From the end of a command's validity to its last motion behind the mux, on a busy machine."""
+
+
+def oldest_command_ms(robot: Driving, since_ns: int) -> float:
+    """Returns how old the newest held command was, at most, when motion reached the base."""
+    assert robot.peer
+    held = Instants.held_ns(robot.peer.path)
+    ages_ns = [
+        moved_ns - max(sent_ns for sent_ns in held if sent_ns <= moved_ns)
+        for moved_ns in robot.witness.motion_since(since_ns)
+    ]
+    return max(ages_ns, default=0) / 1e6
+
+
+def test_blackouts_of_300_ms_do_not_move_the_robot_again_by_themselves(robot: Driving) -> None:
+    def blackout() -> float:
+        peer = robot.drive()
+        since_ns = time.monotonic_ns()
+        peer.tell(silent=True)
+        robot.phase_is("INHIBITED")
+        time.sleep(0.05)
+        peer.tell(silent=False)  # The driver still holds.
+        episode = robot.state().episode.episode_id
+        time.sleep(0.3)
+        assert robot.state().episode.episode_id == episode
+        peer.tell(held=False)
+        robot.phase_is("ARMED", "INHIBITED")
+        robot.settled()
+        return oldest_command_ms(robot, since_ns)
+
+    for _ in range(5):
+        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", blackout)
+
+
+@pytest.mark.parametrize("who", ["gateway", "drive"])
+def test_frozen_and_thawed_again_and_again_nothing_old_moves(robot: Driving, who: str) -> None:
+    """With the gateway, or with both processes of the drive program, whose socket fills meanwhile."""
+
+    def freeze_and_thaw() -> float:
+        peer = robot.drive()
+        since_ns = time.monotonic_ns()
+        assert robot.guard
+        frozen = (
+            [psutil.Process(peer.process.pid)]
+            if who == "gateway"
+            else [robot.worker, psutil.Process(robot.guard.pid)]
+        )
+        for process in frozen:
+            process.suspend()
+        time.sleep(0.3)
+        episode = robot.observer.state() if who == "gateway" else None
+        for process in reversed(frozen):
+            process.resume()
+        time.sleep(0.1)
+        if episode:
+            assert robot.state().episode.episode_id == episode.episode.episode_id
+        peer.tell(held=False)
+        robot.settled()
+        return oldest_command_ms(robot, since_ns)
+
+    for _ in range(20):
+        keeps(VALID_MS + ON_THE_WAY_MS, "age of a command that moves, ms", freeze_and_thaw)
+
+
+def test_another_source_of_higher_priority_stops_us(robot: Driving) -> None:
+    robot.drive()
+    robot.robot.change(commander="unseen", speed_mps=0.2)
+    try:
+        state = robot.phase_is("INHIBITED")
+        assert list(state.inhibits) == [pb.INHIBIT_OUTRANKED]
+    finally:
+        robot.robot.change(commander="nobody")
+    robot.settled()
+
+
+def test_without_a_base_nothing_is_driven(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    with driving(tmp_path) as robot:
+        robot.drive()
+        robot.robot.process.terminate()
+        state = robot.phase_is("INHIBITED")
+        assert set(state.inhibits) & {pb.INHIBIT_BASE_ABSENT, pb.INHIBIT_OUTRANKED}
+        state = wait_until(
+            lambda: state if pb.INHIBIT_BASE_ABSENT in (state := robot.state()).inhibits else None, "no base"
+        )
+        assert "nothing takes the velocities on /cmd_vel_keyboard" in state.problems
+
+
+def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
+    """Zeros mask a source of lower priority while a driver has the lease, and not afterwards."""
+    robot.settled()
+    robot.robot.change(commander="autonomy", speed_mps=0.2, turn_rad_s=0)
+    try:
+        peer = robot.ready()
+        wait_until(lambda: robot.witness.seen[-1][1] == pytest.approx(0.2), "autonomy drives")
+        peer.tell(lease="anna", held=False)
+        wait_until(lambda: not robot.witness.moves(), "it is masked")
+        peer.tell(end="CLOSED")
+        wait_until(lambda: robot.witness.seen[-1][1] == pytest.approx(0.2), "autonomy drives again")
+        began_ns = time.monotonic_ns()
+        peer.tell(stop="ben")
+        robot.phase_is("STOPPED")
+        robot.settled()
+        assert robot.witness.zero_after_ms(began_ns) < 1000
+        robot.settled()
+    finally:
+        robot.robot.change(commander="nobody", speed_mps=0.0)
+
+
+def _tell(**line: Any) -> Callable[[Driving], None]:
+    def tell(robot: Driving) -> None:
+        assert robot.peer
+        robot.peer.tell(**line)
+
+    return tell
+
+
+def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
+    def send(robot: Driving) -> None:
+        assert robot.guard
+        assert robot.peer
+        pid = {"gateway": robot.peer.process.pid, "worker": robot.worker.pid, "guard": robot.guard.pid}[who]
+        os.kill(pid, number)
+        if who == "guard":
+            robot.guard.wait(10)
+
+    return send
+
+
+ENDINGS = {
+    "released": _tell(held=False),
+    "stopped": _tell(stop="ben"),
+    "disabled": _tell(enabled=False),
+    "closed": _tell(end="CLOSED"),
+    "access ended": _tell(end="ACCESS_ENDED"),
+    "taken over": _tell(lease="ben"),
+    "gateway killed": _signal("gateway", signal.SIGKILL),
+    "gateway frozen": _signal("gateway", signal.SIGSTOP),
+    "worker killed": _signal("worker", signal.SIGKILL),
+    "worker frozen": _signal("worker", signal.SIGSTOP),
+    "worker terminated": _signal("worker", signal.SIGTERM),
+    "ended": _signal("guard", signal.SIGTERM),
+    "interrupted": _signal("guard", signal.SIGINT),
+    "guard killed": _signal("guard", signal.SIGKILL),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_whatever_ends_it_the_last_message_is_zero(robot: Driving, ending: str) -> None:
+    robot.drive()
+    ENDINGS[ending](robot)
+    robot.settled()
+    assert robot.witness.seen
+    assert not robot.witness.moves()
+
+
+def test_a_terminal_that_reads_nothing_keeps_no_zero_back(tmp_path: Path, ros_domain: int) -> None:  # noqa: ARG001
+    """Standard error is a full pipe: whoever logs there would stand still before the zeros."""
+    reader, writer = os.pipe()
+    with driving(tmp_path) as robot:
+        assert robot.guard
+        robot.guard.terminate()
+        robot.guard.wait()
+        robot.observer.close()
+        os.set_blocking(writer, False)
+        try:
+            while True:
+                os.write(writer, b"x" * 4096)
+        except BlockingIOError:
+            os.set_blocking(writer, True)
+        config = tmp_path / "drive.yaml"
+        robot.guard = subprocess.Popen(
+            [sys.executable, "-m", "drive.cli", "serve", "--config", str(config)], stderr=writer
+        )
+        os.close(writer)
+        wait_until(robot.observer.state, "the drive program serves", 30)
+        robot.drive()
+        began_ns = time.monotonic_ns()
+        os.kill(robot.worker.pid, signal.SIGSTOP)
+        robot.settled()
+        assert robot.witness.zero_after_ms(began_ns) < 1000
+        robot.close()
+    os.close(reader)

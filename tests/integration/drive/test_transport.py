@@ -1,0 +1,38 @@
+"""The drive program without shared memory: nodes that join and leave don't delay a velocity."""
+
+from pathlib import Path
+
+import psutil
+import pytest
+
+from common.ros_node import ros_node
+from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.driving import driving
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+
+JOINING = 12
+
+
+def threads(process: psutil.Process) -> set[str]:
+    return {path.read_text().strip() for path in Path(f"/proc/{process.pid}/task").glob("*/comm")}
+
+
+def test_nodes_that_join_and_leave_do_not_stop_the_robot(
+    tmp_path: Path,
+    ros_domain: int,  # noqa: ARG001  # for its effect
+) -> None:
+    with driving(tmp_path) as robot:
+        assert robot.guard
+        for process in (psutil.Process(robot.guard.pid), robot.worker):
+            names = threads(process)
+            assert any(name.startswith("dds.udp") for name in names)
+            assert not any(name.startswith("dds.shm") for name in names)
+        robot.drive()
+        for number in range(JOINING):
+            with ros_node(f"visitor_{number}"):
+                assert robot.state().phase == pb.PHASE_DRIVING
+        state = robot.state()
+        assert state.phase == pb.PHASE_DRIVING
+        assert not state.HasField("stop")
+        assert state.counters.worker_kills == 0

@@ -1,0 +1,177 @@
+"""The guard, with small programs for workers: what it publishes, when it kills, what it keeps."""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from drive.guard import Guard
+from drive.machine import OnLoss
+from drive.stop_file import StopFile, Stops, read_stops
+from drive.values import ZERO, Latch, Velocity
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).parents[3]
+BEATS = """
+import os, signal, socket, sys, time
+from omniseer.drive.v1 import drive_pb2 as pb
+started, then = sys.argv[1], sys.argv[2]
+def begin():
+    with open(started, "a") as file:
+        file.write(str(os.getpid()) + "\\n")
+if then == "crash" and os.path.exists(started):
+    begin()
+    sys.exit(3)
+beats = socket.socket(fileno=int(os.environ["DRIVE_HEARTBEATS"]))
+if then == "ignore":
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+phase = pb.PHASE_AVAILABLE if then == "rest" else pb.PHASE_DRIVING
+for number in range(1_000_000):
+    if number == 20 or then == "garbage":
+        begin()
+    beats.send(b"\\xff\\xff" if then == "garbage" else pb.ActualState(phase=phase).SerializeToString())
+    time.sleep(0.01)
+"""
+
+
+@dataclass
+class Zeros:
+    """The guard's publisher."""
+
+    at_s: list[float] = field(default_factory=list)
+
+    def publish(self, velocity: Velocity) -> None:
+        assert velocity == ZERO
+        self.at_s.append(time.monotonic())
+
+    def wait_until_acknowledged(self) -> None:
+        pass
+
+    def since(self, began_s: float) -> list[float]:
+        return [at_s - began_s for at_s in self.at_s if at_s >= began_s]
+
+
+@dataclass
+class Running:
+    guard: Guard
+    zeros: Zeros
+    started: Path
+    stop_file: Path
+
+    def pids(self) -> list[int]:
+        return [int(line) for line in self.started.read_text().split()] if self.started.exists() else []
+
+    def worker(self, count: int = 1) -> int:
+        """The process ID of the newest of so many workers, once it has sent heartbeats for a while."""
+        wait_until(lambda: len(self.pids()) >= count, f"{count} workers")
+        return self.pids()[-1]
+
+
+@contextmanager
+def guarding(
+    tmp_path: Path, then: str, on_loss: OnLoss = OnLoss.HOLD, stops: Stops | None = None
+) -> Iterator[Running]:
+    path = tmp_path / "stop.json"
+    stop_file, zeros = StopFile(path), Zeros()
+    started = tmp_path / "started"
+    command = [sys.executable, "-c", BEATS, str(started), then]
+    guard = Guard(command, zeros, on_loss, stop_file, stops or Stops())
+    thread = threading.Thread(target=guard.run)
+    thread.start()
+    try:
+        yield Running(guard, zeros, started, path)
+    finally:
+        guard.stop()
+        thread.join(10)
+        assert not thread.is_alive()
+        stop_file.close()
+
+
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT}:{ROOT / 'proto/python'}")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_lost_worker_means_zeros_until_the_next_one_has_the_robot(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    with guarding(tmp_path, "beat") as running:
+        lost = running.worker()
+        began_s = time.monotonic()
+        os.kill(lost, number)
+        wait_until(lambda: running.zeros.since(began_s), "zeros")
+        wait_until(lambda: len(running.pids()) > 1, "the next worker")
+        zeros = running.zeros.since(began_s)
+        assert zeros[0] < 1.0
+        assert max(b - a for a, b in pairwise(zeros)) < 0.5
+    latch = read_stops(running.stop_file).latch
+    assert latch is None or latch.by == "robot-drive"
+
+
+def test_zeros_go_on_while_the_next_workers_fail(tmp_path: Path) -> None:
+    with guarding(tmp_path, "crash") as running:
+        lost = running.worker()
+        began_s = time.monotonic()
+        os.kill(lost, signal.SIGKILL)
+        wait_until(lambda: len(running.pids()) >= 4, "three attempts")
+        zeros = running.zeros.since(began_s)
+        assert zeros[-1] > 0.6, "beyond the first attempt"
+        assert read_stops(running.stop_file).latch == Latch(
+            1, "robot-drive", "its worker was lost while a driver had the robot"
+        )
+
+
+def test_hand_back_ends_the_zeros(tmp_path: Path) -> None:
+    with guarding(tmp_path, "crash", OnLoss.HAND_BACK) as running:
+        lost = running.worker()
+        began_s = time.monotonic()
+        os.kill(lost, signal.SIGKILL)
+        wait_until(lambda: len(running.pids()) >= 5, "four attempts", 20)
+        zeros = running.zeros.since(began_s)
+        assert 0.3 < zeros[-1] < 0.6
+    assert read_stops(running.stop_file).latch is None
+
+
+def test_a_worker_that_nobody_drives_with_is_replaced_without_a_word(tmp_path: Path) -> None:
+    with guarding(tmp_path, "rest") as running:
+        os.kill(running.worker(), signal.SIGKILL)
+        running.worker(2)
+        assert not running.zeros.at_s
+
+
+def test_what_is_no_heartbeat_ends_the_worker_and_not_the_guard(tmp_path: Path) -> None:
+    with guarding(tmp_path, "garbage") as running:
+        wait_until(lambda: len(running.pids()) >= 3, "three attempts", 20)
+
+
+def test_a_worker_that_ignores_its_end_is_killed(tmp_path: Path) -> None:
+    with guarding(tmp_path, "ignore") as running:
+        running.worker()
+        began_s = time.monotonic()
+        for _ in range(100):
+            running.guard.stop()
+    assert time.monotonic() - began_s < 6
+    assert running.zeros.since(began_s), "the last is zero"
+
+
+def test_a_worker_that_refuses_to_start_ends_the_guard(tmp_path: Path) -> None:
+    stop_file = StopFile(tmp_path / "stop.json")
+    command = [sys.executable, "-c", "raise SystemExit(2)"]
+    assert Guard(command, Zeros(), OnLoss.HOLD, stop_file, Stops()).run() == 2
+    stop_file.close()
+
+
+def test_the_number_of_the_last_stop_is_kept(tmp_path: Path) -> None:
+    with guarding(tmp_path, "crash", stops=Stops(7)) as running:
+        os.kill(running.worker(), signal.SIGKILL)
+        wait_until(running.stop_file.exists, "the stop is kept")
+        wait_until(lambda: read_stops(running.stop_file).last_id == 8, "with the next number")

@@ -1,0 +1,327 @@
+"""Whatever happens in whatever order: when the robot may move, and how fast."""
+
+from dataclasses import replace
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from drive.machine import (
+    Enable,
+    EndLease,
+    Event,
+    GrantLease,
+    Observe,
+    OnLoss,
+    Reset,
+    Rules,
+    State,
+    Stop,
+    Tick,
+    step,
+)
+from drive.phases import Phase
+from drive.shaping import Limits, approached, limited, supervised
+from drive.values import MS, ZERO, Command, Lease, LeaseEnd, Supervision, Surroundings, Velocity
+
+SESSIONS = ("s1", "s2", "s3")
+speeds = st.floats(-2, 2)
+velocities = st.builds(Velocity, speeds, speeds, speeds)
+offsets_ms = st.integers(-800, 800)
+FLAWS = (
+    "",
+    "",
+    "",
+    "",
+    "echo",
+    "echo ahead",
+    "picture",
+    "picture ahead",
+    "none",
+    "expired",
+    "other",
+    "repeated",
+    "nan",
+    "infinite",
+    "forever",
+)
+
+
+def _flawed(flaw: str, now_ns: int) -> dict[str, Any]:
+    """Returns what is wrong with a command."""
+    flaws: dict[str, dict[str, Any]] = {
+        "echo": {"echo_ns": now_ns - 450 * MS},
+        "echo ahead": {"echo_ns": now_ns + 1000 * MS},
+        "picture": {"picture_ns": now_ns - 650 * MS},
+        "picture ahead": {"picture_ns": now_ns + 1000 * MS},
+        "none": {"picture_ns": 0},
+        "expired": {"valid_until_ns": now_ns - 1},
+        "forever": {"valid_until_ns": now_ns + 10**18},
+        "other": {"session_id": "s3"},
+        "nan": {"velocity": Velocity(vx_mps=float("nan"))},
+        "infinite": {"velocity": Velocity(wz_rad_s=float("inf"))},
+    }
+    return flaws.get(flaw, {})
+
+
+class Driving(RuleBasedStateMachine):
+    """Feeds events, and judges every state by what was fed: the model keeps the newest facts itself."""
+
+    @initialize(on_loss=st.sampled_from(OnLoss), ramp_s=st.sampled_from([0.0, 0.2]), enabled=st.booleans())
+    def start(self, on_loss: OnLoss, ramp_s: float, enabled: bool) -> None:
+        self.configured = Rules(on_loss=on_loss, release_ramp_s=ramp_s)
+        self.now_ns = 10**12
+        self.state = State.at_start(enabled=enabled)
+        self.before = self.state
+        self.event: Event = Tick()
+        self.lease: Lease | None = None
+        self.enabled = enabled
+        self.sequence = 0
+        self.newest: Command | None = None
+        self.arrived_ns = 0
+
+    def feed(self, event: Event) -> None:
+        self.before, self.event = self.state, event
+        self.state = step(self.state, event, self.now_ns, self.configured)
+
+    @rule(ms=st.integers(0, 700))
+    def pass_time(self, ms: int) -> None:
+        self.now_ns += ms * MS
+        self.feed(Tick())
+
+    @rule(enabled=st.booleans())
+    def enable(self, enabled: bool) -> None:
+        self.enabled = enabled
+        if not enabled:
+            self.lease = None
+        self.feed(Enable(enabled=enabled))
+
+    @rule(
+        session=st.sampled_from(SESSIONS), supervision=st.sampled_from(Supervision), streaming=st.booleans()
+    )
+    def grant(self, session: str, supervision: Supervision, streaming: bool) -> None:
+        lease = Lease(session, session, supervision, streaming)
+        if self.enabled:
+            self.lease, self.newest = lease, None
+        self.feed(GrantLease(lease))
+
+    @rule(session=st.sampled_from(SESSIONS), why=st.sampled_from(LeaseEnd))
+    def end(self, session: str, why: LeaseEnd) -> None:
+        if self.lease and self.lease.session_id == session:
+            self.lease = None
+        self.feed(EndLease(session, why))
+
+    @rule(
+        session=st.sampled_from(SESSIONS),
+        newer=st.booleans(),
+        held=st.booleans(),
+        velocity=velocities,
+        instants_ms=st.tuples(offsets_ms, offsets_ms, offsets_ms),
+    )
+    def command(self, *, session: str, newer: bool, held: bool, velocity: Velocity, instants_ms: Any) -> None:
+        """Sends anything that a decoder lets through."""
+        self.sequence += newer
+        valid, echo, picture = (self.now_ns + offset * MS for offset in instants_ms)
+        self.send(Command(session, self.sequence, held, velocity, valid, echo, picture))
+
+    @rule(held=st.booleans(), velocity=velocities, times=st.integers(1, 10), flaw=st.sampled_from(FLAWS))
+    def drive(self, held: bool, velocity: Velocity, times: int, flaw: str = "") -> None:
+        """Sends 50 commands a second as a client of the holder does, with at most one flaw."""
+        for _ in range(times):
+            self.now_ns += 20 * MS
+            self.sequence += flaw != "repeated"
+            now = self.now_ns
+            proper = Command(
+                session_id=self.lease.session_id if self.lease else "s1",
+                sequence=self.sequence,
+                held=held,
+                velocity=velocity,
+                valid_until_ns=now + 250 * MS,
+                echo_ns=now,
+                picture_ns=now - 20 * MS,
+            )
+            self.send(replace(proper, **_flawed(flaw, now)))
+            self.limits_hold()
+
+    def send(self, command: Command) -> None:
+        mine = self.lease is not None and command.session_id == self.lease.session_id
+        newer = self.newest is None or command.sequence > self.newest.sequence
+        if mine and newer and command.velocity.is_finite:
+            self.newest, self.arrived_ns = command, self.now_ns
+        self.feed(command)
+
+    @precondition(lambda self: self.state.phase is not Phase.DRIVING)
+    @rule(supervision=st.sampled_from(Supervision), streaming=st.booleans(), velocity=velocities)
+    def set_off(self, supervision: Supervision, streaming: bool, velocity: Velocity) -> None:
+        """Does everything that it takes to drive: by chance alone it would hardly come about."""
+        self.drive(held=False, velocity=ZERO, times=1)
+        self.reset(right=True)
+        self.enable(enabled=True)
+        self.all_clear()
+        self.grant(session="s1", supervision=supervision, streaming=streaming)
+        self.drive(held=False, velocity=ZERO, times=1)
+        self.drive(held=True, velocity=velocity, times=5)
+        assert self.state.phase is Phase.DRIVING
+
+    @rule(by=st.sampled_from(["anna", "ben"]))
+    def stop(self, by: str) -> None:
+        self.feed(Stop(by))
+        assert self.state.phase is Phase.STOPPED
+        assert self.state.output == ZERO
+
+    @rule(right=st.booleans())
+    def reset(self, right: bool) -> None:
+        latch = self.state.latch
+        self.feed(Reset(latch.stop_id if latch and right else 0))
+        if self.before.phase is Phase.STOPPED:
+            assert self.state.output in (None, ZERO)
+        if self.state.latch is None and latch is not None:
+            # What was held before the reset is unknown to it, and starts nothing.
+            self.newest = None
+
+    @rule(
+        running=st.booleans(), newest_ms=st.integers(-900, 0), base=st.booleans(), bad=st.sampled_from("sofn")
+    )
+    def observe(self, running: bool, newest_ms: int, base: bool, bad: str) -> None:
+        good = Surroundings(preview_running=True, newest_capture_ns=10**18, base_present=True, still=True)
+        kinds: dict[str, dict[str, Any]] = {
+            "s": {"robot_stopped": True},
+            "o": {"outranked": True},
+            "f": {"preview_running": running, "newest_capture_ns": self.now_ns + newest_ms * MS},
+            "n": {"base_present": base, "still": None},
+        }
+        self.feed(Observe(replace(good, **kinds[bad])))
+
+    @rule()
+    def all_clear(self) -> None:
+        good = Surroundings(preview_running=True, newest_capture_ns=10**18, base_present=True, still=True)
+        self.feed(Observe(good))
+
+    def moves(self) -> bool:
+        return self.state.output not in (None, ZERO)
+
+    @invariant()
+    def motion_has_every_reason(self) -> None:
+        state = self.state
+        if not self.moves() or state.phase is Phase.STOPPING:
+            return
+        lease, command, around = self.lease, self.newest, state.surroundings
+        assert state.phase is Phase.DRIVING
+        assert self.enabled
+        assert lease is not None
+        assert lease == state.lease
+        assert command is not None
+        assert command.held
+        assert self.now_ns <= command.valid_until_ns
+        assert self.now_ns <= self.arrived_ns + (250 if lease.streaming else 500) * MS
+        assert state.latch is None
+        assert around.base_present
+        assert not around.robot_stopped
+        assert not around.outranked
+        if lease.streaming:
+            assert command.echo_ns <= self.arrived_ns
+            assert self.now_ns - command.echo_ns <= 400 * MS
+        if lease.supervision is Supervision.PICTURE:
+            assert around.preview_running
+            assert command.picture_ns <= self.arrived_ns + 20 * MS
+            assert self.now_ns - command.picture_ns <= 600 * MS
+
+    @invariant()
+    def slowing_down_only_follows_a_release(self) -> None:
+        if self.moves() and self.state.phase is Phase.STOPPING:
+            assert self.configured.release_ramp_s > 0
+            assert not self.state.inhibits
+            assert self.before.phase in {Phase.DRIVING, Phase.STOPPING}
+            assert _no_faster(self.state.output, self.before.output)
+
+    @invariant()
+    def motion_begins_with_a_press_after_a_release(self) -> None:
+        before, state = self.before, self.state
+        if state.phase is not Phase.DRIVING or before.phase is Phase.DRIVING:
+            return
+        assert before.phase in {Phase.ARMED, Phase.STOPPING}
+        assert isinstance(self.event, Command)
+        assert self.event.held
+        if state.lease and state.lease.streaming:
+            assert before.lease == state.lease
+            assert before.command is not None
+            assert not before.command.held
+
+    @invariant()
+    def limits_hold(self) -> None:
+        limits, output = self.configured.limits, self.state.output
+        if output is None:
+            return
+        assert abs(output.vx_mps) <= limits.vx_mps + 1e-9
+        assert abs(output.vy_mps) <= limits.vy_mps + 1e-9
+        assert abs(output.wz_rad_s) <= limits.wz_rad_s + 1e-9
+        elapsed_s = (self.state.output_ns - self.before.output_ns) / 1e9
+        previous = self.before.output or ZERO
+        for name, limit in (
+            ("vx_mps", limits.acceleration_mps2),
+            ("vy_mps", limits.acceleration_mps2),
+            ("wz_rad_s", limits.acceleration_rad_s2),
+        ):
+            grown = abs(getattr(output, name)) - abs(getattr(previous, name))
+            assert grown <= limit * elapsed_s + 1e-9
+
+    @invariant()
+    def nothing_is_published_when_nobody_drives(self) -> None:
+        silent = self.state.phase in {Phase.DISABLED, Phase.AVAILABLE}
+        assert (self.state.output is None) == silent
+        if silent:
+            assert self.before.output in (None, ZERO), "the last is zero"
+
+    @invariant()
+    def a_stop_stays_until_its_reset(self) -> None:
+        if self.before.phase is Phase.STOPPED and self.state.phase is not Phase.STOPPED:
+            assert isinstance(self.event, Reset)
+            assert self.before.latch is not None
+            assert self.event.stop_id == self.before.latch.stop_id
+            assert not self.before.holding(self.now_ns)
+
+    @invariant()
+    def the_sequence_only_grows(self) -> None:
+        before, after = self.before.command, self.state.command
+        if before and after and self.before.lease == self.state.lease:
+            assert after is before or after.sequence > before.sequence
+
+
+def _no_faster(after: Velocity | None, before: Velocity | None) -> bool:
+    after, before = after or ZERO, before or ZERO
+    return after.linear_mps <= before.linear_mps + 1e-9 and abs(after.wz_rad_s) <= abs(before.wz_rad_s) + 1e-9
+
+
+TestDriving = Driving.TestCase
+TestDriving.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)
+
+
+@given(velocities)
+def test_limits_keep_the_direction(wanted: Velocity) -> None:
+    limits = Limits()
+    slowed = limited(wanted, limits)
+    rim = abs(slowed.vx_mps) + abs(slowed.vy_mps) + limits.wheel_lever_m * abs(slowed.wz_rad_s)
+    assert rim <= limits.wheel_mps + 1e-9
+    assert abs(slowed.vx_mps * wanted.vy_mps - slowed.vy_mps * wanted.vx_mps) < 1e-9
+    assert abs(slowed.vx_mps * wanted.wz_rad_s - slowed.wz_rad_s * wanted.vx_mps) < 1e-9
+    assert slowed.vx_mps * wanted.vx_mps >= 0
+
+
+@given(velocities, st.floats(0.001, 0.6))
+def test_no_farther_than_the_picture_allows(wanted: Velocity, age_s: float) -> None:
+    limits = Limits()
+    slowed = supervised(wanted, Supervision.PICTURE, age_s, limits)
+    assert slowed.linear_mps * age_s <= limits.picture_travel_m + 1e-9
+    assert abs(slowed.wz_rad_s) * age_s <= limits.picture_turn_rad + 1e-9
+
+
+@given(velocities, velocities, st.floats(0, 1))
+def test_an_approach_never_overshoots(current: Velocity, target: Velocity, elapsed_s: float) -> None:
+    after = approached(current, target, elapsed_s, Limits())
+    for name in ("vx_mps", "vy_mps", "wz_rad_s"):
+        reached, wanted = getattr(after, name), getattr(target, name)
+        assert abs(reached) <= abs(wanted)
+        assert reached * wanted >= 0
+        if getattr(current, name) * wanted < 0:
+            assert abs(reached) <= 1.6 * elapsed_s + 1e-9, "from zero on"

@@ -1,0 +1,54 @@
+"""The file that keeps a stop over a restart."""
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from drive import stop_file
+from drive.stop_file import StopFile, Stops, read_stops
+from drive.values import Latch
+
+STOPPED = Stops(7, Latch(7, "ben", "a child in the way"))
+
+
+def test_a_stop_and_its_number_outlive_the_program(tmp_path: Path) -> None:
+    path = tmp_path / "state" / "stop.json"
+    assert read_stops(path) == Stops()
+    for stops in (STOPPED, Stops(7)):
+        file = StopFile(path)
+        file.keep(stops)
+        file.close()
+        assert read_stops(path) == stops
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{", b"null", b"[]", b'{"last_id": 1}', b'{"latch": {}, "last_id": "x"}']
+)
+def test_a_file_that_says_nothing_counts_as_a_stop(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "stop.json"
+    path.write_bytes(content)
+    latch = read_stops(path).latch
+    assert latch is not None
+    assert "there may have been a stop" in latch.reason
+
+
+def test_a_disk_that_hangs_delays_nobody_and_keeps_the_newest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hangs, writing, written = threading.Event(), threading.Event(), []
+
+    def write(_path: Path, content: bytes) -> None:
+        writing.set()
+        hangs.wait(10)
+        written.append(Stops.from_json(content))
+
+    monkeypatch.setattr(stop_file, "write_private", write)
+    file = StopFile(tmp_path / "stop.json")
+    file.keep(STOPPED)
+    assert writing.wait(10)
+    for number in range(8, 1000):
+        file.keep(Stops(number))
+    hangs.set()
+    file.close()
+    assert written == [STOPPED, Stops(999)]

@@ -1,0 +1,100 @@
+"""The schema of the socket, on the drive program's side."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drive.episode import Episode
+from drive.inhibits import Deadlines
+from drive.machine import Enable, EndLease, GrantLease, Reset, Rules, State, Stop
+from drive.phases import Phase
+from drive.values import Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
+from drive.wire import (
+    INHIBITS,
+    MAX_MESSAGE_BYTES,
+    PHASES,
+    ProtocolError,
+    actual_state,
+    decoded,
+    event_of,
+    welcome,
+)
+from omniseer.drive.v1 import drive_pb2 as pb
+
+LONG = "\N{GRINNING FACE}" * 100_000
+
+
+@pytest.mark.parametrize(
+    ("message", "event"),
+    [
+        (pb.ToDrive(desired=pb.DesiredState(revision=3, enabled=True)), Enable(enabled=True)),
+        (
+            pb.ToDrive(grant=pb.GrantLease(session_id="s", holder="a", line_of_sight=True, streaming=True)),
+            GrantLease(Lease("s", "a", Supervision.LINE_OF_SIGHT)),
+        ),
+        (pb.ToDrive(grant=pb.GrantLease(session_id="s")), GrantLease(Lease("s", "", streaming=False))),
+        (
+            pb.ToDrive(end=pb.EndLease(session_id="s", why=pb.LEASE_END_TAKEN_OVER)),
+            EndLease("s", LeaseEnd.TAKEN_OVER),
+        ),
+        # A reason of a newer gateway, or none: the careful one.
+        (pb.ToDrive(end=pb.EndLease(session_id="s")), EndLease("s", LeaseEnd.LOST)),
+        (pb.ToDrive(stop=pb.Stop(by="ben", reason="a child")), Stop("ben", "a child")),
+        (pb.ToDrive(reset=pb.Reset(stop_id=7)), Reset(7)),
+        (
+            pb.ToDrive(
+                command=pb.Command(
+                    session_id="s", sequence=2, held=True, vx_mps=0.1, vy_mps=0.2, wz_rad_s=0.3,
+                    valid_until_ns=4, echo_ns=5, picture_ns=6,
+                )
+            ),
+            Command("s", 2, True, Velocity(0.1, 0.2, 0.3), 4, 5, 6),
+        ),
+        (pb.ToDrive(picture=pb.Picture(running=True)), None),
+        (pb.ToDrive(hello=pb.Hello()), None),
+    ],
+)  # fmt: skip
+def test_each_message_is_its_event(message: pb.ToDrive, event: object) -> None:
+    assert event_of(decoded(message.SerializeToString())) == event
+
+
+def test_every_phase_and_reason_has_its_number() -> None:
+    assert set(PHASES.values()) | {0} == set(pb.Phase.values())
+    assert set(INHIBITS.values()) | {0} == set(pb.Inhibit.values())
+    assert len(PHASES) == len(Phase)
+    assert len(INHIBITS) == len(Inhibit)
+
+
+@given(st.binary(max_size=200))
+def test_any_packet_is_a_message_or_a_protocol_error(packet: bytes) -> None:
+    try:
+        message = decoded(packet)
+    except ProtocolError:
+        return
+    event_of(message)
+
+
+def test_no_caller_makes_a_report_larger_than_a_packet() -> None:
+    stop = event_of(pb.ToDrive(stop=pb.Stop(by=LONG, reason=LONG)))
+    grant = event_of(pb.ToDrive(grant=pb.GrantLease(session_id=LONG, holder=LONG)))
+    assert isinstance(stop, Stop)
+    assert isinstance(grant, GrantLease)
+    latch = Latch(1, stop.by, stop.reason)
+    by = f"stopped by {stop.by}: {stop.reason}"
+    report = actual_state(
+        State(phase=Phase.STOPPED, lease=grant.lease, latch=latch),
+        Rules(),
+        0,
+        revision=1,
+        counters=pb.Counters(),
+        episode=Episode(1, grant.lease.holder, 0, ended_by=by),
+        problems=["x" * 8 * 257, "x" * 257],
+    )
+    assert report.ByteSize() < MAX_MESSAGE_BYTES - 1024
+
+
+def test_the_welcome_has_the_limits_in_effect() -> None:
+    rules = Rules(deadlines=Deadlines(picture_ns=300_000_000))
+    limits = welcome("1", rules).welcome.limits
+    assert limits.max_picture_age_ms == 300
+    assert limits.max_vx_mps == pytest.approx(rules.limits.vx_mps)
