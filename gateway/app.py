@@ -9,12 +9,14 @@ from typing import Final
 
 import grpc
 
+from common.advertisement import Advertisement
 from common.findings import Verdict
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
 from gateway.links.preview.control import PreviewLink
 from gateway.links.preview.exposure import video_exposure
 from gateway.metrics.endpoint import serving_metrics
+from gateway.platform.advertising import advertise
 from gateway.rpc.server import SERVICE, serving
 from gateway.status.preview import Listener
 from gateway.status.snapshot import Snapshot
@@ -23,6 +25,8 @@ _log = logging.getLogger(__name__)
 
 PREVIEW_HEALTH: Final = "preview"
 """The preview service's name in the health service. The gateway serves without it."""
+DRIVE_HEALTH: Final = "drive"
+"""The drive program's name there, where the robot is set up for driving."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often faults and events are looked for; a change of the preview causes a look at once."""
 
@@ -74,6 +78,14 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                 tasks.create_task(_observe(gateway), name="observer"),
                 tasks.create_task(gateway.connection_guard.run(port), name="connection-guard"),
             ]
+            if gateway.settings.discovery.advertise:
+                background.append(tasks.create_task(_advertise(gateway.settings, port), name="advertising"))
+            if teleop := gateway.teleop:
+                background += [
+                    tasks.create_task(teleop.link.run(), name="drive-link"),
+                    tasks.create_task(teleop.follow(), name="drive-reports"),
+                    tasks.create_task(teleop.run(), name="teleop"),
+                ]
             try:
                 yield port
             finally:
@@ -96,6 +108,12 @@ async def _metrics(gateway: Gateway) -> AsyncIterator[None]:
             measuring.cancel()
 
 
+async def _advertise(settings: GatewaySettings, port: int) -> None:
+    contract = SERVICE.rpartition(".")[0]
+    announced = Advertisement(settings.name, contract, settings.security.guarded)
+    await advertise(announced, port, settings.grpc.host, settings.discovery.addresses)
+
+
 async def _observe(gateway: Gateway) -> None:
     """Updates faults, events and the health service, whether or not an operator is connected."""
     link, health = gateway.preview_link, gateway.health
@@ -105,6 +123,8 @@ async def _observe(gateway: Gateway) -> None:
         seen = gateway.state.observe(access)
         health.set_serving(SERVICE, serving=not (seen.ros_stalled or access.closed))
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
+        if seen.teleop:
+            health.set_serving(DRIVE_HEALTH, serving=seen.teleop.drive.reachable)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()
         if seen.preview.listener and seen.preview.listener != listener:

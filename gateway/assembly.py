@@ -18,6 +18,9 @@ from common.health import Health
 from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
+from gateway.links.drive.commands import DriveCommands
+from gateway.links.drive.model import DriveModel
+from gateway.links.drive.wire import DriveConnector
 from gateway.links.link import ServiceLink
 from gateway.links.preview.control import PreviewControl, PreviewLink
 from gateway.links.preview.feedback import Feedback, PreviewServiceConnector
@@ -27,11 +30,12 @@ from gateway.links.reconciler import Reconciler
 from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
-from gateway.rpc.calls.methods import CONTRACT
+from gateway.rpc.calls.methods import SERVICES
 from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.connections.admission import MAX_PENDING, Admission
 from gateway.rpc.connections.guard import ConnectionGuard
 from gateway.rpc.connections.refusal_delay import RefusalDelay
+from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
@@ -44,14 +48,19 @@ from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
 from gateway.rpc.services.status import StatusService
+from gateway.rpc.services.teleop import TeleopService
 from gateway.shown_settings import shown_settings
 from gateway.state import State
 from gateway.status.board import Board
+from gateway.teleop.episodes import Episodes
+from gateway.teleop.teleop import Teleop
 
 _log = logging.getLogger(__name__)
 
 _BESIDE_PLACES: Final = 2 * MAX_PENDING
 """Accepted connections: pending ones, and surplus ones for the moment until they are closed."""
+_DRIVE_SILENCE_S: Final = 1.5
+"""The drive program reports twice a second at least. One that is frozen moves nothing: its guard ends it."""
 _PASSPHRASE_BYTES: Final = 24
 """32 characters of base64: 192 random bits, beyond guessing whatever the length of SRT's AES key."""
 
@@ -75,6 +84,7 @@ class Gateway:
     max_connections: int
     state: State
     preview_link: PreviewLink
+    teleop: Teleop | None
     access: AccessControl
     status_stream: StatusStream
     services: Services
@@ -98,7 +108,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     feedback = Feedback(outside.preview_connector())
     link = ServiceLink(name, feedback, Reconciler(first_revision, model))
     control = PreviewControl(link, settings.preview.settle_ms / 1000)
-    stats = Stats(CONTRACT.methods_by_name)
+    stats = Stats([name for service in SERVICES for name in service.methods_by_name])
     state = State(settings, link, stats)
     max_connections = possible_connections(settings.limits.connections + _BESIDE_PLACES)
     admission = Admission(settings.limits, max_connections=max_connections)
@@ -106,6 +116,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     connection_guard = ConnectionGuard(admission)
     access = AccessControl(settings.security, state, control, admission, refusals)
     recipients = Recipients(settings.preview.advertised_host)
+    teleop = state.teleop = _teleop(settings, link, access.audit, first_revision)
     status_stream = StatusStream(state, time.monotonic)
     event_stream = EventStream(state.events, state.event_added)
     services = Services(
@@ -113,6 +124,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         preview=PreviewService(control, feedback, state, recipients),
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
+        teleop=TeleopService(teleop, state, legacy_clients=settings.teleop.legacy_clients),
     )
     interceptors = Interceptors(
         stats=stats,
@@ -129,6 +141,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         max_connections=max_connections,
         state=state,
         preview_link=link,
+        teleop=teleop,
         access=access,
         status_stream=status_stream,
         services=services,
@@ -144,7 +157,34 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
             status_stream=status_stream,
             event_stream=event_stream,
             preview_link=link,
+            drive_link=teleop.link if teleop else None,
         ),
+    )
+
+
+def _teleop(
+    settings: GatewaySettings, preview: PreviewLink, audit: Audit, first_revision: int
+) -> Teleop | None:
+    """Returns what drives the robot; None where it is not set up for that."""
+    driving = settings.teleop
+    if driving.socket is None:
+        return None
+    episodes = Episodes(audit)
+    commands = DriveCommands(DriveConnector(driving.socket, episodes.record))
+    model = DriveModel(enabled_at_start=driving.enabled_at_start)
+    link = ServiceLink(
+        f"drive program at {driving.socket}",
+        commands,
+        Reconciler(first_revision, model),
+        silence_s=_DRIVE_SILENCE_S,
+        apply_deadline_s=_DRIVE_SILENCE_S,
+    )
+    return Teleop(
+        link,
+        commands,
+        lambda: preview.view,
+        line_of_sight=driving.line_of_sight,
+        episodes=episodes,
     )
 
 

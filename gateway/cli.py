@@ -1,5 +1,6 @@
 """`robot-gateway`: serve, check the configuration, or find out what is wrong with this machine."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -8,9 +9,10 @@ from rich.console import Console
 
 from common import logs
 from common.check_options import PrintOption, SchemaOption
-from common.config import as_yaml, json_schema
+from common.config import ConflictError, as_yaml, json_schema
+from common.errors import UserError
 from common.findings import exit_code, print_findings
-from common.program import bound_arenas, run, run_to_exit
+from common.program import bound_arenas, run, run_command_line
 from gateway.access.reloader import load_access
 from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
@@ -32,6 +34,8 @@ Config = Annotated[
 @app.command()
 def serve(config: Config = None) -> None:
     """Serve operators until SIGINT or SIGTERM."""
+    # The advertiser is started by fork and exec; gRPC's handlers for a bare fork would only get in its way.
+    os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
     settings = load_settings(config)
     logs.configure(settings.log_level, settings.log_format)
     bound_arenas()
@@ -47,12 +51,7 @@ def check(config: Config = None, in_effect: PrintOption = False, schema: SchemaO
     if schema:
         typer.echo(json_schema(GatewaySettings))
         return
-    settings = load_settings(config)
-    # Late: importing it checks the middleware, which an error at the import could not report in one line.
-    from gateway.ros.readers import reader_for  # noqa: PLC0415
-
-    for source in settings.sources:
-        reader_for(source)
+    settings = load_settings(config, _check_readers)
     if access_files := settings.security.access_files():
         load_access(*access_files)
     if in_effect:
@@ -61,6 +60,17 @@ def check(config: Config = None, in_effect: PrintOption = False, schema: SchemaO
     count = len(settings.sources)
     where = f"{settings.grpc.host}:{settings.grpc.port}"
     typer.echo(f"configuration good: '{settings.name}' serves at {where} and reads {count} sources")
+
+
+def _check_readers(settings: GatewaySettings) -> None:
+    # Late: importing it checks the middleware, which an error at the import could not report in one line.
+    from gateway.ros.readers import reader_for  # noqa: PLC0415
+
+    for position, source in enumerate(settings.sources):
+        try:
+            reader_for(source)
+        except UserError as error:
+            raise ConflictError(("sources", position, "type"), error.what, error.remedy) from error
 
 
 @app.command()
@@ -79,4 +89,4 @@ def doctor(
 
 def main() -> None:
     """The program."""
-    run_to_exit(app)
+    run_command_line(app, "robot-gateway")

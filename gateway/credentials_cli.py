@@ -187,7 +187,7 @@ def _say(*lines: str) -> None:
 
 
 def _minute(instant_s: int | None) -> str:
-    return "-" if instant_s is None else datetime.fromtimestamp(instant_s, UTC).strftime("%Y-%m-%d %H:%M")
+    return "-" if instant_s is None else datetime.fromtimestamp(instant_s, UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
 def _as_json(credential: Credential, now_s: float) -> dict[str, Any]:

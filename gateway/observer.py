@@ -103,7 +103,7 @@ def _preview_changed(preview: PreviewView) -> Event:
 
 
 def _fallback(encoder: Encoder) -> Event:
-    """Without a sentence: the overlay already has the one of the fault."""
+    """Without a sentence: the overlay already has the one of the fault, which also is the warning."""
     message = f"{encoder.name} encodes instead of {encoder.wanted}: {encoder.fallback_reason}"
     detail = EncoderFallback(encoder.name, encoder.wanted, encoder.fallback_reason)
-    return Event(Severity.WARNING, _PREVIEW, message, detail)
+    return Event(Severity.INFO, _PREVIEW, message, detail)

@@ -3,7 +3,7 @@
 import logging
 import secrets
 import time
-from typing import Final
+from typing import Final, Protocol
 
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
@@ -21,10 +21,18 @@ from gateway.status.faults.tracker import FaultTracker
 from gateway.status.pictures import NO_PICTURES, PictureReport, PictureReports, Pictures
 from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Identity, Runtime, Snapshot, take
+from gateway.status.teleop import TeleopView
 
 _log = logging.getLogger(__name__)
 
 _RUN_ID_BYTES: Final = 8
+
+
+class TeleopSource(Protocol):
+    """What has the view of driving."""
+
+    def view(self) -> TeleopView:
+        """Returns driving at this instant, from memory."""
 
 
 class State:
@@ -38,6 +46,7 @@ class State:
     Attributes:
         event_added: notified after each event.
         access: of the newest look at it.
+        teleop: has the view of driving; None where the robot is not set up for it.
     """
 
     def __init__(self, settings: GatewaySettings, preview_link: PreviewLink, stats: Stats) -> None:
@@ -59,6 +68,7 @@ class State:
         self.event_added = Broadcast()
         self._pictures = PictureReports()
         self.access: AccessView = UNGUARDED
+        self.teleop: TeleopSource | None = None
 
     @property
     def preview(self) -> PreviewView:
@@ -79,6 +89,7 @@ class State:
             faults=self._tracker.faults,
             now_s=now_s,
             access=self.access,
+            teleop=self.teleop.view() if self.teleop else None,
         )
 
     def observe(self, access: AccessView) -> Snapshot:

@@ -11,6 +11,7 @@ from gateway.config.settings import (
     load_settings,
 )
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
+from gateway.config.teleop import TeleopSettings
 
 __all__ = [
     "CONFIG_VARIABLE",
@@ -25,6 +26,7 @@ __all__ = [
     "PreviewSettings",
     "SecuritySettings",
     "SourceSettings",
+    "TeleopSettings",
     "TlsSettings",
     "is_loopback",
     "load_settings",

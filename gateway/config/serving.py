@@ -3,7 +3,7 @@
 import ipaddress
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from common.config import Section
 
@@ -33,6 +33,24 @@ class LimitSettings(Section):
     """Capacity of the bucket, in requests."""
     request_bytes: int = Field(default=131_072, ge=1024, le=262_144)
     """Largest request that is accepted."""
+
+
+class DiscoverySettings(Section):
+    """Whether and where the gateway is announced by mDNS, so that operators find it without its address."""
+
+    advertise: bool = False
+    addresses: tuple[str, ...] = ()
+    """Of this machine: on whose networks it is announced; by default the network of the default route."""
+
+    @field_validator("addresses")
+    @classmethod
+    def _are_addresses(cls, addresses: tuple[str, ...]) -> tuple[str, ...]:
+        for each in addresses:
+            try:
+                ipaddress.ip_address(each)
+            except ValueError:
+                raise ValueError("addresses of this machine, [10.0.0.7] for example") from None
+        return addresses
 
 
 class MetricsSettings(Section):

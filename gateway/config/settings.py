@@ -1,18 +1,24 @@
 """The whole configuration: one YAML file, overridden by `GATEWAY__...` environment variables."""
 
-from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final, Literal
 
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
-from common.config import Section, Settings, load
-from common.errors import ExitCode, UserError
+from common.config import ConflictError, Section, Settings, load
 from gateway.config.faults import FaultSettings
 from gateway.config.security import SecuritySettings
-from gateway.config.serving import GrpcSettings, LimitSettings, MetricsSettings, is_loopback
+from gateway.config.serving import (
+    DiscoverySettings,
+    GrpcSettings,
+    LimitSettings,
+    MetricsSettings,
+    is_loopback,
+)
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
+from gateway.config.teleop import TeleopSettings
 from gateway.status.snapshot import Rules, SourceRule
 
 CONFIG_VARIABLE: Final = "ROBOT_GATEWAY_CONFIG"
@@ -57,9 +63,11 @@ class GatewaySettings(Settings):
     security: SecuritySettings = SecuritySettings()
     limits: LimitSettings = LimitSettings()
     preview: PreviewSettings = PreviewSettings()
+    teleop: TeleopSettings = TeleopSettings()
     platform: PlatformSettings = PlatformSettings()
     faults: FaultSettings = FaultSettings()
     metrics: MetricsSettings = MetricsSettings()
+    discovery: DiscoverySettings = DiscoverySettings()
     sources: tuple[SourceSettings, ...] = DEFAULT_SOURCES
     """An empty list makes a gateway that needs no ROS."""
 
@@ -85,16 +93,19 @@ class GatewaySettings(Settings):
         return Rules(rules, self.platform.stale_after_ms, self.faults.ignored_by_health)
 
 
-def load_settings(path: Path | None) -> GatewaySettings:
+def load_settings(path: Path | None, *checks: Callable[[GatewaySettings], None]) -> GatewaySettings:
     """Reads and checks the configuration, each section and all together.
+
+    Args:
+        path: of the file.
+        checks: further ones, as of `common.config.load`.
 
     Raises:
         UserError: it can't be read, or something in it is wrong.
     """
-    settings = load(GatewaySettings, path)
-    _check_exposure(settings)
-    _check_sources(settings)
-    return settings
+    return load(
+        GatewaySettings, path, _check_exposure, _check_discovery, _check_driving, _check_sources, *checks
+    )
 
 
 def _check_exposure(settings: GatewaySettings) -> None:
@@ -103,27 +114,53 @@ def _check_exposure(settings: GatewaySettings) -> None:
         what = "anyone on that network could read and control everything"
         if security.credentials is not None:
             what = "anyone on that network could read tokens and responses (security.tls.enabled is false)"
-        raise UserError(
+        raise ConflictError(
+            ("grpc", "host"),
             f"grpc.host is {settings.grpc.host}: {what}",
             "Authenticate callers ('robot-gateway credentials init' explains how), use 127.0.0.1 "
             "and a tunnel, or accept it with 'security: {insecure: true}'",
-            exit_code=ExitCode.USAGE,
         )
     metrics = settings.metrics
     open_metrics = metrics.port is not None and not is_loopback(metrics.host)
     if open_metrics and not metrics.insecure:
-        raise UserError(
+        raise ConflictError(
+            ("metrics", "host"),
             f"metrics.host is {metrics.host}: anyone on that network could read the metrics",
             "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",
-            exit_code=ExitCode.USAGE,
+        )
+
+
+def _check_discovery(settings: GatewaySettings) -> None:
+    discovery, host = settings.discovery, settings.grpc.host
+    alone = bool(discovery.addresses) and all(map(is_loopback, discovery.addresses))
+    if discovery.advertise and is_loopback(host) and not alone:
+        raise ConflictError(
+            ("discovery", "advertise"),
+            f"discovery.advertise announces a gateway that no other machine reaches: grpc.host is {host}",
+            "Set grpc.host to 0.0.0.0 (with security.credentials), or leave discovery.advertise out",
+        )
+
+
+def _check_driving(settings: GatewaySettings) -> None:
+    if (
+        settings.teleop.socket
+        and settings.security.credentials is None
+        and not settings.teleop.allow_insecure
+    ):
+        raise ConflictError(
+            ("teleop", "socket"),
+            "teleop.socket is set without authentication: anyone who reaches the gateway could drive",
+            "Authenticate callers ('robot-gateway credentials init' explains how), or accept it with "
+            "'teleop: {allow_insecure: true}'",
         )
 
 
 def _check_sources(settings: GatewaySettings) -> None:
-    name, count = next(iter(Counter(source.name for source in settings.sources).most_common(1)), ("", 0))
-    if count > 1:
-        raise UserError(
-            f"sources lists '{name}' {count} times",
-            "Keep one topic for each kind, and one for each label of mux_input",
-            exit_code=ExitCode.USAGE,
-        )
+    names = [source.name for source in settings.sources]
+    for position, source in enumerate(settings.sources):
+        if source.name in names[:position]:
+            raise ConflictError(
+                ("sources", position),
+                f"sources lists '{source.name}' {names.count(source.name)} times",
+                "Keep one topic for each kind, and one for each label of mux_input",
+            )

@@ -12,6 +12,7 @@ from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
+from gateway.links.drive.state import DriveLink
 from gateway.links.preview.control import PreviewLink
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.ports import SnapshotSource
@@ -22,6 +23,7 @@ from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot
+from gateway.status.teleop import DrivePhase, TeleopView
 
 _PREFIX: Final = "robot_gateway"
 
@@ -38,6 +40,7 @@ class GatewayCollector(Collector):
         event_stream: counts gaps of subscribers.
         connection_guard: counts connections.
         preview_link: counts failures to connect.
+        drive_link: the same; None where the robot is not set up for driving.
     """
 
     state: SnapshotSource
@@ -47,6 +50,7 @@ class GatewayCollector(Collector):
     status_stream: StatusStream
     event_stream: EventStream
     preview_link: PreviewLink
+    drive_link: DriveLink | None = None
 
     def text(self) -> bytes:
         """Returns them in Prometheus' text format."""
@@ -72,6 +76,8 @@ class GatewayCollector(Collector):
             "preview_link_failures", "Failures in a row to connect to the preview service.", failures
         )
         yield from _stream(now)
+        if now.teleop and self.drive_link:
+            yield from _driving(now.teleop, self.drive_link.failures)
 
     def _calls(self) -> Iterator[Metric]:
         methods = sorted(self.stats.methods.items())
@@ -173,6 +179,27 @@ def _preview(preview: PreviewView) -> Iterator[Metric]:
     yield _counter("preview_fallbacks", passed_over, counters.fallbacks)
     beyond = "Connections of viewers beyond srt.max_viewers."
     yield _counter("preview_viewers_refused", beyond, counters.viewers_refused)
+
+
+def _driving(teleop: TeleopView, failures: int) -> Iterator[Metric]:
+    drive = teleop.drive
+    phases = {each.value: float(drive.phase is each) for each in DrivePhase}
+    yield _gauges("drive_phase", "1 for the phase of driving.", "phase", phases)
+    yield _gauge("drive_reachable", "1 while the drive program answers.", drive.reachable)
+    yield _gauge("drive_link_failures", "Failures in a row to connect to the drive program.", failures)
+    yield _gauge("drive_leased", "1 while a driver has the lease.", bool(teleop.holder))
+    if drive.actual is None:
+        return
+    # Of the present process of the drive program: they start again with the next, as counters may.
+    counters = drive.actual.counters
+    yield _counter("drive_commands", "Commands that counted.", counters.commands)
+    ignored = "Commands that did not count: repeated, or of another session."
+    yield _counter("drive_commands_ignored", ignored, counters.ignored)
+    inhibited = "Times that a reason stopped the robot while its driver held."
+    yield _counter("drive_inhibited", inhibited, counters.inhibited)
+    yield _counter("drive_stops", "Stops.", counters.stops)
+    yield _counter("drive_published", "Velocity messages published.", counters.published)
+    yield _counter("drive_late_cycles", "Cycles that began more than 5 ms late.", counters.late_cycles)
 
 
 def _stream(now: Snapshot) -> Iterator[Metric]:

@@ -10,11 +10,10 @@ from typing import Any, Final
 
 from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
+from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node
 from gateway.config import SourceSettings
-from gateway.ros.lifetime import middleware_name, ros_node
 from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
-from gateway.ros.subscription import TypeMissingError, message_class
 
 _STAND_IN: Final = "STAND_IN"
 """The file that marks the packages of interfaces/stand_ins."""

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from common.ros_node import TypeMissingError, ros_node
 from gateway.config import SourceSettings
-from gateway.ros.lifetime import ros_node
 from gateway.ros.publishers import PublisherMonitor
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
-from gateway.ros.subscription import TypeMissingError, subscribe
+from gateway.ros.subscription import subscribe
 from gateway.status.board import Board
 
 log = logging.getLogger(__name__)

@@ -1,33 +1,12 @@
 """The subscription of a configured source: its message class and its QoS profile."""
 
-from importlib import import_module
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from common.ros_node import TypeMissingError, message_class
 from gateway.config import SourceSettings
-
-
-class TypeMissingError(Exception):
-    """A message type is not installed; the text names the package to install."""
-
-
-def message_class(type_name: str) -> Any:
-    """Returns the Python class of "package/msg/Name".
-
-    Raises:
-        TypeMissingError: the package is not installed, or has no such message.
-    """
-    package, _, name = type_name.split("/")
-    try:
-        return getattr(import_module(f"{package}.msg"), name)
-    except ImportError as error:
-        raise TypeMissingError(
-            f"message type {type_name} is not installed ({error}); install the ROS package {package}"
-        ) from error
-    except AttributeError as error:
-        raise TypeMissingError(f"the installed package {package} has no message {name}") from error
 
 
 def subscribe(node: Any, source: SourceSettings) -> Any:

@@ -18,7 +18,7 @@ from common.interceptors import Behavior, Chain
 from common.rpc import STOP_GRACE_S, new_server
 from gateway.config import GrpcSettings
 from gateway.rpc.calls.call import CallContext
-from gateway.rpc.calls.methods import CONTRACT, Method
+from gateway.rpc.calls.methods import CONTRACT, SERVICES, Method
 from gateway.rpc.interceptors.audit import Audit, AuditStart
 from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.presence import Presence
@@ -29,6 +29,7 @@ from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
 from gateway.rpc.services.status import StatusService
+from gateway.rpc.services.teleop import TeleopService
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +44,7 @@ class Services:
     preview: PreviewService
     events: EventsService
     info: InfoService
+    teleop: TeleopService
 
     def methods(self) -> Mapping[str, Behavior]:
         """Returns the contract's methods by name. Total: a test compares them with the schema."""
@@ -56,6 +58,11 @@ class Services:
             "SubscribeEvents": self.events.subscribe_events,
             "GetGatewayInfo": self.info.get_gateway_info,
             "Ping": self.info.ping,
+            "SetTeleopEnabled": self.teleop.set_teleop_enabled,
+            "SendTeleopCommand": self.teleop.send_teleop_command,
+            "Drive": self.teleop.drive,
+            "StopRobot": self.teleop.stop_robot,
+            "ResetStop": self.teleop.reset_stop,
         }
 
 
@@ -118,9 +125,14 @@ async def serving(
     """
     chain = interceptors.chain()
     server = new_server(chain, max_connections=max_connections)
-    server.add_generic_rpc_handlers((chain.service(CONTRACT, services.methods()), *extra))
+    methods = services.methods()
+    handlers = [
+        chain.service(each, {name: methods[name] for name in each.methods_by_name}) for each in SERVICES
+    ]
+    server.add_generic_rpc_handlers((*handlers, *extra))
     health.register(server)
-    enable_server_reflection((SERVICE, HEALTH_SERVICE, REFLECTION_SERVICE), server)
+    names = [each.full_name for each in SERVICES]
+    enable_server_reflection((*names, HEALTH_SERVICE, REFLECTION_SERVICE), server)
     try:
         try:
             port = bind_tcp(server, settings.host, settings.port, credentials)

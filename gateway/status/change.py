@@ -15,6 +15,7 @@ from gateway.status.preview import PreviewView
 from gateway.status.snapshot import Snapshot
 from gateway.status.source_view import SourceView
 from gateway.status.sources import SourceSpec
+from gateway.status.teleop import TeleopView
 
 EXCLUDED: Final = frozenset({"at_s", "gateway", "events", "access", "ros_stalled"})
 """Time; counters that the watchers' own calls advance; events, which have their own stream; the access state
@@ -45,6 +46,14 @@ def _sources(sources: tuple[SourceView, ...]) -> object:
     return [(each.spec, each.state, each.freshness.stale, each.detail) for each in sources]
 
 
+def _teleop(view: TeleopView | None) -> object:
+    """Without velocities and ages, which change all the time: the driver has a stream of its own."""
+    if view is None:
+        return None
+    drive = view.drive
+    return drive.enabled, drive.error, drive.phase, drive.stop, view.inhibits, view.holder, view.last_error
+
+
 def _faults(faults: tuple[Fault, ...]) -> object:
     return [(each.condition, each.onset_s, each.cleared_s) for each in faults]
 
@@ -60,5 +69,6 @@ PROJECTIONS: Final[Mapping[str, Callable[[Any], object]]] = {
     # The age is no change, as no age is.
     "pictures": attrgetter("viewer_count"),
     "sources": _sources,
+    "teleop": _teleop,
     "faults": _faults,
 }

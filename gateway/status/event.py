@@ -52,16 +52,18 @@ class EncoderFallback:
 
 @dataclass(frozen=True, slots=True)
 class ClientJoined:
-    """A client has had a stream open for a while."""
+    """A client has had a stream open for a while; `who` is empty where callers are not authenticated."""
 
     address: str
+    who: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class ClientLeft:
-    """A client that had joined closed its last stream."""
+    """A client that had joined closed its last stream; `who` as in `ClientJoined`."""
 
     address: str
+    who: str = ""
 
 
 @dataclass(frozen=True, slots=True)

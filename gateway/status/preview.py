@@ -19,9 +19,9 @@ class PreviewState(Enum):
 class Profile(Enum):
     """Bandwidth profile of the preview."""
 
-    LOW_BW = "LOW_BW"
-    BALANCED = "BALANCED"
-    HIGH_QUALITY = "HIGH_QUALITY"
+    LOW_BW = "low-bw"
+    BALANCED = "balanced"
+    HIGH_QUALITY = "high-quality"
 
 
 class Codec(Enum):

@@ -22,6 +22,7 @@ from gateway.status.sources import (
     SourceSpec,
     ValueT,
 )
+from gateway.status.teleop import TeleopView
 
 MEASUREMENT_STALE_AFTER_MS: Final = 2000
 ROS_STALLED_AFTER_S: Final = 2.0
@@ -92,6 +93,7 @@ class Snapshot:
         sources: the state of each configured source.
         events: the overlay's short list, oldest first.
         pictures: what viewers report of the pictures that they show.
+        teleop: driving; None where the robot is not set up for it.
         ros_stalled: whether the ROS sampler makes no progress, so that the sources' ages accuse no publisher.
     """
 
@@ -109,6 +111,7 @@ class Snapshot:
     faults: tuple[Fault, ...]
     access: AccessView
     ros_stalled: bool
+    teleop: TeleopView | None = None
 
     def __getitem__(self, spec: SourceSpec[ValueT]) -> Sample[ValueT]:
         """Returns the sample of a source; an absent one if the source is not configured."""
@@ -130,6 +133,7 @@ def take(
     gateway: Runtime = _UNKNOWN,
     access: AccessView = UNGUARDED,
     pictures: Pictures = NO_PICTURES,
+    teleop: TeleopView | None = None,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
     configured = rules.sources
@@ -173,6 +177,7 @@ def take(
         faults=faults,
         access=access,
         ros_stalled=ros_stalled,
+        teleop=teleop,
     )
 
 

@@ -54,8 +54,9 @@ class CallContext(Call):
         method: as the schema describes it.
         peer: where the call comes from.
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
-        refusal: why `Auth` refuses the call, while the refusal is delayed and after; None otherwise.
-        request: the newest message of the caller; None before the first.
+        refusal: why `Auth` refuses the call, while the refusal is delayed and after, or why it has ended it;
+            None otherwise.
+        request: the first message of the caller; None before it.
         responded: whether a message has left for the caller.
         response: the newest message to the caller, of control actions alone; serialised or not.
     """

@@ -10,11 +10,17 @@ from google.protobuf.message_factory import GetMessageClass
 
 from common import interceptors
 from gateway.access.role import Role
+from omniseer.gateway.v1 import teleop_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_ADMIN, ROLE_OPERATOR, ROLE_VIEWER, required_role
 from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
 
 CONTRACT: Final = DESCRIPTOR.services_by_name["RobotGateway"]
-"""The operator's service."""
+"""The operator's first service, by whose name the health service knows the gateway."""
+TELEOP: Final = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
+SERVICES: Final = (CONTRACT, TELEOP)
+"""All services of the operators' contract. Their methods have names of their own."""
+STOP_ROBOT: Final = "StopRobot"
+"""Exempt from every limit: it must work when nothing else does. The only control action of viewers."""
 
 
 class Open(Enum):
@@ -44,9 +50,10 @@ class Method(interceptors.Method):
 
     Attributes:
         name: without its service, "Ping" for example.
-        key: unique name for statistics: `name` in the operator's service, else "package.Service/Method".
+        key: unique name for statistics: `name` in the operators' contract, else "package.Service/Method".
         needed: what a caller needs.
         of_contract: whether it belongs to the operators' contract, so that it is counted and validated.
+        unlimited: whether no limit on calls, streams and connections applies.
         request_type: of the contract's methods; None for others.
         response_type: the same.
         has_parameters: whether the request has fields, and so possibly rules.
@@ -60,11 +67,13 @@ class Method(interceptors.Method):
     ) -> None:
         super().__init__(path, request_streaming=request_streaming, response_streaming=response_streaming)
         service, _, self.name = path.removeprefix("/").partition("/")
-        self.key = self.name if service == CONTRACT.full_name else f"{service}/{self.name}"
+        of_operators = any(service == each.full_name for each in SERVICES)
+        self.key = self.name if of_operators else f"{service}/{self.name}"
         self.needed: Needed = STANDARD.get(service, Open.UNDECLARED)
         self.of_contract = False
         self.request_type = self.response_type = None
         self.has_parameters = False
+        self.unlimited = service == TELEOP.full_name and self.name == STOP_ROBOT
         found = _described(service, self.name)
         if found is not None:
             self.needed = ROLES.get(found.GetOptions().Extensions[required_role], Open.UNDECLARED)
@@ -76,8 +85,8 @@ class Method(interceptors.Method):
 
     @property
     def changes_robot(self) -> bool:
-        """Whether it is a control action: a method of the contract that a viewer may not call."""
-        return self.of_contract and self.needed is not Role.VIEWER
+        """Whether it is a control action: one that a viewer may not call, or the stop, which a viewer may."""
+        return self.of_contract and (self.needed is not Role.VIEWER or self.unlimited)
 
 
 def _described(service: str, name: str) -> MethodDescriptor | None:

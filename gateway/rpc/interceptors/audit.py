@@ -21,6 +21,7 @@ from gateway.rpc.calls.methods import Method
 from gateway.rpc.calls.ports import AuditSink, EventSink
 from gateway.status.event import ControlAction, ControlResult, Event
 from gateway.status.fault import Severity
+from gateway.status.preview import Profile
 
 _COMPONENT: Final = "gateway"
 _MAX_TEXT: Final = 200
@@ -47,6 +48,7 @@ class Audit(Interceptor[CallContext]):
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._events = events
+        self._done_sink = done
         self._done = Repeats(partial(self._write, done), clock)
         self._refused = Repeats(partial(self._write, refused), clock)
 
@@ -82,6 +84,10 @@ class Audit(Interceptor[CallContext]):
             self._record(call, ControlResult.ACCEPTED, "the caller left before the answer")
         else:
             self._record(call, ControlResult.FAILED, "internal error; see the robot's log")
+
+    def record_action(self, action: ControlAction) -> None:
+        """Records what a caller did in a stream, a time of motion for example. It is never folded."""
+        self._write(self._done_sink, action)
 
     def record_due(self) -> None:
         """Records repeated actions whose time has come; to be called a few times a second."""
@@ -173,6 +179,8 @@ def _as_text(request: Message) -> str:
         if each.type == each.TYPE_BOOL and not (each.has_presence or getattr(request, each.name))
     ]
     rest = text_format.MessageToString(request, as_one_line=True)
+    for profile in Profile:
+        rest = rest.replace(f"PREVIEW_PROFILE_{profile.name}", profile.value)
     return " ".join([*false, rest] if rest else false)
 
 

@@ -86,7 +86,7 @@ class Auth(Interceptor[CallContext]):
         """
         try:
             call.principal = principal = await self._authenticate(call)
-            self._admission.admit(call.peer)
+            self._admit(call)
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
             call.refusal = error
@@ -97,6 +97,14 @@ class Auth(Interceptor[CallContext]):
             task = asyncio.current_task()
             assert task is not None  # noqa: S101  # gRPC serves each call in a task of its own
             self._streams[call] = task
+
+    def _admit(self, call: CallContext) -> None:
+        try:
+            self._admission.admit(call.peer)
+        except TooMuchError:
+            # A stop needs no place.
+            if not call.method.unlimited:
+                raise
 
     def on_response(self, call: CallContext, _response: Any) -> None:
         """Withholds the response of a caller that lost access while it waited: it may hold a new secret.
@@ -140,6 +148,7 @@ class Auth(Interceptor[CallContext]):
         for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
             # First the stream, then the place: others of the same connection may be valid.
             task = self._streams.pop(call)
+            call.refusal = self._authenticator.access_lost()
             self._dismiss(call)
             abort = asyncio.create_task(self._end(call, task), name="revocation of a stream")
             self._aborts.add(abort)

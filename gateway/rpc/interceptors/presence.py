@@ -21,6 +21,7 @@ _COMPONENT: Final = "gateway"
 @dataclass(slots=True)
 class _Client:
     since_s: float
+    name: str
     streams: int = 0
     joined: bool = False
 
@@ -44,7 +45,8 @@ class Presence(Interceptor[CallContext]):
 
     def on_call(self, call: CallContext) -> None:
         """Counts an open stream."""
-        client = self._clients.setdefault(call.peer.address, _Client(self._clock()))
+        name = call.principal.name if call.principal else ""
+        client = self._clients.setdefault(call.peer.address, _Client(self._clock(), name))
         client.streams += 1
 
     def on_end(self, call: CallContext, _error: BaseException | None) -> None:
@@ -55,7 +57,7 @@ class Presence(Interceptor[CallContext]):
         if client.streams == 0:
             del self._clients[address]
             if client.joined:
-                self._note(f"{address} left", ClientLeft(address))
+                self._note("left", ClientLeft(address, client.name))
 
     def report_joined(self) -> None:
         """Reports clients that have been here long enough; to be called a few times a second."""
@@ -63,7 +65,8 @@ class Presence(Interceptor[CallContext]):
         for address, client in self._clients.items():
             if not client.joined and client.since_s <= before_s:
                 client.joined = True
-                self._note(f"{address} joined", ClientJoined(address))
+                self._note("joined", ClientJoined(address, client.name))
 
-    def _note(self, message: str, detail: ClientJoined | ClientLeft) -> None:
+    def _note(self, what: str, detail: ClientJoined | ClientLeft) -> None:
+        message = f"{detail.who or detail.address} {what}"
         self._events.note(Event(Severity.INFO, _COMPONENT, message, detail))

@@ -1,6 +1,7 @@
 """Limits of each connection: requests a second, open streams, and how many connections there may be."""
 
 from collections.abc import Awaitable
+from contextlib import suppress
 from typing import Any
 
 from common.errors import TooMuchError
@@ -13,7 +14,8 @@ from gateway.rpc.connections.refusal_delay import RefusalDelay
 class RateLimit(Interceptor[CallContext]):
     """Refuses calls beyond a connection's share with a delay; accounts for open streams.
 
-    Each message of a request stream takes a token like a call.
+    Each message of a request stream takes a token like a call, except for those of Drive, which has its own
+    limit: a client that polls as often as it may must not end its own driving. StopRobot is never refused.
 
     Args:
         admission: the account of connections.
@@ -32,6 +34,11 @@ class RateLimit(Interceptor[CallContext]):
         Raises:
             TooMuchError: there is none left; from the awaitable, after a delay.
         """
+        if call.method.unlimited:
+            if self._admits:
+                with suppress(TooMuchError):
+                    self._admission.admit(call.peer)
+            return None
         try:
             self._admission.take_token(call.peer, call.method.name)
             if self._admits:
@@ -48,7 +55,7 @@ class RateLimit(Interceptor[CallContext]):
         Raises:
             TooMuchError: there is none left. It ends the stream at once; opening another one is delayed.
         """
-        if call.method.request_streaming:
+        if call.method.request_streaming and not call.method.of_contract:
             self._admission.take_token(call.peer)
         return request
 

@@ -12,7 +12,8 @@ from gateway.status.health import HealthState
 from gateway.status.pictures import Delivery
 from gateway.status.preview import Codec, PreviewState, Profile
 from gateway.status.source_view import SourceState
-from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2
+from gateway.status.teleop import DriveInhibit, DrivePhase
+from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2, teleop_pb2
 
 _MemberT = TypeVar("_MemberT", bound=Enum)
 
@@ -36,6 +37,9 @@ HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT
 SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
 SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
 CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
+TELEOP_STATES: Final = {False: states_pb2.TELEOP_DISABLED, True: states_pb2.TELEOP_ENABLED}
+DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")
+DRIVE_INHIBITS: Final = _by_name(DriveInhibit, teleop_pb2.DriveInhibit, "DRIVE_INHIBIT")
 GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 _DELIVERY_OF: Final[Mapping[int, Delivery | None]] = {

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from gateway.status.fault import Condition
 from gateway.status.faults.access import access_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
+from gateway.status.faults.driving import driving_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
 from gateway.status.faults.preview import preview_faults
 from gateway.status.faults.sources import sampler_fault, source_faults
@@ -49,5 +50,6 @@ def conditions(
     yield from of_sources
     yield from diagnostics_faults(snapshot[DIAGNOSTICS])
     yield from preview_faults(snapshot.preview, active, settled=settled)
+    yield from driving_faults(snapshot.teleop, settled=settled)
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

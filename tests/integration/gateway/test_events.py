@@ -66,7 +66,7 @@ async def test_a_control_action_and_what_came_of_it(operator: Operator) -> None:
         assert (await until(events, EventKind.PREVIEW)).position.sequence > action.position.sequence
 
 
-async def test_a_control_action_that_is_refused_is_told_as_well(operator: Operator) -> None:
+async def test_a_refused_control_action_is_an_event_as_well(operator: Operator) -> None:
     with pytest.raises(grpc.aio.AioRpcError):
         await operator.switch(True, 99)
     async with AsyncGatewayClient(f"127.0.0.1:{operator.port}") as client:
@@ -76,7 +76,7 @@ async def test_a_control_action_that_is_refused_is_told_as_well(operator: Operat
     assert "99" in action.control.answer
 
 
-async def test_who_comes_to_stay_and_leaves_is_told(operator: Operator) -> None:
+async def test_a_client_that_stays_and_leaves_is_two_events(operator: Operator) -> None:
     async with AsyncGatewayClient(f"127.0.0.1:{operator.port}") as here:
         events = here.events()
         own = await until(events, EventKind.CLIENT_JOINED)

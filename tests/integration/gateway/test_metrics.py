@@ -46,7 +46,7 @@ async def samples(port: int) -> dict[tuple[str, ...], float]:
     }
 
 
-async def test_calls_of_a_real_gateway_are_told(tmp_path: Path) -> None:
+async def test_calls_of_a_real_gateway_are_counted(tmp_path: Path) -> None:
     port = free_tcp_port()
     async with running_gateway(tmp_path / "preview.sock", metrics={"port": port}) as operator:
         await asyncio.gather(*(operator.status() for _ in range(5)))
@@ -131,7 +131,7 @@ async def test_a_taken_port_is_one_line() -> None:
                 pass
 
 
-async def test_an_open_stream_is_told_and_forgotten(tmp_path: Path) -> None:
+async def test_an_open_stream_is_counted_until_it_ends(tmp_path: Path) -> None:
     port = free_tcp_port()
     async with running_gateway(tmp_path / "preview.sock", metrics={"port": port}) as operator:
         watching = operator.stub.WatchSystemStatus(WatchSystemStatusRequest(), timeout=LONG_S)

@@ -126,10 +126,12 @@ async def test_a_request_beyond_all_measure_is_refused(operator: Operator) -> No
     assert (await operator.status()).gateway_name == "lab"
 
 
-async def test_teleoperation_is_not_there_yet(operator: Operator) -> None:
+@pytest.mark.parametrize("method", ["SetTeleopEnabled", "SendTeleopCommand"])
+async def test_a_robot_that_is_not_set_up_for_driving_says_so(operator: Operator, method: str) -> None:
     with pytest.raises(grpc.aio.AioRpcError) as seen:
-        await raw_unary(operator.channel, "/omniseer.gateway.v1.RobotGateway/SetTeleopEnabled")(b"")
-    assert seen.value.code() is grpc.StatusCode.UNIMPLEMENTED
+        await raw_unary(operator.channel, f"/omniseer.gateway.v1.RobotGateway/{method}")(b"")
+    assert seen.value.code() is grpc.StatusCode.FAILED_PRECONDITION
+    assert not (await operator.status()).HasField("teleop")
 
 
 async def test_an_open_gateway_says_so(tmp_path: Path) -> None:
@@ -137,7 +139,7 @@ async def test_an_open_gateway_says_so(tmp_path: Path) -> None:
         assert (await operator.status()).insecure
 
 
-async def test_a_second_gateway_on_the_port_is_told_so(operator: Operator, tmp_path: Path) -> None:
+async def test_a_second_gateway_on_the_port_is_an_error(operator: Operator, tmp_path: Path) -> None:
     with pytest.raises(UserError, match=f"port {operator.port} on 127.0.0.1 is taken"):
         async with running_gateway(tmp_path / "q.sock", grpc={"port": operator.port}):
             pass

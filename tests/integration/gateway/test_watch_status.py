@@ -50,13 +50,13 @@ async def test_the_first_status_comes_at_once_and_the_next_when_something_change
     call.cancel()
 
 
-def told_that_the_computer_is_stale(status: Any) -> bool:
+def reports_that_the_computer_is_stale(status: Any) -> bool:
     return any(fault.id == "platform.stale" and fault.active for fault in status.faults)
 
 
-async def test_what_does_not_change_is_told_once_a_second_with_its_age(operator: Operator) -> None:
+async def test_an_unchanged_status_is_sent_once_a_second_with_its_age(operator: Operator) -> None:
     # The last thing that changes here: what is never read again about the computer grows stale.
-    await eventually(operator.status, told_that_the_computer_is_stale, "the last change")
+    await eventually(operator.status, reports_that_the_computer_is_stale, "the last change")
     call = watching(operator)
     instants = [(await take(call)).monotonic_ns for _ in range(5)]
     # The first interval begins between two ticks.
@@ -65,7 +65,7 @@ async def test_what_does_not_change_is_told_once_a_second_with_its_age(operator:
     call.cancel()
 
 
-async def test_nobody_is_told_more_often_than_asked(operator: Operator) -> None:
+async def test_no_stream_is_faster_than_requested(operator: Operator) -> None:
     call = watching(operator, min_interval_ms=300)
     instants = [(await take(call)).monotonic_ns]
     stop = asyncio.Event()

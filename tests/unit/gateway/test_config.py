@@ -75,6 +75,17 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         ("sources: [{kind: odometry, topic: /a//b, type: n/msg/O}]", "expected: a topic name"),
         ("sources: [{kind: odometry, topic: /1a, type: n/msg/O}]", "expected: a topic name"),
         ("sources: [{kind: odometry, topic: /a, type: Odometry}]", "expected: a message type"),
+        (
+            "discovery: {advertise: true}",
+            "line 1: discovery.advertise announces a gateway that no other machine reaches: grpc.host is 127",
+        ),
+        ("discovery: {addresses: [lab]}", "expected: addresses of this machine, [10.0.0.7] for example"),
+        ("grpc:\n  port: 1\n  host: 0.0.0.0", "line 3: grpc.host is 0.0.0.0"),
+        ("metrics:\n  port: 1\n  host: 0.0.0.0", "line 3: metrics.host is 0.0.0.0"),
+        (
+            "sources:\n- {kind: mode, topic: /a, type: n/msg/O}\n- kind: mode\n  topic: /b\n  type: n/msg/O",
+            "line 3: sources lists 'mode' 2 times",
+        ),
         ("- a list", "holds a list at the top level"),
         ("a: [", "is not YAML"),
     ],
@@ -116,6 +127,15 @@ def test_nothing_is_served_in_the_clear_beyond_the_loopback_unless_somebody_acce
         load(tmp_path, text)
     assert "insecure: true" in str(seen.value)
     assert seen.value.exit_code is ExitCode.USAGE
+
+
+def test_no_one_drives_without_credentials_unless_that_is_accepted(tmp_path: Path) -> None:
+    assert load(tmp_path, "{}").teleop.socket is None, "off by default"
+    with pytest.raises(UserError, match="allow_insecure: true") as seen:
+        load(tmp_path, "{teleop: {socket: /d}}")
+    assert seen.value.exit_code is ExitCode.USAGE
+    assert load(tmp_path, "{teleop: {socket: /d, allow_insecure: true}}").teleop.socket == Path("/d")
+    assert load(tmp_path, "{teleop: {socket: /d}, security: {credentials: /c}}").teleop.enabled_at_start
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def test_the_first_look_is_the_ground_and_no_news() -> None:
     assert new_observer(startup_grace_s=5).observe(snapshot(Board())) == []
 
 
-def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
+def test_a_source_that_comes_goes_and_returns_is_reported_each_time() -> None:
     observer, board = new_observer(startup_grace_s=0.2), Board()
     assert sentences(observer.observe(snapshot(board, now_s=99.0))) == []
     missing = "no odometry since the gateway started, and nothing on the robot publishes it"
@@ -44,7 +44,7 @@ def test_a_source_that_comes_goes_and_returns_is_told_each_time() -> None:
     assert sentences(observer.observe(snapshot(board, now_s=102.0))) == ["cleared: odometry stopped coming"]
 
 
-def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
+def test_a_faulted_preview_is_reported_once_however_often_it_retries() -> None:
     observer = new_observer(startup_grace_s=60)
     observer.observe(snapshot(Board()))
     faulted = replace(OFF, state=PreviewState.FAULTED, last_error="no camera")
@@ -57,7 +57,7 @@ def test_a_faulted_preview_is_told_once_however_often_it_retries() -> None:
     running = replace(OFF, state=PreviewState.RUNNING)
     assert sentences(observer.observe(snapshot(Board(), running))) == [
         f"cleared: {message}",
-        "preview running, BALANCED",
+        "preview running, balanced",
     ]
 
 
@@ -103,7 +103,8 @@ def test_a_fallback_to_another_encoder_is_news() -> None:
     details = [each.detail for each in news]
     assert EncoderFallback("x264", "mpp-h265", "no output for 2 s") in details
     assert sum(isinstance(each, FaultRaised) for each in details) == 1
-    assert observer.observe(snapshot(Board(), fallen)) == [], "told once"
+    assert [each.severity for each in news].count(Severity.WARNING) == 1, "the warning once"
+    assert observer.observe(snapshot(Board(), fallen)) == [], "once"
 
 
 def test_another_mode_is_news() -> None:

@@ -228,7 +228,7 @@ class TestSwitching:
     async def test_on_and_off(self, operator: Operator, double: PreviewDouble) -> None:
         on = await operator.switch(True)
         assert on.accepted
-        assert on.message == "preview is running, BALANCED"
+        assert on.message == "preview is running, balanced"
         assert on.preview.state == states.PREVIEW_RUNNING
         endpoint = on.preview.endpoint
         assert (endpoint.host, endpoint.port, endpoint.latency_ms) == ("127.0.0.1", 7100, 125)
@@ -321,7 +321,7 @@ class TestSwitching:
         await operator.switch(True)
         overlay = await eventually(
             operator.overlay,
-            lambda it: any(event.message == "preview running, BALANCED" for event in it.events),
+            lambda it: any(event.message == "preview running, balanced" for event in it.events),
             "the event of the running preview",
         )
         sequences = [event.sequence for event in overlay.events]
@@ -333,7 +333,7 @@ class TestSwitching:
         for _ in range(2):
             await operator.switch(True)
             await operator.switch(False)
-        expected = ["preview running, BALANCED", "preview off"] * 2
+        expected = ["preview running, balanced", "preview off"] * 2
         await eventually(
             operator.overlay,
             lambda it: [event.message for event in it.events][-4:] == expected,

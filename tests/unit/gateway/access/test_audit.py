@@ -86,7 +86,9 @@ def test_files_are_bounded_and_the_newest_lines_stay(tmp_path: Path, generations
     assert kept == [str(number) for number in range(200 - len(kept), 200)]
 
 
-def test_a_full_disk_leaves_no_half_line_and_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_no_half_line_and_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     log = AuditLog(tmp_path / "a", 1 << 20, 2)
     really_write = os.write
     room = 600

@@ -213,7 +213,7 @@ def test_an_operator_who_flips_a_mode_100_times_a_second(tmp_path: Path) -> None
     ticks = round(minutes * WINDOW_S / TICK_S)
     for _ in range(ticks):
         for _ in range(round(100 * TICK_S / 2)):
-            ground.take(action("enabled: true", answer="preview is running, BALANCED"))
+            ground.take(action("enabled: true", answer="preview is running, balanced"))
             ground.take(action("enabled: false", answer="preview is off"))
         ground.wait(TICK_S)
     assert sum(each.count for each in ground.records) >= 100 * (minutes - 1) * WINDOW_S

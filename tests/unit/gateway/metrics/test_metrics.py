@@ -36,6 +36,7 @@ from gateway.status.preview import (
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Received, Velocity
+from tests.support.drive_views import stopped_view
 from tests.support.eventually import eventually
 
 ROOT = Path(__file__).parents[4]
@@ -66,6 +67,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
         faults=(Fault(FAULT, 1.0, 2.0, None, 1), Fault(FAULT, 1.0, 2.0, 3.0, 1)),
         gateway=Runtime("abc", "boot", 61_500, 3, 10, 1),
         pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
+        teleop=stopped_view(NOW_S),
     )
 
 
@@ -98,6 +100,7 @@ def families(calls: Stats, now: Snapshot | None = None) -> list[Metric]:
         status_stream=world,
         event_stream=world,
         preview_link=world,
+        drive_link=world,
     )
     return list(text_string_to_metric_families(collector.text().decode()))
 
@@ -137,7 +140,7 @@ def test_a_histogram_counts_what_is_not_longer_than_each_bound() -> None:
     assert histogram.sum_s == pytest.approx(7.65)
 
 
-def test_calls_are_told_apart_by_method_and_code() -> None:
+def test_calls_are_counted_by_method_and_code() -> None:
     shown = values(some_calls())
     assert shown["robot_gateway_requests_total", "code=OK method=GetSystemStatus"] == 2
     assert shown["robot_gateway_requests_total", "code=INVALID_ARGUMENT method=SetPreviewMode"] == 1
@@ -197,7 +200,7 @@ def test_the_running_preview() -> None:
     [None, Received(Measurement(29.5, 2400.0, 2, 12, 180.0, 6.0), NOW_S - 60)],
     ids=["none", "of a minute ago"],
 )
-def test_figures_that_nobody_measured_now_are_not_told(measured: Received[Measurement] | None) -> None:
+def test_figures_without_a_present_measurement_are_left_out(measured: Received[Measurement] | None) -> None:
     shown = values(Stats(), snapshot(replace(PREVIEW, measured=measured)))
     assert ("robot_gateway_preview_viewers", "") not in shown
     assert shown["robot_gateway_preview_starts_total", ""] == 4
@@ -220,7 +223,7 @@ def test_a_busy_loop_is_seen() -> None:
     assert delay.delays.sum_s >= 0.1
 
 
-def test_the_page_names_what_is_told_and_nothing_else() -> None:
+def test_the_page_names_exactly_the_metrics() -> None:
     shown = {family.name for family in families(some_calls())}
     page = (ROOT / "docs/metrics.md").read_text()
     documented = {
@@ -229,7 +232,7 @@ def test_the_page_names_what_is_told_and_nothing_else() -> None:
     assert documented == shown
 
 
-def test_the_dashboard_asks_for_what_is_told() -> None:
+def test_the_dashboard_queries_existing_metrics() -> None:
     dashboard = json.loads((ROOT / "docs/grafana-dashboard.json").read_text())
     queries = [target["expr"] for panel in dashboard["panels"] for target in panel.get("targets", ())]
     asked = set(re.findall(r"robot_gateway_\w+", " ".join(queries)))

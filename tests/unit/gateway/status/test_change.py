@@ -11,7 +11,9 @@ from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Measurement, PreviewState
 from gateway.status.snapshot import Runtime, Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
+from gateway.status.teleop import DrivePhase
 from gateway.status.values import Mode, Received, Velocity
+from tests.support.drive_views import actual, stopped_view
 from tests.support.status import OFF, snapshot_of
 
 FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
@@ -74,3 +76,18 @@ def test_this_is_a_change(later: Snapshot) -> None:
 def test_every_field_of_the_snapshot_is_projected_or_excluded_by_name() -> None:
     assert PROJECTIONS.keys() | EXCLUDED == {field.name for field in fields(Snapshot)}
     assert not PROJECTIONS.keys() & EXCLUDED
+
+
+def test_driving_wakes_watchers_when_an_operator_would_act_on_it_and_not_with_each_velocity() -> None:
+    view = stopped_view(100.0)
+    drive = view.drive
+    moved = replace(drive, actual=actual(phase=DrivePhase.STOPPED, stop=drive.stop, monotonic_ns=2))
+    before = change_key(snapshot(teleop=view))
+    assert change_key(snapshot(teleop=replace(view, drive=moved))) == before
+    for changed in (
+        replace(view, holder="another"),
+        replace(view, inhibits=()),
+        replace(view, drive=replace(drive, error="gone")),
+        replace(view, drive=replace(drive, actual=actual(phase=DrivePhase.ARMED))),
+    ):
+        assert change_key(snapshot(teleop=changed)) != before

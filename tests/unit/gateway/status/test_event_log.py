@@ -58,7 +58,7 @@ def test_a_long_reading_is_cut() -> None:
     assert reading.position == Position("run", 5)
 
 
-def test_who_is_too_late_is_told_how_many_it_missed() -> None:
+def test_a_late_subscriber_learns_how_many_it_missed() -> None:
     reading = filled(10).read(Position("run", 2), 100)
     assert reading.gap == Gap(GapReason.NO_LONGER_KEPT, 4, Position("run", 6))
     assert [event.sequence for event in reading.events] == [7, 8, 9, 10]

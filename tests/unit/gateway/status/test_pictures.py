@@ -40,7 +40,7 @@ def test_a_viewers_newest_report_replaces_its_last_one(reports: PictureReports) 
     assert reports.counting(AT_S + 1) == Pictures(1, 90, 88)
 
 
-def test_viewers_of_a_caller_are_told_apart_and_so_are_callers(reports: PictureReports) -> None:
+def test_viewers_of_a_caller_are_distinguished_and_so_are_callers(reports: PictureReports) -> None:
     for caller, viewer_id in (("anna", "left"), ("anna", "right"), ("ben", "left")):
         reports.take(caller, viewer_id, REPORT, AT_S)
     assert reports.counting(AT_S).viewer_count == 3

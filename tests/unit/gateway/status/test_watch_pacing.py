@@ -29,7 +29,7 @@ def test_a_longer_interval_is_the_heartbeat_as_well() -> None:
     st.integers(0, 60_000),
     st.lists(st.tuples(st.integers(1, 30), st.booleans()), min_size=1, max_size=200),
 )
-def test_never_too_often_and_every_change_is_told(asked_ms: int, steps: list[tuple[int, bool]]) -> None:
+def test_never_too_often_and_every_change_is_sent(asked_ms: int, steps: list[tuple[int, bool]]) -> None:
     now, version, told_at, told_version = 0, 0, 0, 0
     pace = WatchPacing(asked_ms, now, version)
     for ticks, changed in steps:

@@ -61,7 +61,7 @@ def ground() -> Ground:
 @pytest.mark.parametrize(
     ("enabled", "state", "answer"),
     [
-        (ON, PreviewState.RUNNING, "preview is already running, BALANCED; nothing changed"),
+        (ON, PreviewState.RUNNING, "preview is already running, balanced; nothing changed"),
         (ON, PreviewState.STARTING, "preview is not running yet (starting); check the status for progress"),
         (OFF, PreviewState.DISABLED, "preview is off"),
         (OFF, PreviewState.STOPPING, "preview is not off yet (stopping); check the status for progress"),
@@ -124,4 +124,4 @@ async def test_another_profile_is_a_new_request(ground: Ground) -> None:
     await ground.set_mode(ON, Profile.HIGH_QUALITY)
     assert ground.link.desired.revision > before.revision
     ground.report(PreviewState.RUNNING)
-    assert await ground.set_mode(ON, None) == "preview is already running, HIGH_QUALITY; nothing changed"
+    assert await ground.set_mode(ON, None) == "preview is already running, high-quality; nothing changed"

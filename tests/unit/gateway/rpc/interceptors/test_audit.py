@@ -149,11 +149,11 @@ def test_a_single_control_action_has_no_start() -> None:
         (SetPreviewModeRequest(), "enabled: false"),
         (
             SetPreviewModeRequest(profile=PREVIEW_PROFILE_LOW_BW),
-            "enabled: false profile: PREVIEW_PROFILE_LOW_BW",
+            "enabled: false profile: low-bw",
         ),
         (
             SetPreviewModeRequest(enabled=True, profile=PREVIEW_PROFILE_LOW_BW),
-            "enabled: true profile: PREVIEW_PROFILE_LOW_BW",
+            "enabled: true profile: low-bw",
         ),
     ],
 )

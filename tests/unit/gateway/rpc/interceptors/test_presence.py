@@ -1,5 +1,7 @@
 """A client that stays is reported once when it joins and once when it leaves; one that only looks is not."""
 
+from gateway.access.credential import Principal
+from gateway.access.role import Role
 from gateway.rpc.interceptors.presence import JOINED_AFTER_S, Presence
 from gateway.status.event import ClientJoined, ClientLeft, Event
 from tests.support.calls import call_of
@@ -52,3 +54,15 @@ def test_a_client_that_only_looks_is_not_reported() -> None:
 def test_polling_is_no_presence() -> None:
     assert not World().presence.applies_to(call_of("GetSystemStatus").method)
     assert World().presence.applies_to(call_of("WatchSystemStatus", streaming=True).method)
+
+
+def test_who_joins_is_named_where_that_is_known() -> None:
+    world = World()
+    stream = call_of("WatchSystemStatus", streaming=True)
+    stream.principal = Principal("anna", Role.VIEWER, ("a1",))
+    world.presence.on_call(stream)
+    world.now_s += JOINED_AFTER_S
+    assert world.reported() == [ClientJoined(ADDRESS, "anna")]
+    world.presence.on_end(stream, None)
+    assert world.reported()[-1] == ClientLeft(ADDRESS, "anna")
+    assert [each.message for each in world.events] == ["anna joined", "anna left"]

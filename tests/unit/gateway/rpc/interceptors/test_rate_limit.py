@@ -12,6 +12,7 @@ from common.reasons import Reason
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer
 from gateway.rpc.calls.call import peer_of as peer_of_connection
+from gateway.rpc.calls.methods import TELEOP
 from gateway.rpc.connections.admission import FORGIVEN_AFTER_S, QUIET_AFTER_S, Admission
 from gateway.rpc.connections.refusal_delay import REFUSAL_DELAY_S, REFUSAL_SPACING_S, RefusalDelay
 from gateway.rpc.interceptors.rate_limit import RateLimit
@@ -230,3 +231,15 @@ async def test_a_delayed_refusal_leaves_no_garbage_behind() -> None:
         assert gone() is None
     finally:
         gc.enable()
+
+
+def test_a_stop_is_never_refused_and_takes_nothing_from_others() -> None:
+    """Whatever the connection has used up: calls, streams, places."""
+    none_left = Admission(LimitSettings(connections=1, requests_per_s=1, burst=1), Clock())
+    call(none_left, "a")
+    limit = RateLimit(none_left, RefusalDelay(), admits=True)
+    for peer in ("ipv4:10.1.1.97:1", "ipv4:10.9.9.9:1"):
+        for _ in range(100):
+            assert limit.on_call(call_of("StopRobot", peer=peer, service=TELEOP.full_name)) is None
+    with pytest.raises(TooMuchError):
+        none_left.take_token(peer_of("a"))

@@ -57,7 +57,8 @@ from gateway.status.values import (
     Velocity,
     Vision,
 )
-from omniseer.gateway.v1 import fault_pb2, preview_pb2, source_pb2, states_pb2
+from omniseer.gateway.v1 import fault_pb2, preview_pb2, source_pb2, states_pb2, teleop_pb2
+from tests.support.drive_views import stopped_view
 
 NOW_S = 1000.0
 CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
@@ -119,6 +120,7 @@ def snapshot(
         ),
         now_s=now_s,
         pictures=Pictures(viewer_count=82, worst_age_ms=141, link_age_ms=139),
+        teleop=stopped_view(now_s),
     )
 
 
@@ -268,6 +270,25 @@ PLACES: dict[str, Any] = {
     "gateway.requests_served": 205,
     "gateway.requests_refused": 206,
     "gateway.run_id": "a run",
+    "teleop.state": states_pb2.TELEOP_ENABLED,
+    "teleop.enabled": True,
+    "teleop.last_command_available": True,
+    "teleop.last_command_stale": True,
+    "teleop.last_command_age_ms": 507,
+    "teleop.last_command_vx_mps": 0.0625,
+    "teleop.last_command_vy_mps": -0.03125,
+    "teleop.last_command_wz_rad_s": 0.15625,
+    "teleop.max_linear_mps": 0.40625,
+    "teleop.max_angular_rad_s": 0.90625,
+    "teleop.last_error": "why a command was refused",
+    "teleop.phase": teleop_pb2.DRIVE_PHASE_STOPPED,
+    "teleop.inhibits[0]": teleop_pb2.DRIVE_INHIBIT_BASE_ABSENT,
+    "teleop.inhibits[1]": teleop_pb2.DRIVE_INHIBIT_DRIVE_LOST,
+    "teleop.holder": "a driver",
+    "teleop.stop.stop_id": 221,
+    "teleop.stop.by": "who stopped",
+    "teleop.stop.reason": "a reason to stop",
+    "teleop.stop.age_ms": 2625,
 }
 """Path in a SystemStatus, without `sources`, and its value."""
 

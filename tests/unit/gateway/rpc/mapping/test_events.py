@@ -30,8 +30,8 @@ DETAILS: list[Detail] = [
     FaultCleared(FAULT),
     PreviewChanged(PreviewState.FAULTED, Profile.LOW_BW, "no camera"),
     EncoderFallback("x264", "mpp", "it hangs"),
-    ClientJoined("10.0.0.1:1"),
-    ClientLeft("10.0.0.1:1"),
+    ClientJoined("10.0.0.1:1", "alice"),
+    ClientLeft("10.0.0.1:1", "alice"),
     ControlAction("alice", "10.0.0.1:1", "SetPreviewMode", "enabled: true", ControlResult.REFUSED, "no"),
     ModeChanged("exploring"),
 ]
@@ -65,7 +65,7 @@ def test_every_payload_of_the_schema_comes_from_somewhere() -> None:
     assert sent == {field.name for field in EventMessage.DESCRIPTOR.oneofs_by_name["payload"].fields}
 
 
-def test_a_gap_and_a_position_are_told_whole() -> None:
+def test_a_gap_and_a_position_are_sent_whole() -> None:
     gap = gap_message(Gap(GapReason.NEW_RUN, 3, Position("run", 12)))
     assert (gap.missed_count, gap.position.run_id, gap.position.sequence) == (3, "run", 12)
     assert position_from(position_message(Position("run", 12))) == Position("run", 12)

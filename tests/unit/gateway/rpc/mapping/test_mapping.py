@@ -10,7 +10,8 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from common.errors import InvalidRequestError
-from gateway.rpc.calls.methods import Method
+from gateway.access.role import Role
+from gateway.rpc.calls.methods import SERVICES, Method
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats
 from gateway.rpc.mapping import enums
@@ -48,6 +49,7 @@ from gateway.status.sources import (
     ROS_SOURCES,
     VISION,
 )
+from gateway.status.teleop import DriveInhibit, DrivePhase
 from gateway.status.values import (
     Battery,
     Compute,
@@ -67,17 +69,14 @@ from omniseer.gateway.v1 import (
     robot_gateway_pb2,
     source_pb2,
     states_pb2,
-    system_status_pb2,
+    teleop_pb2,
 )
+from tests.support.drive_views import stopped_view
 
 FRESH = SourceRule(10**9, required=True)
 NOW_S = 1000.0
 CALLER = Recipient(robot_host="10.1.2.3", sees_passphrase=True)
 FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "look at it")
-NOT_SERVED = {
-    # Declared by the locked contract, implemented with teleoperation.
-    "omniseer.gateway.v1.SystemStatus.teleop",
-}
 
 
 @pytest.mark.parametrize(
@@ -89,6 +88,8 @@ NOT_SERVED = {
         (SourceState, enums.SOURCE_STATES, source_pb2.SourceState),
         (Severity, enums.SEVERITIES, fault_pb2.FaultSeverity),
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
+        (DrivePhase, enums.DRIVE_PHASES, teleop_pb2.DrivePhase),
+        (DriveInhibit, enums.DRIVE_INHIBITS, teleop_pb2.DriveInhibit),
     ],
 )
 def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table: Any, wire_enum: Any) -> None:
@@ -105,17 +106,27 @@ def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
 
 
 def test_every_method_of_the_contract_has_a_handler() -> None:
-    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-    assert service.full_name == SERVICE
+    assert SERVICES[0].full_name == SERVICE
     anything: Any = _AnyService()
-    methods = Services(anything, anything, anything, anything).methods()
-    assert set(methods) == {method.name for method in service.methods}
+    methods = Services(anything, anything, anything, anything, anything).methods()
+    names = [method.name for service in SERVICES for method in service.methods]
+    assert set(methods) == set(names)
+    assert len(methods) == len(names), "statistics tell methods apart by their names"
 
 
-def test_a_viewer_can_change_nothing() -> None:
-    methods = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods_by_name
-    changing = {name for name in methods if Method(f"/{SERVICE}/{name}").changes_robot}
-    assert changing == {"SetPreviewMode"}
+def test_the_control_actions_are_these_and_a_viewer_may_only_stop() -> None:
+    methods = [Method(f"/{each.full_name}/{name}") for each in SERVICES for name in each.methods_by_name]
+    changing = {method.name: method.needed for method in methods if method.changes_robot}
+    assert changing.pop("StopRobot") is Role.VIEWER
+    assert changing == dict.fromkeys(
+        ("SetPreviewMode", "SetTeleopEnabled", "SendTeleopCommand", "Drive", "ResetStop"), Role.OPERATOR
+    )
+
+
+def test_no_limit_applies_to_the_stop_alone() -> None:
+    methods = [Method(f"/{each.full_name}/{name}") for each in SERVICES for name in each.methods_by_name]
+    assert [method.name for method in methods if method.unlimited] == ["StopRobot"]
+    assert not Method("/other.Service/StopRobot").unlimited
 
 
 class _AnyService:
@@ -169,6 +180,7 @@ def everything() -> Snapshot:
         faults=(Fault(FAULT, at_s - 1, at_s, None, 1), Fault(FAULT, at_s - 3, at_s - 1, at_s, 2)),
         now_s=NOW_S,
         pictures=Pictures(1, 140, 138),
+        teleop=stopped_view(NOW_S),
     )
 
 
@@ -184,8 +196,6 @@ def merged(items: Any) -> Any:
 
 def unset(message: Any, descriptor: Descriptor) -> Iterator[str]:
     for field in descriptor.fields:
-        if field.full_name in NOT_SERVED:
-            continue
         value = getattr(message, field.name)
         if field.is_repeated:
             if not value:
@@ -204,9 +214,6 @@ def unset(message: Any, descriptor: Descriptor) -> Iterator[str]:
 def test_a_full_snapshot_sets_every_field_of_the_contract() -> None:
     overlay = overlay_snapshot(everything(), CALLER)
     assert not list(unset(overlay, overlay_pb2.OverlaySnapshot.DESCRIPTOR))
-    assert {field.full_name for field in system_status_pb2.SystemStatus.DESCRIPTOR.fields} >= NOT_SERVED, (
-        "the list of exceptions names fields that don't exist"
-    )
 
 
 def test_the_info_sets_every_field_of_its_answer() -> None:

@@ -212,7 +212,7 @@ def test_names_that_are_no_names_and_texts_without_end() -> None:
     fault.message.encode("utf-8")
 
 
-def test_a_type_that_is_not_installed_is_told_at_once_and_names_no_type() -> None:
+def test_a_missing_type_is_reported_at_once_without_its_name() -> None:
     of = board()
     of.unusable[DETECTIONS] = "message type yolo_msgs/msg/DetectionArray is not installed"
     faults = found(snapshot(of, detections=False), up_s=0.0)

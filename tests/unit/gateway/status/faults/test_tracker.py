@@ -97,7 +97,7 @@ def test_counts_are_kept_of_the_latest_ids_alone(book: FaultTracker) -> None:
     assert raised(*(f"three {number}" for number in range(1024)), "a") == 1, "1024 others came since"
 
 
-def test_getting_worse_is_told_and_keeps_the_onset(book: FaultTracker) -> None:
+def test_getting_worse_is_reported_and_keeps_the_onset(book: FaultTracker) -> None:
     book.update([condition("a")], 10.0)
     changes = book.update([condition("a", Severity.ERROR, "it burns")], 11.0)
     assert ids(changes.worsened) == ["a"]

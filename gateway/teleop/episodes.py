@@ -1,0 +1,62 @@
+"""Times of motion for the audit log: who drove, how long, how far, and why it ended."""
+
+import math
+import time
+from collections import deque
+from typing import Final, Protocol
+
+from gateway.status.event import ControlAction, ControlResult
+from gateway.status.teleop import DriveEpisode
+from gateway.teleop.lease import Driver
+
+_REMEMBERED: Final = 8
+"""Drivers: a time of motion may end after its lease."""
+_NS_PER_S: Final = 1_000_000_000
+
+
+class EpisodeSink(Protocol):
+    """Where times of motion are recorded."""
+
+    def record_action(self, action: ControlAction) -> None:
+        """Takes an action of this instant."""
+
+
+class Episodes:
+    """Records each time of motion that the drive program reports.
+
+    Args:
+        sink: where to.
+    """
+
+    def __init__(self, sink: EpisodeSink) -> None:
+        self._sink = sink
+        self._began_ns = time.monotonic_ns()
+        self._drivers: deque[tuple[Driver, str]] = deque(maxlen=_REMEMBERED)
+        self._recorded: tuple[str, int] | None = None
+
+    def note(self, driver: Driver, input_device: str) -> None:
+        """Notes who drives from now on, and with what."""
+        self._drivers.append((driver, input_device))
+
+    def record(self, instance_id: str, episode: DriveEpisode) -> None:
+        """Records a time of motion that has ended, once."""
+        # What ended earlier was recorded by an earlier gateway.
+        if self._recorded == (instance_id, episode.episode_id) or episode.ended_ns < self._began_ns:
+            return
+        self._recorded = instance_id, episode.episode_id
+        drivers = (each for each in reversed(self._drivers) if each[0].name == episode.holder)
+        driver, device = next(drivers, (Driver("", episode.holder, ""), ""))
+        duration_s = (episode.ended_ns - episode.started_ns) / _NS_PER_S
+        moved = f"{duration_s:.1f} s, {episode.distance_m:.2f} m, {math.degrees(episode.turned_rad):.0f} deg"
+        self._sink.record_action(
+            ControlAction(
+                who=driver.name if driver.role else "",
+                address=driver.address or episode.holder,
+                method="Drive",
+                request=f"{moved}, by {device}" if device else moved,
+                result=ControlResult.ACCEPTED,
+                answer=episode.ended_by,
+                role=driver.role,
+                credential=driver.credential,
+            )
+        )

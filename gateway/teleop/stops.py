@@ -1,0 +1,98 @@
+"""Stops and their resets, confirmed by the drive program."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+from common.errors import DriveUnreachableError, PreconditionError
+from common.reasons import Reason
+from gateway.links.drive.commands import DriveCommands
+from gateway.links.drive.state import DriveLink
+from gateway.status.teleop import DrivePhase, DriveView, StopLatch
+
+CONFIRMED_WITHIN_S: Final = 1.0
+"""How long the drive program may take to confirm a stop, a reset or a switch."""
+HOW_TO_REACH: Final = (
+    "start or restart robot-drive on the robot; the gateway connects by itself. Without the gateway's "
+    "commands it publishes zeros, or nothing"
+)
+_SHARED_NS: Final = 100_000_000
+"""A caller who repeats a stop within this time gets the same answer, from memory."""
+_NS_PER_S: Final = 1_000_000_000
+
+
+class Stops:
+    """Stops the robot, for anyone, and resets that.
+
+    Args:
+        link: to the drive program.
+        commands: what it is sent beside the desired state.
+    """
+
+    def __init__(self, link: DriveLink, commands: DriveCommands) -> None:
+        self._link = link
+        self._commands = commands
+        self._stopped_ns: dict[str, int] = {}
+        """When the newest stop was confirmed, by caller; empty after a reset."""
+
+    async def stop(self, by: str, reason: str) -> StopLatch:
+        """Stops the robot, and returns the stop when the drive program has confirmed it.
+
+        Args:
+            by: who, for people.
+            reason: why, for people.
+
+        Raises:
+            DriveUnreachableError: it has not.
+        """
+        stop, now_ns = self._link.view.stop, time.monotonic_ns()
+        recent = now_ns - self._stopped_ns.get(by, -_NS_PER_S) < _SHARED_NS
+        if stop and stop.by == by and recent and self._link.view.reachable:
+            return stop  # Repeated by the same caller, perhaps very often: one confirmation serves all.
+        if not self._commands.stop(by, reason):
+            raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
+        if not await self._confirmed(now_ns, lambda view: view.phase is DrivePhase.STOPPED):
+            raise DriveUnreachableError(
+                f"the robot's drive program has not confirmed the stop: {HOW_TO_REACH}"
+            )
+        stop = self._link.view.stop
+        if stop is None:
+            raise DriveUnreachableError(f"the stop is already reset; stop again, or {HOW_TO_REACH}")
+        self._stopped_ns = {by: time.monotonic_ns()}
+        return stop
+
+    async def reset(self, stop_id: int) -> str:
+        """Resets a stop; returns what happened, for people.
+
+        Raises:
+            PreconditionError: it is not the present one, or the driver holds.
+            DriveUnreachableError: the drive program does not answer.
+        """
+        stop, now_ns = self._link.view.stop, time.monotonic_ns()
+        if stop is None or stop.stop_id != stop_id:
+            present = (
+                f"the present stop is {stop.stop_id}, by {stop.by}" if stop else "the robot is not stopped"
+            )
+            raise PreconditionError(f"stop {stop_id} can't be reset: {present}", Reason.STOP_NOT_RESET)
+        self._stopped_ns.clear()
+        sent = self._commands.reset(stop_id)
+        if not sent or not await self._confirmed(now_ns, lambda _: True):
+            raise DriveUnreachableError(f"the robot's drive program does not answer: {HOW_TO_REACH}")
+        newer = self._link.view.stop
+        if newer and newer.stop_id == stop_id:
+            raise PreconditionError(
+                f"stop {stop_id} is not reset: the driver holds. Release first", Reason.STOP_NOT_RESET
+            )
+        if newer:
+            return f"stop {stop_id} is reset; the robot was stopped again by {newer.by}"
+        return "the stop is reset; the driver has to release and to hold again"
+
+    async def _confirmed(self, since_ns: int, reached: Callable[[DriveView], bool]) -> bool:
+        """Waits for a report that is newer than an instant and for which `reached` holds."""
+
+        def holds() -> bool:
+            view = self._link.view
+            fresh = view.actual is not None and view.actual.monotonic_ns >= since_ns
+            return view.reachable and fresh and reached(view)
+
+        return await self._link.changes.wait_until(holds, CONFIRMED_WITHIN_S)

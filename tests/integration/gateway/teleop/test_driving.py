@@ -1,0 +1,372 @@
+"""Driving with real parts: client library, gateway, drive program, and a subscriber in the base's place.
+
+One robot serves all tests of a module: each begins with a driver's own session and ends without one.
+"""
+
+import asyncio
+import struct
+import threading
+import time
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
+from typing import Any
+
+import grpc
+import pytest
+
+from common.reasons import Reason
+from console.client import (
+    AsyncGatewayClient,
+    CaughtUp,
+    DriveInhibit,
+    DriveOptions,
+    DrivePhase,
+    DriveSession,
+    Event,
+    GatewayError,
+    Overloaded,
+    Refused,
+)
+from console.client.error_table import error_from
+from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
+from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
+from tests.support.driven_robot import BY_EYE, DrivenRobot, in_motion, is_at_rest
+from tests.support.eventually import eventually
+from tests.support.running_gateway import raw_unary
+
+pytestmark = pytest.mark.ros
+SPEED_MPS = 0.1
+
+
+@pytest.fixture
+async def client(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
+    async with AsyncGatewayClient(robot.target) as client:
+        yield client
+        # What a test leaves behind must not stop the next one.
+        teleop = (await client.status()).teleop
+        if teleop.stop:
+            await client.reset_stop(teleop.stop.stop_id)
+        await eventually(
+            lambda: teleop_of(client), lambda it: it.phase is DrivePhase.AVAILABLE, "no one drives any more"
+        )
+
+
+async def teleop_of(client: AsyncGatewayClient) -> Any:
+    return (await client.status()).teleop
+
+
+async def in_phase(session: DriveSession, phase: DrivePhase) -> None:
+    async def present() -> DrivePhase | None:
+        session.check()
+        return session.state.phase if session.state else None
+
+    await eventually(present, lambda seen: seen is phase, phase.value)
+
+
+async def test_a_hold_moves_the_robot_and_a_release_stops_it(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    async with client.drive(BY_EYE) as session:
+        assert session.limits is not None
+        await in_motion(session, robot.base, SPEED_MPS)
+        await in_phase(session, DrivePhase.DRIVING)
+        teleop = await teleop_of(client)
+        assert (teleop.phase, teleop.holder, teleop.stop) == (DrivePhase.DRIVING, "127.0.0.1", None)
+        session.release()
+        await in_phase(session, DrivePhase.ARMED)
+        assert not robot.base.moves
+    await eventually(lambda: teleop_of(client), lambda it: not it.holder, "no one drives any more")
+    assert not robot.base.moves, "the last message is zero"
+    assert all(abs(each.vx_mps) <= SPEED_MPS + 1e-6 for each in robot.base.heard)
+
+
+async def test_a_session_that_is_left_by_an_error_stops_the_robot(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    async def fails() -> None:
+        async with client.drive(BY_EYE) as session:
+            await in_motion(session, robot.base, SPEED_MPS)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        await fails()
+    await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
+    assert (await teleop_of(client)).stop is None, "that was a release, not a loss"
+
+
+async def test_hands_that_no_longer_report_are_a_release(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    async with client.drive(BY_EYE) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        # From here on the program holds no more, and does not release either.
+        await in_phase(session, DrivePhase.ARMED)
+        assert not robot.base.moves
+
+
+async def test_anyone_may_stop_and_only_that_stop_is_reset(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    async with client.drive(BY_EYE) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        stopped = await client.stop_robot("a child on the track")
+        assert stopped.stop.reason == "a child on the track"
+        assert not robot.base.moves or await is_at_rest(robot.base)
+        assert (await client.stop_robot("again")).stop.stop_id == stopped.stop.stop_id
+        await in_phase(session, DrivePhase.STOPPED)
+        session.hold(SPEED_MPS)
+        await asyncio.sleep(0.05)
+        for stop_id in (stopped.stop.stop_id, stopped.stop.stop_id + 1):
+            # While the driver holds; and not the stop that there is.
+            session.hold(SPEED_MPS)
+            with pytest.raises(Refused) as refused:
+                await client.reset_stop(stop_id)
+            assert refused.value.reason == Reason.STOP_NOT_RESET
+        session.release()
+        await asyncio.sleep(0.1)
+        await client.reset_stop(stopped.stop.stop_id)
+        await in_phase(session, DrivePhase.ARMED)
+        assert not robot.base.moves
+        # Released meanwhile, so a new hold moves it again.
+        await in_motion(session, robot.base, SPEED_MPS)
+
+
+async def test_a_lost_driver_leaves_a_stopped_robot(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
+    channel = grpc.aio.insecure_channel(robot.target, options=(("grpc.use_local_subchannel_pool", 1),))
+    async with channel:
+        lane: Any = TeleopServiceStub(channel).Drive()
+        supervision = teleop_pb2.SUPERVISION_LINE_OF_SIGHT
+        await lane.write(teleop_pb2.DriveRequest(open=teleop_pb2.DriveOpen(supervision=supervision)))
+        await lane.read()
+        newest: list[Any] = []
+
+        async def read() -> None:
+            while (response := await lane.read()) is not grpc.aio.EOF:
+                newest[:] = [response.state]
+
+        reading = asyncio.create_task(read())
+        await eventually(lambda: _of(newest), bool, "a state")
+        for sequence in range(1, 500):
+            await lane.write(raw_command(sequence, newest[0], held=sequence > 5))
+            await asyncio.sleep(0.02)
+            if robot.base.moves:
+                break
+        assert robot.base.moves
+        reading.cancel()
+    # The channel is closed: both directions are gone at once.
+    teleop = await eventually(lambda: teleop_of(client), lambda it: it.stop is not None, "stopped")
+    assert "lost" in teleop.stop.reason
+    assert await is_at_rest(robot.base)
+
+
+async def _of(items: list[Any]) -> int:
+    return len(items)
+
+
+def raw_command(sequence: int, state: Any, *, held: bool) -> Any:
+    valid_until_ns = time.monotonic_ns() + 250_000_000
+    command = teleop_pb2.DriveCommand(
+        sequence=sequence,
+        held=held,
+        vx_mps=SPEED_MPS,
+        echo_monotonic_ns=state.monotonic_ns,
+        valid_until_monotonic_ns=valid_until_ns,
+    )
+    return teleop_pb2.DriveRequest(command=command)
+
+
+async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
+    async with client.drive(BY_EYE) as session:
+        await eventually(lambda: _lanes(session), lambda count: count == 2, "two lanes")
+        await in_motion(session, robot.base, SPEED_MPS)
+        # The test's own hand in the library: only there one lane can be cut.
+        session._tasks[1].cancel()
+        for _ in range(15):
+            session.hold(SPEED_MPS)
+            await asyncio.sleep(0.02)
+        session.check()
+        assert robot.base.moves
+
+
+async def _lanes(session: DriveSession) -> int:
+    return session.open_lanes
+
+
+async def test_another_driver_waits_or_takes_over(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
+    async with AsyncGatewayClient(robot.target) as other, client.drive(BY_EYE) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        for take_over in (False, True):
+            with pytest.raises(Refused) as refused:
+                async with other.drive(replace(BY_EYE, take_over=take_over)):
+                    pass
+            assert refused.value.reason == Reason.LEASE_HELD
+            session.hold(SPEED_MPS)
+        session.release()
+        taking = replace(BY_EYE, take_over=True)
+
+        async def taken_over() -> bool:
+            try:
+                async with other.drive(taking) as second:
+                    await in_phase(second, DrivePhase.ARMED)
+                    return True
+            except Refused:
+                return False
+
+        await eventually(taken_over, bool, "taken over after 2 s without a hold")
+        with pytest.raises(Refused) as ended:
+            await eventually(lambda: _checked(session), bool, "the first session has ended")
+        assert ended.value.reason == Reason.LEASE_LOST
+
+
+async def _checked(session: DriveSession) -> bool:
+    session.check()
+    return False
+
+
+async def test_without_a_picture_nothing_moves_under_supervision(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    async with client.drive(DriveOptions(picture=time.monotonic_ns)) as session:
+        for _ in range(25):
+            session.hold(SPEED_MPS)
+            await asyncio.sleep(0.02)
+        with pytest.raises(Refused, match="no picture"):
+            await session.ready(within_s=0.2)
+        assert session.state is not None
+        assert session.state.inhibits == (DriveInhibit.PICTURE_MISSING,)
+        assert not robot.base.moves
+
+
+async def test_disabling_ends_the_session(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
+    async with client.drive(BY_EYE) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        answer = await client.set_driving_enabled(False)
+        assert (answer.accepted, answer.teleop.enabled) == (True, False)
+        with pytest.raises(Refused) as ended:
+            await eventually(lambda: _checked(session), bool, "the session has ended")
+        assert ended.value.reason == Reason.TELEOP_DISABLED
+    assert await is_at_rest(robot.base)
+    with pytest.raises(Refused) as refused:
+        async with client.drive(BY_EYE):
+            pass
+    assert refused.value.reason == Reason.TELEOP_DISABLED
+    assert (await client.send_velocity(SPEED_MPS)).accepted is False
+    assert (await client.set_driving_enabled(True)).accepted
+
+
+async def test_single_commands_of_older_tools_move_slowly_and_not_for_long(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    for refused in ((0.36, 0.0, 0.0), (0.0, -0.36, 0.0), (0.0, 0.0, 0.81), (float("nan"), 0.0, 0.0)):
+        assert not (await client.send_velocity(*refused)).accepted
+    robot.base.heard.clear()
+    answer = await client.send_velocity(0.3)
+    assert answer.accepted, answer.message
+    await eventually(lambda: _moves(robot), bool, "it moves")
+    await eventually(lambda: is_at_rest(robot.base), bool, "it has stopped by itself")
+    moving = [each for each in robot.base.heard if each.moves]
+    assert max(each.vx_mps for each in moving) <= 0.15 + 1e-6
+    assert moving[-1].at_s - moving[0].at_s <= 0.5
+    await client.send_velocity(0.0)
+    assert (await teleop_of(client)).last_command.available
+
+
+async def sent_on_a_channel_of_its_own(robot: DrivenRobot, method: str, request: bytes) -> bytes:
+    """As the tools in the field do it: bytes by the locked numbers, a new connection for each call."""
+    options = (("grpc.use_local_subchannel_pool", 1),)
+    async with grpc.aio.insecure_channel(robot.target, options=options) as channel:
+        call = raw_unary(channel, f"/omniseer.gateway.v1.RobotGateway/{method}")
+        return await call(request, timeout=5)
+
+
+async def test_the_bytes_of_tools_in_the_field_drive_and_every_command_ends_by_itself(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    enabled = await sent_on_a_channel_of_its_own(robot, "SetTeleopEnabled", b"\x08\x01")
+    assert enabled.startswith(b"\x08\x01"), "accepted = 1: true"
+    robot.base.heard.clear()
+    forward = b"\x0d" + struct.pack("<f", 0.1) + b"\x1d" + struct.pack("<f", -0.2)
+    for _ in range(5):
+        answer = await sent_on_a_channel_of_its_own(robot, "SendTeleopCommand", forward)
+        assert answer.startswith(b"\x08\x01"), answer
+        await asyncio.sleep(0.2)
+    sent_s = time.monotonic() - 0.2
+    await eventually(lambda: is_at_rest(robot.base), bool, "it has stopped by itself")
+    moving = [each for each in robot.base.heard if each.moves]
+    assert {(each.vy_mps, each.vx_mps > 0, each.wz_rad_s < 0) for each in moving[5:]} == {(0.0, True, True)}
+    assert robot.base.stopped_after_s(sent_s) <= 0.6, "500 ms, and its way"
+    beyond = b"\x0d" + struct.pack("<f", 0.4)
+    refused = system_message(await sent_on_a_channel_of_its_own(robot, "SendTeleopCommand", beyond))
+    assert (refused.accepted, "0.35" in refused.message) == (False, True)
+    assert refused.teleop.last_error == refused.message
+    await client.status()
+
+
+def system_message(answer: bytes) -> Any:
+    return robot_gateway_pb2.SendTeleopCommandResponse.FromString(answer)
+
+
+async def _moves(robot: DrivenRobot) -> bool:
+    return robot.base.moves
+
+
+async def test_a_flood_closes_the_lane_and_a_second_opening_is_an_error(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    await client.status()
+    with pytest.raises(Overloaded) as flooded:
+        await raw_lane(robot, [{"command": {"sequence": number}} for number in range(1, 500)])
+    assert flooded.value.reason == Reason.TOO_MANY_REQUESTS
+    wrong: list[dict[str, Any]] = [{"open": {}}, {"command": {"sequence": 1, "vx_mps": float("inf")}}, {}]
+    for later in wrong:
+        with pytest.raises(GatewayError) as refused:
+            await raw_lane(robot, [later])
+        assert refused.value.reason == Reason.INVALID_REQUEST
+
+
+async def raw_lane(robot: DrivenRobot, requests: list[dict[str, Any]]) -> None:
+    """Opens a lane, sends requests, and raises what the lane ends with."""
+    await asyncio.to_thread(blocking_lane, robot.target, requests)
+
+
+def blocking_lane(target: str, requests: list[dict[str, Any]]) -> None:
+    """In a thread: asyncio's client makes up a status where a call ends while a request is written."""
+    opened = threading.Event()
+
+    def sent() -> Iterator[Any]:
+        opening = teleop_pb2.DriveOpen(supervision=teleop_pb2.SUPERVISION_LINE_OF_SIGHT)
+        yield teleop_pb2.DriveRequest(open=opening)
+        opened.wait(10)
+        for request in requests:
+            yield teleop_pb2.DriveRequest(**request)
+
+    with grpc.insecure_channel(target, options=(("grpc.use_local_subchannel_pool", 1),)) as channel:
+        try:
+            for _ in TeleopServiceStub(channel).Drive(sent(), timeout=20):
+                opened.set()
+        except grpc.RpcError as failure:
+            raise error_from(failure, target, 0.0) from None
+
+
+async def test_every_time_of_motion_is_an_event(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
+    async with client.drive(BY_EYE) as session:
+        await in_motion(session, robot.base, SPEED_MPS)
+        session.release()
+        await in_phase(session, DrivePhase.ARMED)
+
+    async def episodes() -> list[str]:
+        return [each.message for each in (await newest_events(client)) if "deg, by test" in each.message]
+
+    found = await eventually(episodes, bool, "an event of the motion")
+    assert "released" in found[-1]
+    assert " m, " in found[-1]
+
+
+async def newest_events(client: AsyncGatewayClient) -> list[Any]:
+    found = []
+    async for item in client.events():
+        if isinstance(item, CaughtUp):
+            break
+        if isinstance(item, Event):
+            found.append(item)
+    return found

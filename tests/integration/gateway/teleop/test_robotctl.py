@@ -1,0 +1,109 @@
+"""robotctl drive, stop and reset-stop, typed on a real terminal, at a robot of real parts."""
+
+import json
+import time
+
+import pytest
+
+from tests.support.driven_robot import DrivenRobot
+from tests.support.robotctl import robotctl, robotctl_process
+from tests.support.terminal import Terminal, robotctl_on_terminal
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.ros
+KITTY_ANSWER = "\x1b[?0u\x1b[?62;c"
+PLAIN_ANSWER = "\x1b[?62;c"
+W_DOWN, W_UP = "\x1b[119;1:1u", "\x1b[119;1:3u"
+
+
+def begin(screen: Terminal, answer: str) -> None:
+    """Answers as the terminal, and waits until the robot may be driven."""
+    screen.wait_for("\x1b[?u")
+    screen.press(answer)
+    screen.wait_for("hold w a s d")
+
+
+@pytest.fixture(autouse=True)
+def not_stopped(robot: DrivenRobot) -> None:
+    """What a test leaves behind must not stop the next one."""
+    if robot.teleop.HasField("stop"):
+        assert (
+            robotctl("reset-stop", str(robot.teleop.stop.stop_id), "--target", robot.target).returncode == 0
+        )
+
+
+def at_rest(robot: DrivenRobot) -> None:
+    wait_until(lambda: not robot.base.moves, "the base is at rest")
+
+
+def test_a_tap_moves_the_robot_for_a_moment(robot: DrivenRobot) -> None:
+    with robotctl_on_terminal("drive", "--target", robot.target, "--speed", "0.1") as screen:
+        begin(screen, PLAIN_ANSWER)
+        moved = screen.read()
+        wait_until(lambda: tap(screen, robot), "the base moves")
+        at_rest(robot)
+        screen.wait_for("driving", after=len(moved))
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+        assert not screen.key_by_key(), "the terminal is as before"
+        assert screen.read().rstrip().endswith("\x1b[?1004l")
+    assert not robot.base.moves
+
+
+def tap(screen: Terminal, robot: DrivenRobot) -> bool:
+    screen.press("w")
+    time.sleep(0.05)
+    return robot.base.moves
+
+
+def pressed_anew(screen: Terminal, robot: DrivenRobot) -> bool:
+    if not robot.base.moves:
+        screen.press(W_UP)
+        screen.press(W_DOWN)
+        time.sleep(0.3)
+    return robot.base.moves
+
+
+def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(robot: DrivenRobot) -> None:
+    with robotctl_on_terminal("drive", "--target", robot.target, "--json") as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(KITTY_ANSWER)
+        screen.wait_for('"phase": "armed"')
+        # The key goes up and down until the robot was ready for it; then it stays down.
+        wait_until(lambda: pressed_anew(screen, robot), "the base moves")
+        time.sleep(1.0)
+        assert robot.base.moves, "without a repeat"
+        screen.press(W_UP)
+        at_rest(robot)
+        screen.press("\x1b[120;1:1u")
+        assert screen.process.wait(20) == 0
+        assert "\x1b[<u" in screen.read()
+
+
+def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> None:
+    with robotctl_on_terminal("drive", "--target", robot.target) as screen:
+        begin(screen, PLAIN_ANSWER)
+        screen.press(" ")
+        screen.wait_for("stopped")
+        screen.press("r")
+        screen.wait_for("armed", after=screen.drawn.index("stopped"))
+        stopped = robotctl("stop", "--reason", "lunch", "--target", robot.target, "--json")
+        assert stopped.returncode == 0, stopped.stderr
+        document = json.loads(stopped.stdout)
+        assert (document["ok"], document["stop"]["reason"]) == (True, "lunch")
+        screen.wait_for("lunch")
+        stop_id = str(document["stop"]["stop_id"])
+        wrong = robotctl("reset-stop", str(document["stop"]["stop_id"] + 7), "--target", robot.target)
+        assert wrong.returncode == 1
+        assert stop_id in wrong.stderr
+        reset = robotctl_process("reset-stop", stop_id, "--target", robot.target)
+        assert reset.returncode == 0, reset.stderr
+        assert "is reset" in reset.stdout
+        screen.press("\x03")
+        assert screen.process.wait(20) == 0
+
+
+def test_without_a_terminal_it_says_so(robot: DrivenRobot) -> None:
+    refused = robotctl_process("drive", "--target", robot.target)
+    assert refused.returncode == 1
+    assert "terminal" in refused.stderr

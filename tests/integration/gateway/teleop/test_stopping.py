@@ -1,0 +1,209 @@
+"""How soon the base has zero after a fault, with real parts. The figures are those of docs/driving.md."""
+
+import asyncio
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from console.client import AsyncGatewayClient, Credentials, DriveInhibit, GatewayError, NotAllowed
+from console.robots.login import parse_login
+from gateway.access.credential import Kind
+from gateway.access.credential_admin import CredentialRequest
+from gateway.access.role import Role
+from tests.support.bad_links import Relay
+from tests.support.driven_robot import BY_EYE, DrivenRobot, driven_robot, in_motion
+from tests.support.eventually import eventually
+from tests.support.guarded_program import Guarded, guarded_program
+from tests.support.promise import keeps_async
+from tests.support.running_drive import Base, listening_base, running_drive
+
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+ROOT = Path(__file__).parents[4]
+SPEED_MPS = 0.1
+QUIET_S = 0.7
+"""Longer than any motion may last after a fault."""
+WATCHERS, STOPS = 100, 60
+
+
+@asynccontextmanager
+async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
+    """A client of a robot that is not stopped."""
+    async with AsyncGatewayClient(robot.target) as client:
+
+        async def free() -> bool:
+            teleop = (await client.status()).teleop
+            if teleop.stop:
+                try:
+                    await client.reset_stop(teleop.stop.stop_id)
+                except GatewayError:
+                    return False
+            return not teleop.holder and not teleop.stop
+
+        await eventually(free, bool, "the robot is free")
+        yield client
+
+
+@contextmanager
+def program(module: str, *arguments: str, says: str) -> Iterator["subprocess.Popen[str]"]:
+    """A test's program in a process of its own, which has said that it is ready when the block begins."""
+    command = [sys.executable, "-m", module, *arguments]
+    environment = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT / 'proto/python'}"}
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert process.stdout
+        assert process.stdout.readline() == f"{says}\n"
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        if process.stdout:
+            process.stdout.close()
+
+
+async def stopped_after_s(robot: DrivenRobot, target: str, fault: Callable[[int], object]) -> float:
+    """How long the base moves after a fault, which gets the driver's process ID."""
+    async with available(robot):
+        pass
+    with program("tests.support.driver_program", target, says="driving") as process:
+        await eventually(lambda: moves(robot), bool, "the base moves")
+        began_s = time.monotonic()
+        fault(process.pid)
+        await asyncio.sleep(QUIET_S)
+        assert not await moves(robot), "the last message is zero"
+        return robot.base.stopped_after_s(began_s)
+
+
+async def moves(robot: DrivenRobot) -> bool:
+    return robot.base.moves
+
+
+async def test_a_release_stops_within_60_ms(robot: DrivenRobot) -> None:
+    async def measure() -> float:
+        async with available(robot) as client, client.drive(BY_EYE) as session:
+            slowest_s = 0.0
+            for _ in range(5):
+                await in_motion(session, robot.base, SPEED_MPS)
+                began_s = time.monotonic()
+                session.release()
+                await asyncio.sleep(QUIET_S)
+                slowest_s = max(slowest_s, robot.base.stopped_after_s(began_s))
+            return slowest_s
+
+    await keeps_async(0.06, "s of motion after a release", measure)
+
+
+async def test_a_killed_client_stops_within_100_ms(robot: DrivenRobot) -> None:
+    await keeps_async(
+        0.1,
+        "s of motion after the client was killed",
+        lambda: stopped_after_s(robot, robot.target, lambda pid: os.kill(pid, signal.SIGKILL)),
+    )
+
+
+async def test_a_frozen_client_stops_within_280_ms(robot: DrivenRobot) -> None:
+    await keeps_async(
+        0.28,
+        "s of motion after the client was frozen",
+        lambda: stopped_after_s(robot, robot.target, lambda pid: os.kill(pid, signal.SIGSTOP)),
+    )
+
+
+async def test_two_lost_lanes_stop_within_280_ms(robot: DrivenRobot) -> None:
+    async def measure() -> float:
+        with Relay(robot.gateway.port) as relay:
+            return await stopped_after_s(robot, f"127.0.0.1:{relay.port}", lambda _: relay.fall_silent())
+
+    await keeps_async(0.28, "s of motion after both lanes fell silent", measure)
+
+
+@pytest.mark.parametrize(
+    ("number", "promised_s"), [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28)], ids=["killed", "frozen"]
+)
+async def test_a_lost_gateway_stops_in_time(
+    domain: int,  # noqa: ARG001  # for its effect
+    tmp_path: Path,
+    number: signal.Signals,
+    promised_s: float,
+) -> None:
+    """A gateway whose loop is blocked is as silent as a frozen one."""
+    attempts = iter(range(99))
+
+    async def measure() -> float:
+        directory = tmp_path / str(next(attempts))
+        directory.mkdir()
+        with driven_robot(directory) as robot:
+            process = robot.gateway.process
+            try:
+                return await stopped_after_s(robot, robot.target, lambda _: os.kill(process.pid, number))
+            finally:
+                process.send_signal(signal.SIGCONT)
+
+    await keeps_async(promised_s, "s of motion after the gateway was lost", measure)
+
+
+async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRobot) -> None:
+    async def measure() -> float:
+        async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
+            with program("tests.support.status_siege", robot.target, str(WATCHERS), says="ready"):
+                took_s = []
+                for number in range(STOPS):
+                    began_s = time.monotonic()
+                    stopped = await viewer.stop_robot(str(number))
+                    took_s.append(time.monotonic() - began_s)
+                    await operator.reset_stop(stopped.stop.stop_id)
+        return statistics.quantiles(took_s, n=100)[98]
+
+    await keeps_async(0.05, "s at the 99th percentile of StopRobot", measure)
+
+
+async def test_a_revoked_driver_stops_within_1_1_s(domain: int, tmp_path: Path) -> None:  # noqa: ARG001
+    async def measure() -> float:
+        with TemporaryDirectory(dir=tmp_path) as name:
+            directory = Path(name)
+            with (
+                listening_base() as base,
+                running_drive(directory) as drive,
+                guarded_program(
+                    directory, directory, teleop={"socket": str(drive.socket), "line_of_sight": True}
+                ) as robot,
+            ):
+                credential, bundle = robot.admin.add(CredentialRequest("anna", Role.OPERATOR, Kind.TOKEN))
+                anna = parse_login(bundle.text()).credentials
+                return await revoked_s(robot, base, anna, credential.credential_id)
+
+    await keeps_async(1.1, "s of motion after the driver's credential was revoked", measure)
+
+
+async def revoked_s(robot: Guarded, base: Base, anna: Credentials, credential_id: str) -> float:
+    async with (
+        AsyncGatewayClient(robot.target, credentials=robot.own) as admin,
+        AsyncGatewayClient(robot.target, credentials=anna) as client,
+    ):
+        await eventually(lambda: enabled(admin), bool, "driving is enabled")
+        async with client.drive(BY_EYE) as session:
+            await in_motion(session, base, SPEED_MPS)
+            began_s = time.monotonic()
+            robot.admin.revoke(credential_id)
+            while time.monotonic() - began_s < QUIET_S + 1.1:
+                session.hold(SPEED_MPS)
+                await asyncio.sleep(0.02)
+            assert isinstance(session.error, NotAllowed)
+            teleop = (await admin.status()).teleop
+            assert teleop.stop is not None
+            assert not teleop.holder
+            assert DriveInhibit.ACCESS_ENDED in teleop.inhibits
+            assert not base.moves, "the last message is zero"
+            return base.stopped_after_s(began_s)
+
+
+async def enabled(client: AsyncGatewayClient) -> bool:
+    return (await client.status()).teleop.enabled

@@ -1,0 +1,66 @@
+"""Each time of motion is recorded once, with its driver."""
+
+import time
+from dataclasses import replace
+
+from gateway.status.event import ControlAction
+from gateway.status.teleop import DriveEpisode
+from gateway.teleop.episodes import Episodes
+from gateway.teleop.lease import Driver
+
+ANNA = Driver("anna", "anna", "10.0.0.9:4711", "operator", "cafe01")
+
+
+class Sink:
+    def __init__(self) -> None:
+        self.actions: list[ControlAction] = []
+
+    def record_action(self, action: ControlAction) -> None:
+        self.actions.append(action)
+
+
+def ended(episode_id: int = 1, holder: str = "anna") -> DriveEpisode:
+    now_ns = time.monotonic_ns()
+    return DriveEpisode(episode_id, holder, now_ns - 2_500_000_000, now_ns, 0.25, 1.5, "released")
+
+
+def test_it_says_who_how_long_how_far_and_why_it_ended() -> None:
+    sink = Sink()
+    episodes = Episodes(sink)
+    episodes.note(ANNA, "gamepad")
+    episodes.record("process", ended())
+    (action,) = sink.actions
+    assert (action.who, action.role, action.credential, action.address) == (
+        "anna",
+        "operator",
+        "cafe01",
+        "10.0.0.9:4711",
+    )
+    assert (action.method, action.request) == ("Drive", "2.5 s, 0.25 m, 86 deg, by gamepad")
+    assert action.answer == "released"
+
+
+def test_it_is_recorded_once_for_each_process() -> None:
+    sink = Sink()
+    episodes = Episodes(sink)
+    first = ended()
+    for instance, episode in (("a", first), ("a", first), ("a", ended(2)), ("b", ended(2))):
+        episodes.record(instance, episode)
+    assert len(sink.actions) == 3
+
+
+def test_one_of_an_earlier_gateway_is_not_recorded_again() -> None:
+    sink = Sink()
+    earlier = ended()
+    episodes = Episodes(sink)
+    episodes.record("process", replace(earlier, ended_ns=earlier.ended_ns - 1))
+    assert sink.actions == []
+
+
+def test_a_driver_without_a_name_is_an_address() -> None:
+    sink = Sink()
+    episodes = Episodes(sink)
+    episodes.note(Driver("10.0.0.9", "10.0.0.9", "10.0.0.9:4711"), "")
+    episodes.record("process", ended(holder="10.0.0.9"))
+    (action,) = sink.actions
+    assert (action.who, action.address, action.request) == ("", "10.0.0.9:4711", "2.5 s, 0.25 m, 86 deg")
