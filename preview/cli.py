@@ -69,7 +69,7 @@ def encoders(
 
 def main() -> None:
     """Entry point."""
-    program.run_to_exit(app)
+    program.run_command_line(app, "robot-preview")
 
 
 def _load(config_file: Path | None) -> PreviewSettings:

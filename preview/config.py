@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings
@@ -78,16 +78,25 @@ class ProfileSettings(Section):
 
 
 class ProfilesSettings(Section):
-    """The three profiles of the contract."""
+    """The three profiles of the contract, spelled as everywhere: low-bw, balanced, high-quality.
 
-    low_bw: ProfileSettings = ProfileSettings(fps=15, bitrate_kbps=1000, floor_kbps=300)
+    Environment variables, which can't have a hyphen, and earlier files spell them with an underscore.
+    """
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    low_bw: ProfileSettings = Field(
+        default=ProfileSettings(fps=15, bitrate_kbps=1000, floor_kbps=300), alias="low-bw"
+    )
     balanced: ProfileSettings = ProfileSettings(fps=30, bitrate_kbps=2500, floor_kbps=500)
-    high_quality: ProfileSettings = ProfileSettings(fps=60, bitrate_kbps=4500, floor_kbps=800)
+    high_quality: ProfileSettings = Field(
+        default=ProfileSettings(fps=60, bitrate_kbps=4500, floor_kbps=800), alias="high-quality"
+    )
 
     @property
     def targets(self) -> Mapping[Profile, Target]:
         """Stream parameters by profile."""
-        return MappingProxyType({p: Target(**getattr(self, p.value).model_dump()) for p in Profile})
+        return MappingProxyType({p: Target(**getattr(self, p.name.lower()).model_dump()) for p in Profile})
 
     @property
     def largest(self) -> Target:
@@ -159,7 +168,7 @@ class EncoderSettings(Section):
 class AdaptiveSettings(Section):
     """Adaptive bit rate: follows the capacity of the viewers' links."""
 
-    enabled: bool = False
+    enabled: bool = True
 
 
 class TimeoutSettings(Section):
@@ -189,6 +198,7 @@ class PreviewSettings(Settings):
     """All settings of the preview service. The defaults suit the first robot."""
 
     model_config = SettingsConfigDict(env_prefix="PREVIEW__")
+    spellings = MappingProxyType({each.value: each.name.lower() for each in Profile})
 
     socket: Path = Path("/run/robot-gateway/preview.sock")
     """Unix socket on which the gateway connects."""

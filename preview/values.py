@@ -12,11 +12,11 @@ negative. pipeline/capture_clock.py makes it true."""
 
 
 class Profile(Enum):
-    """Bandwidth profile; the values are the keys of the configuration."""
+    """Bandwidth profile, spelled as for operators."""
 
-    LOW_BW = "low_bw"
+    LOW_BW = "low-bw"
     BALANCED = "balanced"
-    HIGH_QUALITY = "high_quality"
+    HIGH_QUALITY = "high-quality"
 
 
 class Codec(Enum):

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from common.units import bit_rate
 from preview.pipeline.queue_delay import QueueDelay
 
 _BELOW_DELIVERED: Final = 0.85
@@ -24,9 +25,11 @@ _DRAIN_S: Final = 2.0
 _LEAST_SHARE: Final = 0.5
 """... but at least this share of it."""
 _LEAST_DELIVERED: Final = 0.4
-"""Estimates of the delivered share below this are not trusted: a rate that is too low takes long to rise."""
+"""A lower estimate of the delivered share is not remembered: a rate that is too low takes long to rise."""
 _HOLD_AFTER_DECREASE_S: Final = 1.0
 """A lower rate takes this long to show in the statistics."""
+_HOLD_OVERWHELMED_S: Final = 0.4
+"""In the round trip alone it shows sooner."""
 _CALM_BEFORE_INCREASE_S: Final = 2.0
 _INCREASE_EVERY_S: Final = 1.0
 _STEP: Final = 0.05
@@ -37,6 +40,8 @@ _PASSED: Final = 1.1
 """... until this share of it, where that rate is forgotten."""
 _SMALL_STEP: Final = 0.025
 """As a share of the bit rate."""
+_REMEMBERED_S: Final = 10.0
+"""Without viewers; the next one then starts with the profile's own rate."""
 _FIRST_WAIT_S: Final = 4.0
 _LONGEST_WAIT_S: Final = 60.0
 _RTT_SLACK_MS: Final = 40.0
@@ -100,6 +105,7 @@ class _Observed:
     rtt: QueueDelay = field(default_factory=lambda: QueueDelay(_RTT_SLACK_MS, _RTT_SLACK_SHARE))
     loss_percent: float = 0.0
     """Of the newest window, but no more than on average: neither one bad window counts nor what is over."""
+    newest_loss_percent: float = 0.0
     dropped_percent: float = 0.0
     _average_loss_percent: float = 0.0
 
@@ -107,6 +113,7 @@ class _Observed:
         self.rtt.observe(link.rtt_ms, now)
         self._average_loss_percent += _LOSS_SMOOTHING * (link.loss_percent - self._average_loss_percent)
         self.loss_percent = min(link.loss_percent, self._average_loss_percent)
+        self.newest_loss_percent = link.loss_percent
         self.dropped_percent = link.dropped_percent
 
 
@@ -120,7 +127,11 @@ class BitrateController:
 
     def __init__(self, target_kbps: int, floor_kbps: int) -> None:
         self._viewers: dict[str, _Observed] = {}
+        self._seen: dict[str, _Observed] = {}
+        """The same of the newest window with viewers."""
         self._age: QueueDelay | None = None
+        self._viewed_at = float("-inf")
+        self._overwhelmed = False
         self._last_decrease_at = float("-inf")
         self._last_increase_at = float("-inf")
         self._calm_since: float | None = None
@@ -146,13 +157,17 @@ class BitrateController:
             now: monotonic seconds.
         """
         self._observe(sample, now)
+        if self._viewers:
+            self._viewed_at = now
         if not self._viewers:
-            # The next viewer starts with the profile's own rate.
-            self._forget_congestion()
-            self._decision = Decision(self._target_kbps)
+            # A viewer whose pictures have become too old joins anew, over the same link.
+            if now - self._viewed_at >= _REMEMBERED_S:
+                self._forget_congestion()
+                self._decision = Decision(self._target_kbps)
         elif signs := self._signs_of_congestion():
             self._calm_since = None
-            if now - self._last_decrease_at >= _HOLD_AFTER_DECREASE_S and not self._is_draining():
+            held = now - self._last_decrease_at < _HOLD_AFTER_DECREASE_S and not self._overwhelmed
+            if not held and not self._is_draining():
                 self._decrease(", ".join(signs), sample.stream_kbps, now)
         elif not all(delay.is_calm for delay in self._delays()):
             self._calm_since = None
@@ -162,8 +177,27 @@ class BitrateController:
                 self._increase(now)
         return self._decision
 
+    def is_overwhelmed(self, rtts_ms: Mapping[str, float], now: float) -> bool:
+        """Whether the link has become so narrow that the end of the window is too late for a decision.
+
+        That decision sets half of the delivered rate: what was lost meanwhile has to pass the link as well.
+
+        Args:
+            rtts_ms: round-trip times now, by the viewers' addresses.
+            now: monotonic seconds.
+        """
+        self._overwhelmed = False
+        if now - self._last_decrease_at < _HOLD_OVERWHELMED_S:
+            return False
+        known = [each for each in rtts_ms if each in self._viewers]
+        self._overwhelmed = any(self._viewers[each].rtt.leaps_to(rtts_ms[each]) for each in known)
+        return self._overwhelmed
+
     def _observe(self, sample: Sample, now: float) -> None:
-        self._viewers = {address: self._viewers.get(address, _Observed()) for address in sample.viewers}
+        if sample.viewers:
+            self._viewers = self._seen = {each: self._observed(each) for each in sample.viewers}
+        else:
+            self._viewers = {}
         for address, link in sample.viewers.items():
             self._viewers[address].observe(link, now)
         if sample.age_ms is None:
@@ -171,6 +205,21 @@ class BitrateController:
         else:
             self._age = self._age or QueueDelay(_AGE_SLACK_MS)
             self._age.observe(sample.age_ms, now)
+
+    def _observed(self, address: str) -> _Observed:
+        """Returns what has been seen of a viewer's link.
+
+        While the bit rate is lowered, a new viewer of a host is the one that left: it joins anew, over a link
+        whose queue may still be full, so that its first round trip is no minimum.
+        """
+        if address in self._seen:
+            return self._seen[address] if address in self._viewers else _Observed()
+        if self._decision.bitrate_kbps < self._target_kbps:
+            host = _host(address)
+            left = [each for each in self._seen if _host(each) == host]
+            if left:
+                return self._seen.pop(left[0])
+        return _Observed()
 
     def _delays(self) -> list[QueueDelay]:
         return [*([self._age] if self._age else []), *(viewer.rtt for viewer in self._viewers.values())]
@@ -199,19 +248,23 @@ class BitrateController:
         # An encoder may deliver less than it is set to.
         sent_kbps = min(before, stream_kbps)
         delays = self._delays()
-        lost = max(viewer.loss_percent for viewer in self._viewers.values()) / 100
+        # Whether there is congestion takes an average; how much, the newest window says best.
+        lost = max(viewer.newest_loss_percent for viewer in self._viewers.values()) / 100
         delivered = (1 - lost) * (1 - max(delay.growth for delay in delays))
         drained = 1 - max(delay.queued_ms for delay in delays) / 1000 / _DRAIN_S
-        self._congested_kbps = sent_kbps * max(_LEAST_DELIVERED, delivered)
-        share = max(_LEAST_SHARE, min(_BELOW_DELIVERED, drained))
+        trusted = max(_LEAST_DELIVERED, delivered)
+        self._congested_kbps = sent_kbps * trusted
+        share = max(_LEAST_SHARE, min(_BELOW_DELIVERED, drained, _BELOW_DELIVERED * (1 - lost) / trusted))
+        if self._overwhelmed:
+            share, self._overwhelmed = _LEAST_SHARE, False
         after = max(self._floor_kbps, round(self._congested_kbps * share))
         self._wait_s = min(_LONGEST_WAIT_S, self._wait_s * 2 if self._close_since else self._wait_s)
         self._close_since = None
         self._last_decrease_at = now
         if after < before:
-            self._decision = Decision(after, f"{signs}: {before} -> {after} kbit/s")
+            self._decision = Decision(after, f"{signs}: {bit_rate(before)} -> {bit_rate(after)}")
         elif after < self._target_kbps:
-            self._decision = Decision(before, f"{signs}: at the floor of {before} kbit/s")
+            self._decision = Decision(before, f"{signs}: at the floor of {bit_rate(before)}")
 
     def _may_increase(self, now: float) -> bool:
         return (
@@ -236,10 +289,15 @@ class BitrateController:
         if after >= self._congested_kbps * _PASSED or after == self._target_kbps:
             self._forget_congestion()
         self._last_increase_at = now
-        reason = "" if after == self._target_kbps else f"the link is quiet: {before} -> {after} kbit/s"
+        change = f"{bit_rate(before)} -> {bit_rate(after)}"
+        reason = "" if after == self._target_kbps else f"the link is quiet: {change}"
         self._decision = Decision(after, reason)
 
     def _forget_congestion(self) -> None:
         self._congested_kbps = float("inf")
         self._wait_s = _FIRST_WAIT_S
         self._close_since = None
+
+
+def _host(address: str) -> str:
+    return address.rpartition(":")[0]

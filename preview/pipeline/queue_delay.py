@@ -11,6 +11,8 @@ _DRIFT_PER_S: Final = 0.04
 _RISE_MS: Final = 10.0
 _FALL_MS: Final = 5.0
 """Smaller changes between two observations say nothing about a queue."""
+_LEAP: Final = 2.0
+"""Of the delay that counts as long."""
 
 
 class QueueDelay:
@@ -54,6 +56,12 @@ class QueueDelay:
     def is_long(self) -> bool:
         """Whether there is a queue."""
         return self.queued_ms > self._limit_ms
+
+    def leaps_to(self, delay_ms: float) -> bool:
+        """Whether a delay between two observations shows a queue that fills fast."""
+        lowest_ms = self._lowest_ms
+        falls = delay_ms < self.delay_ms - _FALL_MS
+        return lowest_ms is not None and not falls and delay_ms - lowest_ms > _LEAP * self._limit_ms
 
     @property
     def is_draining(self) -> bool:

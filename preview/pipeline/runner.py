@@ -214,8 +214,14 @@ class Runner:
             if silent:
                 self._fail(faults.of(*silent, self.plan))
                 return
-            if now - reading.at >= _WINDOW_S:
+            if now - reading.at >= _WINDOW_S or self._is_overwhelmed(now):
                 reading = self._measure(reading)
+
+    def _is_overwhelmed(self, now: float) -> bool:
+        """Whether the bit rate can't wait for the end of the window."""
+        if not self.plan.settings.adaptive.enabled or self._is_pending("bit rate"):
+            return False
+        return self._controller.is_overwhelmed(statistics.read(self._framing, self._parts.sink).rtts_ms, now)
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
         now = statistics.read(self._framing, self._parts.sink)

@@ -37,7 +37,7 @@ def desired_state(message: pb.DesiredState) -> DesiredState:
     profile = _PROFILES_BACK.get(message.profile)
     if profile is None and message.enabled:
         raise InvalidRequestError(
-            f"profile {message.profile} is not known; known are {', '.join(p.name for p in Profile)}"
+            f"profile {message.profile} is not known; known are {', '.join(p.value for p in Profile)}"
         )
     size = len(message.passphrase.encode())
     if size and not _MIN_PASSPHRASE_BYTES <= size <= _MAX_PASSPHRASE_BYTES:

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.gst
 
 def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
     with (
-        RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
+        RunningPreview(tmp_path) as preview,
         UdpLink(preview.port) as link,
         Watcher(link.port) as watcher,
     ):
@@ -24,7 +24,7 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
         link.impairment.loss = 0.4
         state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 600, "a lower rate")
         assert "% loss" in state.stream.bitrate_reason
-        assert f"600 -> {state.stream.target_bitrate_kbps} kbit/s" in state.stream.bitrate_reason
+        assert f"600 kbit/s -> {state.stream.target_bitrate_kbps} kbit/s" in state.stream.bitrate_reason
         low = preview.wait_for(lambda a: a.stream.target_bitrate_kbps == 150, "the floor").stream
         assert low.target_bitrate_kbps == 150
         link.impairment.loss = 0.0
@@ -37,7 +37,7 @@ def test_a_bad_link_gets_less_and_a_good_one_more(tmp_path: Path) -> None:
 def test_random_loss_on_a_wide_link_costs_nothing(tmp_path: Path) -> None:
     bad = Impairment(delay_s=0.02, loss=0.03, control_loss=0.03)
     with (
-        RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
+        RunningPreview(tmp_path) as preview,
         UdpLink(preview.port, bad) as link,
         Watcher(link.port, latency_ms=125) as watcher,
     ):
@@ -50,7 +50,7 @@ def test_random_loss_on_a_wide_link_costs_nothing(tmp_path: Path) -> None:
 
 def test_a_narrow_link_gets_what_it_carries(tmp_path: Path) -> None:
     with (
-        RunningPreview(tmp_path, {"adaptive": {"enabled": True}}) as preview,
+        RunningPreview(tmp_path) as preview,
         UdpLink(preview.port, Impairment(delay_s=0.02)) as link,
         Watcher(link.port, latency_ms=125) as watcher,
     ):
@@ -62,13 +62,13 @@ def test_a_narrow_link_gets_what_it_carries(tmp_path: Path) -> None:
         assert re.search("RTT|loss", state.stream.bitrate_reason)
         preview.wait_for(lambda a: a.measurement.worst_rtt_ms < 80, "the queue has drained")
         watcher.wait_for_frames(150)
-        state = preview.wait_for(lambda a: a.stream.target_bitrate_kbps < 450, "still below the limit")
-        assert state.stream.target_bitrate_kbps > 150, "above the floor"
+        # A queue that grew for long, as on a busy machine, brings the first decrease down to the floor.
+        preview.wait_for(lambda a: 225 <= a.stream.target_bitrate_kbps < 450, "half of it and more", 60)
 
 
-def test_unless_it_is_asked_to_the_bit_rate_stays(tmp_path: Path) -> None:
+def test_switched_off_the_bit_rate_stays(tmp_path: Path) -> None:
     with (
-        RunningPreview(tmp_path) as preview,
+        RunningPreview(tmp_path, {"adaptive": {"enabled": False}}) as preview,
         UdpLink(preview.port, Impairment(loss=0.4)) as link,
         Watcher(link.port) as watcher,
     ):

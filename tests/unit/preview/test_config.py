@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from common.config import load
+from common.config import as_yaml, load
 from common.errors import UserError
 from preview.config import PreviewSettings, V4l2Source
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER
@@ -29,7 +29,7 @@ def test_the_defaults_suit_the_first_robot() -> None:
     assert (settings.srt.port, settings.srt.latency_ms) == (7100, 125)
     assert settings.encoders.allowed[0].name == "mpp-h265"
     assert settings.encoders.allowed[-1].name == "x264"
-    assert not settings.adaptive.enabled
+    assert settings.adaptive.enabled
 
 
 def test_a_source_replaces_the_default_whole(tmp_path: Path) -> None:
@@ -72,3 +72,17 @@ def test_every_encoder_has_a_bit_rate_and_a_gop_length() -> None:
         controlled = set(properties.controls.values())
         assert properties.bitrate or "bitrate" in controlled, encoder.name
         assert properties.gop or "gop" in controlled, encoder.name
+
+
+def test_profiles_are_spelled_as_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a hyphen; the underscore of environment variables and of earlier files means the same."""
+    monkeypatch.setenv("PREVIEW__PROFILES__LOW_BW__FPS", "12")
+    for name in ("low-bw", "low_bw"):
+        settings = from_text(tmp_path, f"profiles: {{{name}: {{fps: 10, width_px: 640}}}}")
+        low = settings.profiles.low_bw
+        assert (low.fps, low.width_px, low.bitrate_kbps) == (12, 640, 1000)
+        assert "low-bw:" in as_yaml(settings)
+        assert "low_bw" not in as_yaml(settings)
+    monkeypatch.delenv("PREVIEW__PROFILES__LOW_BW__FPS")
+    with pytest.raises(UserError, match=r"line 2: key 'profiles.low-bw.fps' is 0"):
+        from_text(tmp_path, "profiles:\n low_bw: {fps: 0, width_px: 640}")

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.units import bit_rate
 from preview.pipeline.adaptive import BitrateController, Decision, Sample, ViewerLink
 
 WINDOW_S = 0.5
@@ -71,7 +72,7 @@ def test_a_quiet_link_gets_the_target() -> None:
 def test_a_congested_link_gets_less_at_once(settled: Run, congested: Sample, signs: str) -> None:
     decision = settled.after(congested)
     assert decision.bitrate_kbps <= 2500 * 0.85
-    assert decision.reason == f"{signs}: 2500 -> {decision.bitrate_kbps} kbit/s"
+    assert decision.reason == f"{signs}: 2.50 Mbit/s -> {bit_rate(decision.bitrate_kbps)}"
 
 
 @pytest.mark.parametrize("loss", [3, 10, 15])
@@ -187,7 +188,7 @@ def test_pictures_that_grow_old_are_congestion_before_anything_is_lost(settled: 
     decision = settled.after(sample(age_ms=450))
     # Half of it arrived, and about 390 ms wait.
     assert decision.bitrate_kbps == pytest.approx(2500 * 0.5 * (1 - 0.385 / 2), abs=2)
-    assert decision.reason.startswith("pictures 450 ms old: 2500 -> ")
+    assert decision.reason.startswith("pictures 450 ms old: 2.50 Mbit/s -> ")
 
 
 def test_pictures_that_were_always_old_are_no_congestion() -> None:
@@ -200,9 +201,49 @@ def test_the_age_is_judged_before_loss(settled: Run) -> None:
     assert settled.after(sample(age_ms=900, loss=80)).reason.startswith("pictures 900 ms old, 40 % loss")
 
 
-def test_without_viewers_the_target_comes_back(settled: Run) -> None:
+def test_without_viewers_the_target_comes_back_after_a_while(settled: Run) -> None:
     settled.after(CONGESTED)
+    lower = settled.rates(9, NO_VIEWER)
+    assert max(lower) < 2500
+    assert settled.rates(2, NO_VIEWER)[-1] == 2500
     assert settled.after(NO_VIEWER) == Decision(2500)
+
+
+def test_a_viewer_that_joins_anew_finds_the_rate_that_it_left(settled: Run) -> None:
+    before = settled.after(CONGESTED).bitrate_kbps
+    settled.after(NO_VIEWER)
+    again = Sample(2500, {"another port": ViewerLink(10.0)})
+    assert settled.after(again).bitrate_kbps == before < 2500
+
+
+def test_a_viewer_that_joins_anew_over_a_full_queue_has_the_minimum_of_before(settled: Run) -> None:
+    def link(port: int, rtt_ms: float) -> Sample:
+        return Sample(2500, {f"10.0.0.7:{port}": ViewerLink(rtt_ms)})
+
+    settled.after(*[link(4000, 20)] * 4)
+    lowered = settled.after(link(4000, 220)).bitrate_kbps
+    settled.after(NO_VIEWER, NO_VIEWER)
+    again = settled.after(link(4001, 220))
+    assert again.bitrate_kbps < lowered
+    assert again.reason.startswith("RTT 220 ms")
+
+
+def test_a_queue_that_fills_fast_is_answered_within_the_window_and_by_half(settled: Run) -> None:
+    controller, now = settled.controller, settled.now
+    assert not controller.is_overwhelmed({"viewer": 60.0}, now), "as long as a repair"
+    assert not controller.is_overwhelmed({"another": 600.0}, now), "its minimum is not known"
+    assert controller.is_overwhelmed({"viewer": 210.0}, now)
+    # 200 ms in half a second: 60 % of the data arrives.
+    decision = settled.after(sample(rtt_ms=210))
+    assert decision.bitrate_kbps == pytest.approx(2500 * 0.6 * 0.5, abs=2)
+    assert not controller.is_overwhelmed({"viewer": 210.0}, settled.now - 0.2), "it takes a moment to show"
+    assert not controller.is_overwhelmed({"viewer": 150.0}, settled.now), "it drains"
+    assert controller.is_overwhelmed({"viewer": 210.0}, settled.now)
+
+
+def test_heavy_loss_is_answered_by_its_own_size(settled: Run) -> None:
+    """At the first sign: what is sent in the meantime has to be sent again, too."""
+    assert settled.after(sample(loss=60)).bitrate_kbps == pytest.approx(2500 * 0.4 * 0.85, abs=2)
 
 
 def test_another_profile_begins_at_its_target(settled: Run) -> None:

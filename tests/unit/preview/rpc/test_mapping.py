@@ -128,6 +128,6 @@ def test_a_passphrase_that_srt_does_not_take_is_refused_without_repeating_it(pas
 
 
 def test_an_unknown_profile_is_refused_only_when_enabled() -> None:
-    with pytest.raises(InvalidRequestError, match="known are LOW_BW, BALANCED, HIGH_QUALITY"):
+    with pytest.raises(InvalidRequestError, match="known are low-bw, balanced, high-quality"):
         mapping.desired_state(pb.DesiredState(enabled=True, profile=9))  # type: ignore[arg-type]
     assert not mapping.desired_state(pb.DesiredState(enabled=False, profile=9)).enabled  # type: ignore[arg-type]
