@@ -6,9 +6,9 @@ from typing import Annotated, Final
 import typer
 from typer.core import TyperGroup
 
+from common.command_line import read_plainly
 from console.cli.lazy import LazyCommand, imported
 from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption
-from console.cli.values import read_plainly
 
 COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
     "status": ("console.cli.status:status", "Show the status of the whole robot, once."),
@@ -39,6 +39,18 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
         "Open a window: live video, status, faults, events, plots, preview controls.",
     ),
     "preview": ("console.cli.preview:preview_app", "Turn the live preview on or off."),
+    "stop": (
+        "console.cli.stop:stop",
+        "Stop the robot until reset-stop, no matter who drives it. Needs the role of a viewer.",
+    ),
+    "reset-stop": (
+        "console.cli.stop:reset_stop",
+        "Reset a stop of the robot. Nothing moves by it; a newer stop stays.",
+    ),
+    "drive": (
+        "console.cli.drive:drive",
+        "Drive the robot by the keyboard, with your own eyes on it, where the robot permits that.",
+    ),
     "robots": ("console.cli.robots:robots_app", "List the robots known by name, or change the list."),
 }
 """Each command's function (or group of commands), and the first line of its own help."""

@@ -5,6 +5,7 @@ import sys
 from typing import Any
 
 from common.errors import ExitCode, UserError
+from console.cli.typed_options import typed_options
 from console.printable import escaped
 
 
@@ -14,7 +15,7 @@ def error_as_json(error: UserError) -> dict[str, Any]:
     return {
         "kind": error.kind or own,
         "what": " ".join(error.what.split()),
-        "remedy": error.remedy,
+        "remedy": typed_options(sys.argv[1:]).repeated_in(error.remedy),
         "exit_code": int(error.exit_code),
     }
 
@@ -24,4 +25,4 @@ def report(error: UserError) -> None:
     if "--json" in sys.argv[1:]:
         print(escaped(json.dumps({"error": error_as_json(error)}, ensure_ascii=False)), file=sys.stderr)
     else:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {typed_options(sys.argv[1:]).repeated_in(str(error))}", file=sys.stderr)

@@ -8,13 +8,13 @@ from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.error_report import error_as_json
-from console.cli.json_form import json_form
 from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
-from console.client.results import GapReason
+from console.client.results import EventKind, GapReason
 from console.presentation.formatting import plural, wall_clock
+from console.presentation.json_form import json_form
 from console.presentation.severity_style import FAULT_STYLES
 
 _CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
@@ -36,6 +36,9 @@ def events(
         Literal["info", "warning", "error"],
         typer.Option("--severity", help="Leave out events of lower severity."),
     ] = "info",
+    clients: Annotated[
+        bool, typer.Option("--clients", help="Show who joins and leaves, too.", show_default=False)
+    ] = False,
 ) -> None:
     """Show past events of the robot, as far back as the gateway keeps them.
 
@@ -51,8 +54,12 @@ def events(
             elif isinstance(item, Outage) and not follow:
                 # Without --follow the past events are all that was asked for.
                 raise item.error
-            else:
+            elif clients or session.as_json or not _is_about_a_client(item):
                 _show(session, item)
+
+
+def _is_about_a_client(item: Event | EventGap | Outage) -> bool:
+    return isinstance(item, Event) and item.kind in (EventKind.CLIENT_JOINED, EventKind.CLIENT_LEFT)
 
 
 def _show(session: Session, item: Event | EventGap | Outage) -> None:

@@ -1,19 +1,23 @@
 """robotctl info: the gateway program itself."""
 
 import json
+import sys
 from datetime import UTC
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from console.cli.json_form import json_form
 from console.cli.session import Session, with_session
 from console.cli.tables import grid
+from console.cli.typed_options import typed_options
 from console.client import GatewayInfo
 from console.presentation.formatting import UNKNOWN, age, wall_clock
+from console.presentation.json_form import json_form
+
+_FULL: Final = "robotctl info --full"
 
 
 @with_session
@@ -40,6 +44,7 @@ def info_json(info: GatewayInfo) -> dict[str, Any]:
 def info_view(info: GatewayInfo, target: str, *, full: bool = False) -> RenderableType:
     """Returns the view for people: build and uptime, call counts; the full one with the configuration."""
     configuration = info.configuration_json or UNKNOWN
+    typed = typed_options(sys.argv[1:])
     return Group(
         Text.assemble((info.gateway_name or "robot", "bold"), (f"  {target}", "dim")),
         Text(),
@@ -47,7 +52,7 @@ def info_view(info: GatewayInfo, target: str, *, full: bool = False) -> Renderab
         Text(),
         _calls(info),
         Text(),
-        Text("configuration" if full else "configuration: robotctl info --full", style="dim"),
+        Text("configuration" if full else f"configuration: {typed.repeated_in(_FULL)}", style="dim"),
         *([Text(configuration)] if full else []),
     )
 

@@ -7,7 +7,7 @@ import typer
 from typer.core import TyperCommand
 from typer.main import get_command
 
-from console.cli.values import read_plainly
+from common.command_line import read_plainly
 
 
 def imported(place: str) -> Any:

@@ -53,7 +53,7 @@ def login(
     check_name(name)
     target = parse_target(target)
     if not (replacing or ca):
-        _check_free(name, target, file)
+        _check_free(name)
     user, credentials = _with_new_authority(name, ca) if ca else _read(file)
     gateway_name = ""
     if not offline:
@@ -92,13 +92,12 @@ def once_known(ask: Callable[[], AnswerT], sleep: Callable[[float], None] = time
         sleep(pauses.next_s())
 
 
-def _check_free(name: str, target: str, file: str) -> None:
+def _check_free(name: str) -> None:
     known = read_robots_file().robots.get(name)
     if known and any(getattr(known, key) for key in FILE_KEYS):
-        words = shlex.join(["robotctl", "login", name, target, *([] if file == _STANDARD_INPUT else [file])])
         raise UserError(
             f"'{name}' has a login already, at {known.target}",
-            f"Type: {words} --replace",
+            f"Type: {shlex.join(['robotctl', *sys.argv[1:], '--replace'])}",
             exit_code=ExitCode.USAGE,
         )
 

@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 import typer
 
 from common.errors import UserError
-from console.cli.json_form import json_form
 from console.cli.session import Session, print_json, with_session
 from console.cli.tables import rows_table
 from console.client import PreviewChange, PreviewProfile, PreviewState
+from console.presentation.json_form import json_form
 from console.presentation.status_table import preview_rows
 
 preview_app = typer.Typer(

@@ -6,10 +6,12 @@ from typing import NoReturn
 
 import typer
 
+from common.command_line import usage_error
 from common.errors import ExitCode, UserError
 from common.output import tolerate_encoding
 from console.cli.app import command_line
 from console.cli.error_report import report
+from console.cli.typed_options import typed_options
 
 
 def run() -> NoReturn:
@@ -25,11 +27,7 @@ def exit_code() -> int:
     except UserError as error:
         return _failed(error)
     except typer.TyperException as error:
-        # A wrong command line.
-        context = getattr(error, "ctx", None)
-        message = error.format_message().removesuffix(".")
-        remedy = f"Type: {context.command_path if context else 'robotctl'} --help"
-        return _failed(UserError(message, remedy, exit_code=ExitCode.USAGE))
+        return _failed(usage_error(error, "robotctl", typed_options(sys.argv[1:]).words))
     except OSError as error:
         # Connections raise GatewayErrors, so this is the output: a full disk, for example.
         _discard_output()

@@ -1,8 +1,8 @@
 """robotctl status and robotctl overlay: one answer of the robot, as a table or as JSON."""
 
-from console.cli.json_form import json_form
 from console.cli.session import Session, with_session
 from console.cli.tables import overlay_view, status_view
+from console.presentation.json_form import json_form
 
 
 @with_session

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from console.cli.error_report import error_as_json
-from console.cli.json_form import json_form
 from console.cli.live_watch import watch_on_a_terminal
 from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.client import Outage, WatchedStatus
+from console.presentation.json_form import json_form
 from console.presentation.status_line import status_line
 
 
@@ -45,7 +45,7 @@ def watch(
 
 
 def _print_line(session: Session, item: WatchedStatus | Outage) -> None:
-    now = datetime.now().astimezone().strftime("%H:%M:%S")
+    now = datetime.now().astimezone().strftime("%H:%M:%S %Z")
     line = (
         status_line(item.status)
         if isinstance(item, WatchedStatus)

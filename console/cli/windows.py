@@ -3,18 +3,22 @@
 import importlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
 from common.errors import ExitCode, UserError
-from console.cli.json_form import json_form
 from console.cli.options import RobotOption, TargetOption
 from console.cli.session import Session, print_json, session_of, with_session
 from console.cli.stopping import until_stopped
+from console.monitor.credential_refresh import LoadCredentials
+from console.presentation.json_form import json_form
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
+from console.robots.robots_file import Robot
+from console.robots.roster import RobotChoice
 from console.target import parse_target
 from console.viewer.headless import watch_headless
 from console.viewer.summary import ViewSummary
@@ -71,7 +75,7 @@ def view(
 ) -> None:
     """Show the live preview with detections overlaid. The robot provides all settings.
 
-    Keys: p preview on or off, o boxes, f full screen, q quit.
+    Keys: p preview on or off, o boxes, a age, f full screen, q quit.
     """
     if frames and not headless:
         raise UserError("--frames is for --headless", "Add --headless", exit_code=ExitCode.USAGE)
@@ -100,12 +104,17 @@ def view(
 def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOption = None) -> None:
     """Open a window: live video, status, faults, events, plots, preview controls.
 
-    Keys: p preview on or off, 1-3 profile, F11 full screen, q quit.
+    Keys: F1 lists all; p preview on or off, 1-3 profile, F9 side panel, f picture only, s save, q quit.
     """
     with _requiring_qt():
         from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
     session = session_of(context, target, robot)
-    run_monitor(session.target, session.credentials)
+
+    def login_of(choice: RobotChoice) -> LoadCredentials:
+        name = choice.name if choice.known else None
+        return replace(session, robot=Robot(target=choice.target), name=name).credentials
+
+    run_monitor(session.target, session.credentials, login_of=login_of)
 
 
 def _view_headless(

@@ -13,6 +13,7 @@ value of `console.client.results` or raises a `GatewayError` that says what to d
 from console.client.aio import AsyncGatewayClient
 from console.client.blocking import GatewayClient
 from console.client.clock import Clock, Offset
+from console.client.driving import DriveOptions, DriveSession
 from console.client.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -30,6 +31,9 @@ from console.client.mapping.methods import DesiredPreview
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,
+    DriveInhibit,
+    DrivePhase,
+    DriveState,
     Event,
     EventGap,
     EventPosition,
@@ -43,6 +47,9 @@ from console.client.results import (
     PreviewProfile,
     PreviewState,
     PreviewStatus,
+    RobotStopped,
+    StopLatch,
+    Supervision,
     SystemStatus,
     WatchedStatus,
 )

@@ -1,17 +1,30 @@
 """The asyncio client. The blocking one (blocking.py) is a facade over it."""
 
+import asyncio
 from collections.abc import AsyncGenerator
 from typing import Self
 
 from console.client import results
 from console.client.clock import Clock, Offset
+from console.client.driving import DriveOptions, DriveSession
+from console.client.errors import DeadlineExceeded, Unreachable
 from console.client.event_feed import EventFeed
+from console.client.mapping.driving import (
+    enabled_request,
+    reset_request,
+    stop_request,
+    velocity_request,
+)
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
     REPORT_PICTURE,
     REQUEST_KEY_FRAME,
+    RESET_STOP,
+    SEND_TELEOP_COMMAND,
+    SET_TELEOP_ENABLED,
+    STOP_ROBOT,
     DesiredPreview,
     key_frame_request,
     picture_request,
@@ -50,13 +63,15 @@ class AsyncGatewayClient:
         options: ClientOptions | None = None,
         credentials: Credentials | None = None,
     ) -> None:
-        options = options or ClientOptions()
         self.target = parse_target(target)
         self.clock = Clock()
-        self._transport = GrpcTransport(self.target, options, credentials or Credentials())
-        self._calls = UnaryCalls(self._transport, options)
-        self._streams = Streams(self._transport, options)
-        self._within_s = options.answer_within_s
+        self._options, self._credentials = options or ClientOptions(), credentials or Credentials()
+        self._transport = self._connect()
+        self._calls = UnaryCalls(self._transport, self._options)
+        self._streams = Streams(self._transport, self._options)
+        self._within_s = self._options.answer_within_s
+        self._second: GrpcTransport | None = None
+        """For stops: a lost packet on one connection then delays nothing."""
 
     @property
     def reconnects(self) -> int:
@@ -166,12 +181,93 @@ class AsyncGatewayClient:
         """
         return self._streams.events(EventFeed(after, least))
 
+    def drive(self, options: DriveOptions | None = None) -> DriveSession:
+        """Returns a session for driving, to be used in an `async with` block: its end stops the robot.
+
+        Example:
+            async with robot.drive(DriveOptions(supervision=Supervision.LINE_OF_SIGHT)) as session:
+                await session.ready()
+                await session.hold_for(1.0, vx_mps=0.1)
+
+        Args:
+            options: How to open the session.
+        """
+        return DriveSession(self._connect, options or DriveOptions(), self._within_s)
+
+    async def stop_robot(self, reason: str = "") -> results.RobotStopped:
+        """Stops the robot until `reset_stop`, no matter who drives it; returns when it has confirmed that.
+
+        A stop of category 2 (IEC 60204-1): the motors stay powered. The call goes out on two connections; the
+        first answer counts.
+
+        Args:
+            reason: For people.
+
+        Raises:
+            GatewayError: The robot has not confirmed it on either connection.
+        """
+        if self._second is None:
+            self._second = self._connect()
+        request = stop_request(reason)
+        calls = (self._calls, UnaryCalls(self._second, self._options))
+        attempts = [
+            asyncio.create_task(each.call(STOP_ROBOT, request, self._within_s), name="stop") for each in calls
+        ]
+        return await _first_answer(attempts)
+
+    async def reset_stop(self, stop_id: int) -> results.StopReset:
+        """Resets a stop. Nothing moves by it.
+
+        Args:
+            stop_id: Of the stop that the caller has seen; a newer one stays.
+
+        Raises:
+            Refused: That stop is not the present one, or the driver holds.
+        """
+        return await self._calls.call(RESET_STOP, reset_request(stop_id), self._within_s)
+
+    async def set_driving_enabled(self, enabled: bool) -> results.TeleopAnswer:
+        """Enables or disables driving, for all. Disabling stops the robot and ends its driver's lease."""
+        return await self._calls.call(SET_TELEOP_ENABLED, enabled_request(enabled), self._within_s)
+
+    async def send_velocity(
+        self, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0
+    ) -> results.TeleopAnswer:
+        """Moves the robot for at most 500 ms, slowly, where it permits commands without hold-to-run.
+
+        For tests of a robot with older tools; `drive` is safer, and not limited in this way.
+        """
+        request = velocity_request(vx_mps, vy_mps, wz_rad_s)
+        return await self._calls.call(SEND_TELEOP_COMMAND, request, self._within_s)
+
+    def _connect(self) -> GrpcTransport:
+        """Returns a connection of its own."""
+        return GrpcTransport(self.target, self._options, self._credentials)
+
     async def close(self) -> None:
-        """Closes the connection. Pending calls and streams in other tasks end with `Cancelled`."""
+        """Closes the connections. Pending calls and streams in other tasks end with `Cancelled`."""
         await self._transport.close()
+        if self._second:
+            await self._second.close()
 
     async def __aenter__(self) -> Self:
         return self
 
     async def __aexit__(self, *_: object) -> None:
         await self.close()
+
+
+async def _first_answer(attempts: "list[asyncio.Task[results.RobotStopped]]") -> results.RobotStopped:
+    """Returns the first answer; a connection that fails leaves it to the others."""
+    waiting = set(attempts)
+    try:
+        while True:
+            done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+            for each in done:
+                error = each.exception()
+                if error is None or not waiting or not isinstance(error, Unreachable | DeadlineExceeded):
+                    return each.result()
+    finally:
+        for each in attempts:
+            each.cancel()
+        await asyncio.gather(*attempts, return_exceptions=True)

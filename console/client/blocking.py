@@ -7,9 +7,11 @@ from contextlib import suppress
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from console.client.aio import AsyncGatewayClient
+from console.client.driving import DriveOptions, DriveSession
 from console.client.errors import Cancelled
 from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions
+from console.client.results import DriveLimits, DriveState
 from console.credentials import Credentials
 from console.target import DEFAULT_TARGET
 
@@ -46,6 +48,44 @@ def _iterating(
                 self._loop.submit(_close(items))
 
     return iterate
+
+
+class BlockingDriveSession:
+    """As `DriveSession`, for blocking code; commands go out in the client's own thread."""
+
+    def __init__(self, loop: LoopThread, session: DriveSession) -> None:
+        self._loop = loop
+        self._session = session
+        self.hold = session.hold
+        self.release = session.release
+        self.reasons = session.reasons
+        self.check = session.check
+
+    @property
+    def state(self) -> DriveState | None:
+        """The robot's newest state; None before the first."""
+        return self._session.state
+
+    @property
+    def limits(self) -> DriveLimits | None:
+        """What the robot accepts."""
+        return self._session.limits
+
+    def ready(self, within_s: float = 2.0) -> DriveState:
+        """As `DriveSession.ready`."""
+        return self._loop.run(self._session.ready(within_s))
+
+    def hold_for(self, seconds: float, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0) -> None:
+        """As `DriveSession.hold_for`."""
+        self._loop.run(self._session.hold_for(seconds, vx_mps, vy_mps, wz_rad_s))
+
+    def __enter__(self) -> Self:
+        self._loop.run(self._session.__aenter__())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(Cancelled):
+            self._loop.run(self._session.__aexit__(None, None, None))
 
 
 class GatewayClient:
@@ -92,6 +132,10 @@ class GatewayClient:
     ping = _blocking(AsyncGatewayClient.ping)
     request_key_frame = _blocking(AsyncGatewayClient.request_key_frame)
     report_picture = _blocking(AsyncGatewayClient.report_picture)
+    stop_robot = _blocking(AsyncGatewayClient.stop_robot)
+    reset_stop = _blocking(AsyncGatewayClient.reset_stop)
+    set_driving_enabled = _blocking(AsyncGatewayClient.set_driving_enabled)
+    send_velocity = _blocking(AsyncGatewayClient.send_velocity)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 
@@ -104,6 +148,14 @@ class GatewayClient:
     def retries(self) -> int:
         """Attempts beyond the first, of all calls together."""
         return self._client.retries
+
+    def drive(self, options: DriveOptions | None = None) -> "BlockingDriveSession":
+        """Returns a session for driving, to be used in a `with` block: its end stops the robot."""
+
+        async def create() -> DriveSession:
+            return self._client.drive(options)
+
+        return BlockingDriveSession(self._loop, self._loop.run(create()))
 
     def close(self) -> None:
         """Closes the connection. Pending calls and streams in other threads end with `Cancelled`."""

@@ -60,10 +60,11 @@ class Clock:
 
     def offset(self, now_s: float) -> Offset | None:
         """Returns the best estimate at `now_s`; None before the first answer."""
-        if not self._readings:
+        # A copy: another thread may add a reading, or drop them all, meanwhile.
+        readings = tuple(self._readings)
+        if not readings:
             return None
-        # A copy: another thread may add a reading meanwhile.
-        best = min(tuple(self._readings), key=lambda reading: reading.error_at(now_s))
+        best = min(readings, key=lambda reading: reading.error_at(now_s))
         return Offset(best.offset_s, best.error_at(now_s))
 
     def local_s(self, robot_monotonic_ns: int, now_s: float) -> float | None:

@@ -34,6 +34,13 @@ ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
 REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
     Reason.INVALID_REQUEST: errors.InvalidRequest,
     Reason.PREVIEW_NOT_RUNNING: errors.Refused,
+    Reason.TELEOP_NOT_CONFIGURED: errors.Refused,
+    Reason.TELEOP_DISABLED: errors.Refused,
+    Reason.SUPERVISION_NOT_PERMITTED: errors.Refused,
+    Reason.LEASE_HELD: errors.Refused,
+    Reason.LEASE_LOST: errors.Refused,
+    Reason.DRIVE_UNREACHABLE: errors.Refused,
+    Reason.STOP_NOT_RESET: errors.Refused,
     Reason.MESSAGE_TOO_LARGE: errors.InvalidRequest,
     Reason.UNKNOWN_SERVICE: errors.Refused,
     Reason.TOO_MANY_CONNECTIONS: errors.Overloaded,
@@ -51,13 +58,17 @@ REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
 }
 """A reason takes precedence over the code; an unknown one, of a newer gateway, leaves it to that."""
 
+_NEW_LOGIN: Final = (
+    "Ask this robot's administrator for a new login, then type: robotctl login NAME HOST:PORT FILE --replace"
+)
 _ADVICE: Final[Mapping[str, str]] = {
     Reason.TOO_MANY_CONNECTIONS: "Close another program that is connected to this robot, or wait",
     Reason.TOO_MANY_STREAMS: "Close a stream of this program, or share one",
-    Reason.CREDENTIAL_EXPIRED: (
-        "Ask this robot's administrator for a new login, then type: "
-        "robotctl login NAME HOST:PORT FILE --replace"
-    ),
+    Reason.CREDENTIAL_UNKNOWN: _NEW_LOGIN,
+    Reason.CREDENTIAL_REVOKED: _NEW_LOGIN,
+    Reason.CREDENTIAL_EXPIRED: _NEW_LOGIN,
+    Reason.TELEOP_DISABLED: "Type: robotctl drive --enable",
+    Reason.LEASE_HELD: "Type: robotctl drive --take-over",
     Reason.CREDENTIALS_UNREADABLE: (
         "Ask this robot's administrator to repair its list of credentials; no new login is needed"
     ),

@@ -1,7 +1,7 @@
 """The gRPC channel of a client: methods in, results or `GatewayError`s out. Belongs to one asyncio loop."""
 
 import asyncio
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 import grpc
 from google.protobuf.message import DecodeError
@@ -76,6 +76,16 @@ class GrpcTransport:
         stream: Any = self._channel.unary_stream(method.path)
         call = stream(request, metadata=self._metadata)
         return Responses(call, method, self, newest_only=newest_only)
+
+    def open_both_ways(self, method: Method[ResultT]) -> "Duplex[ResultT]":
+        """Starts a call whose requests and responses are streams.
+
+        Raises:
+            Cancelled: The client is closed.
+        """
+        self.check_open()
+        call: Any = self._channel.stream_stream(method.path)(metadata=self._metadata)
+        return Duplex(call, method, self)
 
     def decode(self, method: Method[ResultT], answer: bytes) -> ResultT:
         """Returns the result of an answer.
@@ -176,6 +186,64 @@ class Responses:
             error = Cancelled("this client was closed")
         # Behind the items that wait to be read.
         await self._queue.put(error)
+
+
+class Duplex(Generic[ResultT]):
+    """A call whose requests and responses are streams. One task may write while another reads."""
+
+    def __init__(self, call: Any, method: Method[ResultT], transport: GrpcTransport) -> None:
+        self._call = call
+        self._method = method
+        self._transport = transport
+
+    async def write(self, request: bytes) -> None:
+        """Sends a request; returns when gRPC has taken it.
+
+        Raises:
+            GatewayError: The call has ended.
+        """
+        try:
+            await self._call.write(request)
+        except (grpc.RpcError, asyncio.InvalidStateError):
+            raise await self._end() from None
+
+    async def read(self) -> ResultT:
+        """Returns the next response.
+
+        Raises:
+            GatewayError: The call has ended.
+        """
+        try:
+            answer = await self._call.read()
+        except grpc.RpcError as failure:
+            raise self._transport.end_of_stream(failure) from None
+        if answer is grpc.aio.EOF:
+            raise await self._end()
+        return self._transport.decode(self._method, answer)
+
+    async def finish(self) -> None:
+        """Ends the requests; the gateway then ends the call."""
+        try:
+            await self._call.done_writing()
+        except (grpc.RpcError, asyncio.InvalidStateError):
+            return  # It has ended already.
+
+    def cancel(self) -> None:
+        """Ends the call at once."""
+        self._call.cancel()
+
+    async def _end(self) -> GatewayError:
+        """Returns why the call has ended."""
+        if await self._call.code() is grpc.StatusCode.OK:
+            return self._transport.end_of_stream(None)
+        return self._transport.end_of_stream(
+            grpc.aio.AioRpcError(
+                await self._call.code(),
+                await self._call.initial_metadata(),
+                await self._call.trailing_metadata(),
+                await self._call.details(),
+            )
+        )
 
 
 def _tls(credentials: Credentials) -> grpc.ChannelCredentials:

@@ -14,7 +14,10 @@ _ON_THE_WAY: Final = ("name", "tcp", "grpc")
 
 
 def examine(
-    target: str, credentials: Credentials | None = None, wall_clock: Callable[[], float] = time.time
+    target: str,
+    credentials: Credentials | None = None,
+    wall_clock: Callable[[], float] = time.time,
+    nearby: Callable[[], Iterable[tuple[str, str]]] = tuple,
 ) -> Iterator[Finding]:
     """Yields the findings as they are made.
 
@@ -22,7 +25,20 @@ def examine(
         target: HOST:PORT.
         credentials: Token and certificates for the robot.
         wall_clock: This computer's wall clock, in seconds since 1970.
+        nearby: Returns name and HOST:PORT of the gateways that announce themselves; called where none is
+            reached.
     """
+    findings = []
+    for finding in _examine(target, credentials, wall_clock):
+        findings.append(finding)
+        yield finding
+    if not reached(findings) and (announced := network.nearby_finding(nearby())):
+        yield announced
+
+
+def _examine(
+    target: str, credentials: Credentials | None, wall_clock: Callable[[], float]
+) -> Iterator[Finding]:
     host, port = network.split(target)
     name = network.name_finding(host)
     yield name
@@ -69,6 +85,7 @@ def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:
     yield from robot.fault_findings(status)
     yield from robot.source_findings(status)
     yield from robot.encoder_findings(status)
+    yield from robot.driving_findings(status)
     endpoint = status.preview.endpoint
     if status.preview.state is PreviewState.RUNNING and endpoint:
         yield network.stream_finding(endpoint.host, endpoint.port)

@@ -4,9 +4,10 @@ import queue
 import socket
 import threading
 import time
+from collections.abc import Iterable
 from typing import Any, Final
 
-from common.findings import Finding, good, wrong
+from common.findings import Finding, good, note, wrong
 from console.doctor.srt_probe import answers_as_srt
 
 _WITHIN_S: Final = 2.0
@@ -74,6 +75,23 @@ def _why_not(error: OSError, host: str, port: int) -> tuple[str, str, str]:
         f"{host} is unreachable: {error.strerror or error}",
         "There is no route from this computer's network to the robot's",
         "Type: ip route",
+    )
+
+
+def nearby_finding(nearby: Iterable[tuple[str, str]]) -> Finding | None:
+    """Names the gateways that announce themselves on this network, where the requested one is not reached.
+
+    Args:
+        nearby: Name and HOST:PORT of each.
+    """
+    found = [f"{name} at {target}" for name, target in nearby]
+    if not found:
+        return None
+    return note(
+        "nearby",
+        f"announced on this network: {', '.join(found)}",
+        "One of them may be the robot, at another address; nothing announced is trusted",
+        "Type: robotctl robots discover",
     )
 
 

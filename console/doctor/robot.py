@@ -5,7 +5,8 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
-from console.client.results import FaultSeverity, HealthState, SourceState
+from console.client.driving import SENTENCES
+from console.client.results import DriveInhibit, FaultSeverity, HealthState, SourceState, TeleopState
 
 LARGEST_SKEW_S: Final = 1.0
 _FALLBACK: Final = "preview.fallback"
@@ -126,6 +127,38 @@ def encoder_findings(status: SystemStatus) -> Iterator[Finding]:
             "The preview is enabled and does not work",
             "Type on the robot: robot-preview encoders",
         )
+
+
+_INHIBITED: Final = {
+    DriveInhibit.BASE_ABSENT: "Type on the robot: robot-drive doctor",
+    DriveInhibit.OUTRANKED: "Type on the robot: robot-drive doctor; it names what else drives the base",
+    DriveInhibit.ROBOT_STOP: "Release the robot's own stop",
+    DriveInhibit.DRIVE_LOST: "Start or restart robot-drive on the robot",
+}
+"""What to do where the driver's own program can't help."""
+
+
+def driving_findings(status: SystemStatus) -> Iterator[Finding]:
+    """Yields what keeps the robot from being driven; nothing where it is not set up for that."""
+    teleop = status.teleop
+    if teleop.state is TeleopState.UNKNOWN:
+        return
+    if teleop.stop:
+        by = f"the robot is stopped by {teleop.stop.by}"
+        why = f": {teleop.stop.reason}" if teleop.stop.reason else ""
+        remedy = f"When it may move again, type: robotctl reset-stop {teleop.stop.stop_id}"
+        yield note("driving", f"{by}{why}", "Nothing moves until that is reset", remedy)
+        return
+    for inhibit in teleop.inhibits:
+        if inhibit in _INHIBITED:
+            yield note(
+                "driving", SENTENCES[inhibit], "The robot does not move for a driver", _INHIBITED[inhibit]
+            )
+    if not teleop.enabled and not teleop.inhibits:
+        yield note("driving", "driving is disabled", "No one can drive", "Type: robotctl drive --enable")
+    elif not teleop.inhibits:
+        who = f"{teleop.holder} drives" if teleop.holder else "no one drives"
+        yield good("driving", f"the robot can be driven; {who}")
 
 
 def access_finding(status: SystemStatus) -> Finding | None:

@@ -9,6 +9,7 @@ from typing import Any, Final, NoReturn, Protocol
 
 from common.backoff import Backoff
 from console.client import (
+    Clock,
     DesiredPreview,
     GatewayError,
     NotAllowed,
@@ -22,6 +23,7 @@ from console.monitor.event_log import EventLine, line_of
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState
 from console.monitor.snapshot_events import SnapshotEvents
+from console.monitor.viewer_feedback import ViewerFeedback
 
 STATUS_INTERVAL_S: Final = 0.1
 """Least time between two statuses: boxes over the video are at most so much older than they need be."""
@@ -44,8 +46,12 @@ class RobotClient(Protocol):
     ) -> AsyncGenerator[results.WatchedStatus | Outage]:
         """Streams the status with its detections."""
 
+    @property
+    def clock(self) -> Clock:
+        """The estimate of the robot's clock."""
+
     async def ping(self) -> Offset:
-        """Makes the lightest call there is."""
+        """Makes the lightest call there is. Improves `clock`."""
 
     async def overlay(self) -> results.OverlaySnapshot:
         """Returns status, detections and the newest events."""
@@ -59,6 +65,12 @@ class RobotClient(Protocol):
         self, desired: DesiredPreview, *, settle_within_s: float = ...
     ) -> results.PreviewChange:
         """Turns the preview on or off, or changes its profile."""
+
+    async def request_key_frame(self, newest_pts: int | None = ...) -> results.KeyFrameAnswer:
+        """Requests a key frame."""
+
+    async def report_picture(self, report: results.PictureReport) -> None:
+        """Reports the picture that is shown."""
 
 
 class RobotSession(Protocol):
@@ -103,13 +115,15 @@ class Conversation:
     Args:
         latest: takes every change of the state.
         retry: the pauses between attempts; they never end by themselves.
+        feedback: what a viewer sends to the robot, while that answers.
     """
 
     _robot: RobotSession
 
-    def __init__(self, latest: LatestState, retry: RetryBackoff) -> None:
+    def __init__(self, latest: LatestState, retry: RetryBackoff, feedback: ViewerFeedback) -> None:
         self._latest = latest
         self._retry = retry
+        self._feedback = feedback
         self._snapshot_events: SnapshotEvents | None = None
         self._answering = asyncio.Event()
         self._retry_now = asyncio.Event()
@@ -135,7 +149,7 @@ class Conversation:
         while True:
             try:
                 try:
-                    await first_to_end(self._watch(), self._measure_round_trip())
+                    await first_to_end(self._watch(), self._measure_round_trip(), self._send_feedback())
                 except NotAllowed:
                     # The end of an open stream says less about the login than the refusal of a call.
                     if self._answering.is_set():
@@ -216,13 +230,19 @@ class Conversation:
     async def _measure_round_trip(self) -> NoReturn:
         """Pings the gateway while it streams its status."""
         await self._answering.wait()
+        client = self._robot.client
         while True:
-            await asyncio.sleep(_PING_S)
             asked_s = time.monotonic()
-            await self._robot.client.ping()
+            await client.ping()
             now_s = time.monotonic()
             link = replace(self._latest.get().link, answer_ms=(now_s - asked_s) * _MS_PER_S)
-            self._latest.update(lambda state: replace(state, link=link, heard_s=now_s))  # noqa: B023 - called at once
+            heard = {"link": link, "heard_s": now_s, "clock": client.clock}
+            self._latest.update(lambda state: replace(state, **heard))  # type: ignore[arg-type]  # noqa: B023 - called at once
+            await asyncio.sleep(_PING_S)
+
+    async def _send_feedback(self) -> None:
+        await self._answering.wait()
+        await self._feedback.run(self._robot.client)
 
     async def _wait_to_retry(self, pause_s: float) -> None:
         """Waits for the end of the pause, the operator's request, or other stored credentials."""

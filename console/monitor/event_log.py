@@ -9,8 +9,8 @@ from console.client.results import EventKind, GapReason
 from console.presentation.formatting import plural
 from console.presentation.severity_style import SeverityStyle
 
-CAPACITY: Final = 200
-"""Lines that are kept; older ones are dropped."""
+CAPACITY: Final = 1500
+"""Lines that are kept, as many as a gateway keeps events; older ones are dropped."""
 _MS_PER_S: Final = 1000
 _STYLES: Final = {FaultSeverity.WARNING: SeverityStyle.WARNING, FaultSeverity.ERROR: SeverityStyle.BAD}
 

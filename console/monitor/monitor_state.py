@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from console.client import DesiredPreview, GatewayError, OverlaySnapshot, PreviewChange
+from console.client import Clock, DesiredPreview, GatewayError, OverlaySnapshot, PreviewChange
 from console.monitor.event_log import EventLog
 from console.monitor.link import Link, LinkState
 
@@ -45,6 +45,7 @@ class MonitorState:
         events: the log of events.
         heard_s: when the robot last answered anything, on the monotonic clock. It streams its status on every
             change, so that an answer of any kind shows that the snapshot still holds.
+        clock: estimates the robot's clock; None before the first ping. Not frozen: each ping improves it.
     """
 
     link: Link
@@ -53,6 +54,7 @@ class MonitorState:
     request: PreviewRequest | None = None
     events: EventLog = field(default_factory=EventLog)
     heard_s: float = 0.0
+    clock: Clock | None = None
 
     def with_outcome(self, ended: PreviewRequest) -> "MonitorState":
         """Returns the state after the end of the request; it carries the preview's newest status."""

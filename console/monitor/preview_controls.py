@@ -20,14 +20,21 @@ class Controls(PreviewSwitch):
         mark: the preview's state in a word.
         style: colour and shape of the mark.
         summary: size, rate and encoder.
-        notes: the outcome of the operator's request, then the robot's own messages.
+        answers: the outcome of the operator's request.
+        conditions: the robot's own messages.
     """
 
     enabled: bool
     mark: str
     style: SeverityStyle
     summary: str
-    notes: tuple[Note, ...]
+    answers: tuple[Note, ...]
+    conditions: tuple[Note, ...]
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """The answers, then the conditions."""
+        return (*self.answers, *self.conditions)
 
 
 def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float) -> Controls:
@@ -49,7 +56,8 @@ def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float)
         mark=current.value.upper(),
         style=PREVIEW_STYLES[current],
         summary=_summary(preview) if preview and current is not PreviewState.UNKNOWN else "",
-        notes=(*_request_notes(state.request, now_s), *(_robot_notes(preview) if preview else ())),
+        answers=tuple(_request_notes(state.request, now_s)),
+        conditions=tuple(_robot_notes(preview)) if preview else (),
     )
 
 

@@ -1,10 +1,48 @@
 """Rows of the side panel: the robot's faults, and its status by component."""
 
+from dataclasses import dataclass
+from typing import Final
+
 from console.client.results import Fault
+from console.monitor.alarm import Alarm, Occurrence, occurrence
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import age
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.presentation.status_table import Row, View, table_rows
+
+_NO_FAULT: Final = Row("", "none", SeverityStyle.GOOD, "The robot reports no fault")
+_WAS_NO_FAULT: Final = Row("", "none", SeverityStyle.QUIET, "The robot reported no fault")
+_NO_STATUS: Final = Row("", "", SeverityStyle.QUIET, "No status received yet")
+
+
+@dataclass(frozen=True, slots=True)
+class FaultItem:
+    """A fault in the list.
+
+    Args:
+        row: its texts.
+        occurrence: what is acknowledged; None where the row is not a fault.
+        pending: whether it waits for its acknowledgement.
+    """
+
+    row: Row
+    occurrence: Occurrence | None = None
+    pending: bool = False
+
+
+def fault_items(state: MonitorState, alarm: Alarm, now_s: float) -> list[FaultItem]:
+    """Returns the faults with their acknowledgement; a line that says so where there is none."""
+    if state.snapshot is None:
+        return [FaultItem(_NO_STATUS)]
+    faults = state.snapshot.status.faults
+    rows = fault_rows(state, now_s)
+    items = [
+        FaultItem(row, occurrence(fault), alarm.is_pending(fault))
+        for row, fault in zip(rows, faults, strict=True)
+    ]
+    if any(fault.active for fault in faults):
+        return items
+    return [FaultItem(_WAS_NO_FAULT if state.outdated(now_s) else _NO_FAULT), *items]
 
 
 def fault_rows(state: MonitorState, now_s: float) -> list[Row]:
@@ -30,8 +68,8 @@ def component_rows(state: MonitorState, now_s: float) -> list[Row]:
 
 
 def _fault_row(fault: Fault, snapshot_age_ms: int) -> Row:
-    # Of a diagnostic component the message begins with its name.
-    named = not fault.component or fault.message.startswith(f"{fault.component}:")
+    # Many messages begin with the name of the component.
+    named = fault.message.casefold().startswith(fault.component.casefold())
     text = fault.message if named else f"{fault.component}: {fault.message}"
     if fault.active:
         since = f"for {age(fault.age_ms + snapshot_age_ms)}"

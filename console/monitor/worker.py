@@ -6,13 +6,24 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import replace
+from functools import partial
 from typing import Final, TypeAlias
 
-from console.client import Backoff, ClientOptions, Credentials, DesiredPreview, GatewayFailed, parse_target
+from console.client import (
+    Backoff,
+    ClientOptions,
+    Credentials,
+    DesiredPreview,
+    GatewayFailed,
+    Offset,
+    PictureReport,
+    parse_target,
+)
 from console.monitor.conversation import Conversation, RetryBackoff, RobotSession, first_to_end
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
+from console.monitor.viewer_feedback import ViewerFeedback
 
 # One attempt is short here: the conversation retries by itself, and reports each failure.
 _OPTIONS: Final = ClientOptions(answer_within_s=1.5, backoff=Backoff(give_up_after_s=0.3))
@@ -41,6 +52,7 @@ class Worker:
         on_change: called after each change of `latest()`, in the worker's thread; must only hand over.
         connect: makes the client, inside the worker's loop; by default one without credentials.
         retry: the pauses between attempts.
+        picture: returns the report on the picture that is shown; None while there is none to report.
 
     Raises:
         UserError: the target is not an address.
@@ -52,6 +64,7 @@ class Worker:
         on_change: Callable[[], None],
         connect: Connect | None = None,
         retry: RetryBackoff | None = None,
+        picture: Callable[[], PictureReport | None] = lambda: None,
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(state=LinkState.CONNECTING, since_s=time.monotonic()))
@@ -60,7 +73,8 @@ class Worker:
         self._thread = threading.Thread(target=self._run, name="gateway-worker", daemon=True)
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
-        self._conversation = Conversation(self._latest, retry or RetryBackoff())
+        self._feedback = ViewerFeedback(picture)
+        self._conversation = Conversation(self._latest, retry or RetryBackoff(), self._feedback)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -82,6 +96,22 @@ class Worker:
 
         if self._latest.change(begin):
             self._call_soon(self._conversation.send_request)
+
+    def clock_offset(self) -> Offset | None:
+        """Returns the offset of the robot's monotonic clock; None before the first ping."""
+        clock = self.latest().clock
+        return clock.offset(time.monotonic()) if clock else None
+
+    def request_key_frame(self, newest_pts: int | None) -> bool:
+        """Requests a key frame, for a picture that lost packets have torn.
+
+        Returns:
+            Whether it is requested: the robot answers, and is not too old for it.
+        """
+        if not self._feedback.takes_requests or self.latest().link.state is not LinkState.CONNECTED:
+            return False
+        self._call_soon(partial(self._feedback.request_key_frame, newest_pts))
+        return True
 
     def retry_now(self) -> None:
         """Ends the pause before the next attempt."""

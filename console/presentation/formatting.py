@@ -3,6 +3,8 @@
 from datetime import datetime, tzinfo
 from typing import Final
 
+from common import units
+
 UNKNOWN: Final = "-"
 
 _SECOND_MS: Final = 1000
@@ -10,7 +12,6 @@ _CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S"
 _MINUTE_S: Final = 60
 _HOUR_S: Final = 3600
 _GIB: Final = 1 << 30
-_KBIT_PER_MBIT: Final = 1000
 
 
 def quantity(value: float | None, unit: str, digits: int = 1) -> str:
@@ -56,9 +57,7 @@ def gibibytes(count: int | None) -> str:
 
 def bit_rate(kbps: float | None) -> str:
     """Returns a bit rate: 850 kbit/s, 2.98 Mbit/s."""
-    if kbps is None or kbps < _KBIT_PER_MBIT:
-        return quantity(kbps, "kbit/s", 0)
-    return quantity(kbps / _KBIT_PER_MBIT, "Mbit/s", 2)
+    return UNKNOWN if kbps is None else units.bit_rate(kbps)
 
 
 def plural(count: int | None, noun: str) -> str:

@@ -34,8 +34,17 @@ from console.presentation.severity_style import (
     PREVIEW_STYLES,
     SeverityStyle,
 )
+from console.presentation.value_style import (
+    GOOD,
+    Judgement,
+    of_battery,
+    of_compute,
+    of_network,
+    of_video,
+)
 
 _MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
+_REMARKABLE_AGE_MS: Final = 2000
 _UNREADABLE: Final = (
     SourceState.QOS_MISMATCH,
     SourceState.WRONG_TYPE,
@@ -89,19 +98,31 @@ class Look:
             return Row(label, _MARKS[Freshness.STALE], SeverityStyle.WARNING, last)
         return Row(label, state.upper(), style, text)
 
-    def measured(self, label: str, sample: results.Sample, text: str) -> Row:
-        """Returns the row of a measured part: marked by its freshness, empty while it is missing."""
+    def measured(self, label: str, sample: results.Sample, text: str, found: Judgement = GOOD) -> Row:
+        """Returns the row of a measured part: marked by its freshness, empty while it is missing.
+
+        Args:
+            label: of the row.
+            sample: the part.
+            text: its values.
+            found: how good these are, which counts while they are fresh.
+        """
         freshness = sample.freshness
         if freshness is Freshness.FRESH and self.outdated:
             freshness = Freshness.STALE
         text = text if sample.available else ""
+        fresh = freshness is Freshness.FRESH
         return Row(
             self.label(label),
-            _MARKS[freshness],
-            FRESHNESS_STYLES[freshness],
+            (fresh and found.word) or _MARKS[freshness],
+            found.style if fresh else FRESHNESS_STYLES[freshness],
             _unbroken(text) if self.compact else text,
-            self.age(sample.age_ms),
+            "" if fresh and self._is_unremarkable(sample.age_ms) else self.age(sample.age_ms),
         )
+
+    def _is_unremarkable(self, age_ms: int | None) -> bool:
+        """Whether an age says no more than "fresh" does, where texts must be short."""
+        return self.compact and (age_ms or 0) + self.silent_ms < _REMARKABLE_AGE_MS
 
 
 _NOW: Final = Look()
@@ -138,7 +159,7 @@ def preview_rows(preview: results.PreviewStatus, look: Look = _NOW) -> Iterator[
         yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
     if preview.measured.available:
         text = _video(preview.measured, False, preview.target_bitrate_kbps)
-        yield look.measured("stream", preview.measured, text)
+        yield look.measured("stream", preview.measured, text, of_video(preview.measured))
     if preview.endpoint and preview.state is PreviewState.RUNNING:
         encryption = "encrypted" if preview.endpoint.encrypted else ""
         latency = f"latency {preview.endpoint.latency_ms} ms"
@@ -356,6 +377,7 @@ def _measured(
     label: str,
     sample: Callable[[results.SystemStatus], Any],
     text: Callable[[Any, bool], str],
+    judge: Callable[[Any], Judgement] = lambda _: GOOD,
     *,
     optional: bool = False,
 ) -> Rows:
@@ -363,7 +385,7 @@ def _measured(
 
     def rows(view: View) -> Iterator[Row]:
         part = sample(view.status)
-        row = view.measured(label, part, text(part, view.compact))
+        row = view.measured(label, part, text(part, view.compact), judge(part))
         if row.text or not optional:
             yield row
 
@@ -377,15 +399,19 @@ TABLE: Final[tuple[Rows, ...]] = (
     _measured("vision", lambda status: status.vision, _vision),
     _objects,
     _full(_preview),
-    _measured("battery", lambda status: status.platform.power.lipo_battery, _battery),
+    _measured("battery", lambda status: status.platform.power.lipo_battery, _battery, of_battery),
     _measured("command", lambda status: status.effective_command, _command, optional=True),
     _measured("mode", lambda status: status.mission, lambda mission, _: mission.mode or "", optional=True),
-    _measured("computer", lambda status: status.platform.compute, _compute, optional=True),
+    _measured("computer", lambda status: status.platform.compute, _compute, of_compute, optional=True),
     _measured(
-        "computer battery", lambda status: status.platform.power.onboard_battery, _battery, optional=True
+        "computer battery",
+        lambda status: status.platform.power.onboard_battery,
+        _battery,
+        of_battery,
+        optional=True,
     ),
-    _measured("network", lambda status: status.platform.network, _network, optional=True),
-    _compact(_measured("video", lambda status: status.preview.measured, _video, optional=True)),
+    _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
+    _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
     _access,
     _gateway,

@@ -12,7 +12,7 @@ from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions
 
-CaptureTimes: TypeAlias = Callable[[int], int | None]
+FrameTimes: TypeAlias = Callable[[int], tuple[int | None, float | None]]
 CODECS = {"video/x-h264": "h264", "video/x-h265": "h265"}
 """Codec by media type of its stream; GStreamer's parser, software decoder and caps are named after it."""
 _BAD = "gstreamer1.0-plugins-bad"
@@ -66,7 +66,7 @@ class DecodingBranch:
         queue: takes every frame, on a GStreamer thread.
         options: pixel format and decoders.
         source: element that provides whole access units; None to take them from the pad of `attach`.
-        capture_ns: returns the capture time for a frame's presentation time.
+        times: returns when a frame was captured and received, for its presentation time.
 
     Raises:
         UserError: an element is not installed.
@@ -78,10 +78,10 @@ class DecodingBranch:
         queue: FrameQueue,
         options: ReceiverOptions,
         source: Any = None,
-        capture_ns: CaptureTimes | None = None,
+        times: FrameTimes | None = None,
     ) -> None:
         self._codec = codec
-        self._capture_ns = capture_ns or _unknown
+        self._times = times or _unknown
         self._queue = queue
         self._decoder = options.decoders.get(codec, f"avdec_{codec}")
         self._caps: Any = None
@@ -137,6 +137,7 @@ class DecodingBranch:
         info = self._layout
         buffer = sample.get_buffer()
         pts_ns = None if buffer.pts == Gst.CLOCK_TIME_NONE else buffer.pts
+        captured_ns, received_s = _unknown(0) if pts_ns is None else self._times(pts_ns)
         return Frame(
             width=info.width,
             height=info.height,
@@ -147,12 +148,13 @@ class DecodingBranch:
             stride=info.stride[0],
             read=partial(_pixels, buffer),
             decoder=self._decoder,
-            capture_ns=None if pts_ns is None else self._capture_ns(pts_ns),
+            capture_ns=captured_ns,
+            received_s=received_s,
         )
 
 
-def _unknown(_pts_ns: int) -> None:
-    """Returns no capture time."""
+def _unknown(_pts_ns: int) -> tuple[None, None]:
+    return None, None
 
 
 def _pixels(buffer: Any) -> bytes:

@@ -22,10 +22,12 @@ class LinkStatistics:
     Args:
         rtt_ms: round trip, smoothed.
         lost: packets that were missing at first; most of them come by retransmission.
+        received: packets that have come, retransmissions included.
     """
 
     rtt_ms: float
     lost: int
+    received: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +39,9 @@ class Delivery:
         reason: why it is not direct, although that was not ruled out.
         rtt_ms: round trip, smoothed; None before the first connection.
         lost: packets that were missing at first.
+        loss_percent: share of the packets of the last second that were missing at first; None before one.
         held: packets that wait for an earlier one now.
+        waited: packets that had to wait for an earlier one.
         given_up: packets that were not waited for any longer.
         wait_ms: longest wait for a missing packet at this round trip.
         dropped_frames: frames that were not decoded, because they, or one that they depend on, were damaged.
@@ -48,7 +52,9 @@ class Delivery:
     reason: str = ""
     rtt_ms: float | None = None
     lost: int = 0
+    loss_percent: float | None = None
     held: int = 0
+    waited: int = 0
     given_up: int = 0
     wait_ms: int = 0
     dropped_frames: int = 0

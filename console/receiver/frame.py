@@ -31,6 +31,7 @@ class Frame:
         read: copies all its pixels, the first plane first.
         decoder: GStreamer's element that decoded it.
         capture_ns: when the camera took it, on the robot's monotonic clock; None while that is unknown.
+        received_s: when it was complete and in its turn, on `time.monotonic()`; None with SRT's own delivery.
     """
 
     width: int
@@ -43,3 +44,4 @@ class Frame:
     read: Callable[[], bytes] = field(repr=False)
     decoder: str = ""
     capture_ns: int | None = None
+    received_s: float | None = None

@@ -223,7 +223,7 @@ class SrtSocket:
         """
         found = _Statistics()
         self._check(self._srt.srt_bistats(self._socket, ctypes.byref(found), 0, 1))
-        return LinkStatistics(found.msRTT, found.pktRcvLossTotal)
+        return LinkStatistics(found.msRTT, found.pktRcvLossTotal, found.pktRecvTotal)
 
     def close(self) -> None:
         """Disconnects."""

@@ -2,14 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeAlias
 
 from console.capture_time import CaptureClock
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
 
-MAX_AGE_S: Final = 1.0
+RequestKeyFrame: TypeAlias = Callable[[int | None], bool]
+
+MAX_AGE_S: Final = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +26,9 @@ class ReceiverOptions:
         capture: capture times of the stream's frames; None when they are not known.
         max_age_s: age of the frames beyond which the connection is made anew.
         on_picture_lost: requests a key frame, without which no further frame can be shown; called again while
-            none comes. On the receiver's thread, so it must only hand over. Without it the connection is made
-            anew.
+            none comes. Takes the PTS of the newest frame of which anything has arrived, in ticks; returns
+            whether a request is made. On the receiver's thread, so it must only hand over. Without it, or
+            where no request is made, the connection is made anew.
     """
 
     pixels: PixelFormat = PixelFormat.I420
@@ -34,4 +37,4 @@ class ReceiverOptions:
     delivery: DeliveryChoice = DeliveryChoice.AUTO
     capture: CaptureClock | None = None
     max_age_s: float = MAX_AGE_S
-    on_picture_lost: Callable[[], None] | None = None
+    on_picture_lost: RequestKeyFrame | None = None

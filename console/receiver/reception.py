@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final, Protocol
@@ -19,6 +20,12 @@ _SETTLE_S: Final = 0.0003
 """What libsrt's thread takes from a datagram to a readable packet, with room for the rest of the burst."""
 _REPORT_S: Final = 0.25
 """Period of the statistics, and of the wait that follows the round trip."""
+_LOSS_REPORTS: Final = 4
+"""Statistics over which the share of lost packets is taken: a second."""
+_NARROW_PERCENT: Final = 20.0
+"""Loss beyond what SRT repairs: the link is narrower than the stream."""
+_BUSY_S: Final = 0.1
+"""Packets come while none is longer ago."""
 _REPEAT_S: Final = 0.5
 """Without a key frame for that time, one is requested again."""
 _REJOIN_AFTER_S: Final = 0.2
@@ -104,8 +111,15 @@ class Reception:
         self._statistics: LinkStatistics | None = None
         self._report_s = 0.0
         self._settled_s = time.monotonic() + _FIRST_S
+        self._arrived_s = 0.0
+        """When the newest packet came."""
+        self._taken_s = time.monotonic()
+        """When the newest access unit was decoded, or the connection began."""
+        self._window: deque[LinkStatistics] = deque(maxlen=_LOSS_REPORTS + 1)
         self._torn_s: float | None = None
-        """Since when no frame can be shown, or when a key frame was requested last."""
+        """Since when no frame can be shown."""
+        self._request_s = 0.0
+        """When a key frame is to be requested, while none can be shown."""
         self.had_data = False
         """Whether anything has arrived."""
 
@@ -123,7 +137,7 @@ class Reception:
                     stopping.wait(_SETTLE_S)
                 self._drain()
                 now_s = time.monotonic()
-                if self._is_too_old(now_s) or self._needs_rejoin(now_s):
+                if self._is_too_old(now_s) or self._is_stuck(now_s) or self._needs_rejoin(now_s):
                     self._totals = replace(self._totals, rejoins=self._totals.rejoins + 1)
                     return
                 if now_s >= self._report_s:
@@ -140,6 +154,7 @@ class Reception:
     def _drain(self) -> None:
         while packet := self._connection.receive():
             self.had_data = True
+            self._arrived_s = time.monotonic()
             self._decode(self._reorder.put(*packet, time.monotonic()))
         self._decode(self._reorder.expire(time.monotonic()))
 
@@ -150,7 +165,9 @@ class Reception:
             self._sink.record(each.payload)
             for unit in self._stream.feed(each.payload):
                 self._newest = unit
-                if not self._sink.push(unit):
+                if self._sink.push(unit):
+                    self._taken_s = time.monotonic()
+                else:
                     self._stream.damage()
                     self._stream.dropped_units += 1
 
@@ -163,6 +180,20 @@ class Reception:
         age_s = self._options.capture.age_s(unit.pts_ticks) if self._options.capture else None
         return self._age.exceeded(now_s, time_s, age_s)
 
+    def _is_stuck(self, now_s: float) -> bool:
+        """Whether packets come, but for too long no frame that can be shown.
+
+        A link that is narrower than the stream drops some of every frame. The sender repeats them all, and
+        has no room left for new ones; a new connection begins without that backlog.
+        """
+        if now_s - self._arrived_s > _BUSY_S:
+            return False
+        # Where much is lost, what is waited for does not come.
+        narrow = (self._loss_percent() or 0.0) > _NARROW_PERCENT
+        rtt_s = self._statistics.rtt_ms / 1000 if self._statistics else 0.0
+        patience_s = rtt_s if narrow else _FIRST_KEY_FRAME_S
+        return now_s - self._taken_s > self._options.max_age_s + patience_s
+
     def _needs_rejoin(self, now_s: float) -> bool:
         """Requests a key frame while no frame can be shown; returns whether only a new connection helps."""
         stream, request = self._stream, self._options.on_picture_lost
@@ -173,22 +204,30 @@ class Reception:
         if not shown and stream.dropped_units == 0:
             return False
         if self._torn_s is None:
-            # Before the first frame, the key frame that a new connection gets may be under way.
-            self._torn_s = now_s - _REPEAT_S if shown and request else now_s
-        torn_s = now_s - self._torn_s
-        if request is None:
-            return torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)
-        if torn_s >= _REPEAT_S:
             self._torn_s = now_s
-            request()
-        return False
+            # Before the first frame, the key frame that a new connection gets may be under way.
+            self._request_s = now_s if shown else now_s + _REPEAT_S
+        if now_s < self._request_s:
+            return False
+        if request and request(stream.newest_pts):
+            self._request_s = now_s + _REPEAT_S
+            return False
+        return now_s - self._torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)
 
     def _update(self) -> None:
         statistics = self._connection.statistics()
         if time.monotonic() >= self._settled_s:
             self._reorder.wait_s = wait_s(statistics.rtt_ms)
         self._statistics = statistics
+        self._window.append(statistics)
         self._report(self._figures())
+
+    def _loss_percent(self) -> float | None:
+        if len(self._window) <= 1:
+            return None
+        first, last = self._window[0], self._window[-1]
+        received, lost = last.received - first.received, last.lost - first.lost
+        return min(100.0, 100 * lost / received) if received > 0 else None
 
     def _figures(self) -> Delivery:
         totals, found = self._totals, self._statistics
@@ -196,7 +235,9 @@ class Reception:
             totals,
             rtt_ms=found.rtt_ms if found else None,
             lost=totals.lost + (found.lost if found else 0),
+            loss_percent=self._loss_percent(),
             held=self._reorder.held,
+            waited=totals.waited + self._reorder.waited,
             given_up=totals.given_up + self._reorder.given_up,
             wait_ms=round(self._reorder.wait_s * 1000),
             dropped_frames=totals.dropped_frames + self._stream.dropped_units,

@@ -43,6 +43,8 @@ class Reorder:
         self._held: dict[int, tuple[float, bytes]] = {}
         """Arrival and payload by number, in the order of arrival."""
         self.wait_s = wait_s
+        self.waited = 0
+        """Packets that had to wait for an earlier one."""
         self.given_up = 0
         """Packets that were not waited for any longer."""
         self.dropped = 0
@@ -74,6 +76,7 @@ class Reorder:
             return []
         self._held[number] = now_s, payload
         delivered = list(self._run())
+        self.waited += number in self._held
         if len(self._held) > self._capacity:
             delivered += self._skip_to(min(self._held, key=self._distance))
         return delivered

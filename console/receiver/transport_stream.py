@@ -57,6 +57,7 @@ class TransportStream:
         torn: whether access units are dropped until the next key frame, as at the beginning.
         breaks: how often a torn time began after a whole access unit.
         dropped_units: access units that were dropped, as far as their beginning arrived.
+        newest_pts: PTS of the newest access unit of which the beginning arrived, in ticks; None before one.
     """
 
     def __init__(self) -> None:
@@ -74,6 +75,7 @@ class TransportStream:
         self._units: list[AccessUnit] = []
         self.torn = True
         self.breaks = self.dropped_units = 0
+        self.newest_pts: int | None = None
 
     def damage(self) -> None:
         """Notes that packets are missing here."""
@@ -138,6 +140,7 @@ class TransportStream:
         length = first[4] << 8 | first[5]
         self._expected = length + 6 if length else 0
         self._parts, self._size, self._open = [first], len(first), True
+        self.newest_pts = _pts(first)
 
     def _finish(self, *, complete: bool) -> None:
         """Ends the PES packet, if one is open, and keeps its access unit, if it can be decoded."""

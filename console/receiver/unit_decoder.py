@@ -1,5 +1,6 @@
 """Decodes access units that are pushed into it: the GStreamer pipeline of direct delivery."""
 
+import time
 from contextlib import ExitStack
 from typing import Any, Final
 
@@ -40,6 +41,8 @@ class UnitDecoder:
         self._branch: DecodingBranch | None = None
         self._pts = Unwrapped()
         """Over all connections: the decoder's time must not go back."""
+        self._received_s: dict[int, float] = {}
+        """When the access units that are in the decoder were received, by PTS in ns."""
         self._pipeline = Gst.Pipeline.new(None)
         self._recorder: Any = None
         self._release = ExitStack()
@@ -71,6 +74,7 @@ class UnitDecoder:
         buffer = Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(unit.data))
         if unit.pts_ticks is not None:
             buffer.pts = ticks_to_ns(self._pts.ticks(unit.pts_ticks))
+            self._note_received(buffer.pts)
         if unit.first:
             buffer.set_flags(Gst.BufferFlags.DISCONT)
         self._source.emit("push-buffer", buffer)
@@ -97,7 +101,7 @@ class UnitDecoder:
         caps = f"video/x-{codec},stream-format=byte-stream,alignment=au"
         try:
             source = element("appsrc", caps=caps, is_live=True, format="time", max_bytes=0)
-            self._branch = DecodingBranch(codec, self._queue, self._options, source, self._capture_ns)
+            self._branch = DecodingBranch(codec, self._queue, self._options, source, self._times)
         except UserError as error:
             raise UndecodableError(error.what, error.remedy, final=True) from error
         self._codec, self._source = codec, source
@@ -109,6 +113,14 @@ class UnitDecoder:
             # It holds a method of ours: without this only a collector frees both, and GStreamer's sockets.
             self._branch = None
 
-    def _capture_ns(self, pts_ns: int) -> int | None:
-        """Returns the capture time for the decoder's time. On GStreamer's thread."""
-        return self._options.capture.capture_ns(ns_to_ticks(pts_ns)) if self._options.capture else None
+    def _note_received(self, pts_ns: int) -> None:
+        self._received_s[pts_ns] = time.monotonic()
+        if len(self._received_s) > 2 * _MOST_WAITING:
+            # Of a frame that the decoder has dropped.
+            self._received_s.pop(next(iter(self._received_s)), None)
+
+    def _times(self, pts_ns: int) -> tuple[int | None, float | None]:
+        """Returns when a frame was captured and received, for its decoder's time. On GStreamer's thread."""
+        capture = self._options.capture
+        captured_ns = capture.capture_ns(ns_to_ticks(pts_ns)) if capture else None
+        return captured_ns, self._received_s.pop(pts_ns, None)

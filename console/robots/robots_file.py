@@ -188,7 +188,9 @@ def _file(path: Path, text: str) -> Path:
 def _only(path: Path, above: str, table: Mapping[str, Any], allowed: tuple[str, ...]) -> None:
     for key in table:
         if key not in allowed:
-            raise _wrong(path, f"unknown key '{above}{key}'", f"Allowed: {', '.join(allowed)}")
+            meant = get_close_matches(key, allowed, n=1)
+            hint = f"Did you mean '{meant[0]}'? " if meant else ""
+            raise _wrong(path, f"unknown key '{above}{key}'", f"{hint}Allowed: {', '.join(allowed)}")
 
 
 def _wrong(path: Path, what: str, remedy: str) -> UserError:

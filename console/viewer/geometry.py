@@ -62,3 +62,17 @@ def on_frame(box: Box, source_width: float, source_height: float, frame: Box) ->
     if right > left and bottom > top:
         return Box(left, top, right - left, bottom - top)
     return None
+
+
+def label_place(box: Box, width: float, height: float, frame: Box) -> Box:
+    """Returns where the label of a box is drawn: above it, else inside it; never beyond the frame.
+
+    Args:
+        box: what is labelled.
+        width: of the label.
+        height: of the label.
+        frame: where the frame is shown.
+    """
+    above = box.y - height
+    y = above if above >= frame.y else min(box.y, frame.bottom - height)
+    return Box(max(frame.x, min(box.x, frame.right - width)), y, width, height)

@@ -49,6 +49,7 @@ def watch_headless(
     counter = FrameCounter()
     robot = RobotVideo(target, load, pixels=PixelFormat.I420, recording=recording, delivery=delivery)
     robot.session.add_frame_listener(counter.count)
+    robot.session.add_frame_listener(robot.meter.shown)
 
     def done() -> bool:
         return stop.is_set() or (frames is not None and counter.frames >= frames)
@@ -63,7 +64,9 @@ def watch_headless(
                 counter.changed.wait_for(done, _POLL_S)
     finally:
         robot.close(_CLOSE_TIMEOUT_S)
-    summary = counter.summary(robot.session.redials, recording, robot.session.delivery())
+    summary = counter.summary(
+        robot.session.redials, recording, robot.session.delivery(), robot.meter.summary()
+    )
     if frames and summary.pictures < frames:
         raise UserError(f"ended after {summary.pictures} of {frames} frames")
     return summary

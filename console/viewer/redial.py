@@ -36,7 +36,9 @@ def address_of(preview: PreviewStatus) -> StreamAddress | None:
         return None
     if endpoint.transport is not StreamTransport.SRT or endpoint.container is not StreamContainer.MPEG_TS:
         return None
-    return StreamAddress(endpoint.host, endpoint.port, endpoint.latency_ms, endpoint.passphrase)
+    return StreamAddress(
+        endpoint.host, endpoint.port, endpoint.latency_ms, endpoint.passphrase, endpoint.capture_offset_ns
+    )
 
 
 def is_off(preview: PreviewStatus) -> bool:

@@ -4,13 +4,15 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+from console.client import PictureReport, PreviewStatus
 from console.client.results import Detections
 from console.monitor.credential_refresh import LoadCredentials
 from console.monitor.link import LinkState
 from console.monitor.worker import Worker, connecting
-from console.receiver.delivery import DeliveryChoice
+from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
+from console.viewer.picture_meter import PictureMeter
 from console.viewer.session import VideoSession
 
 _SILENT_AFTER_S: Final = 1.0
@@ -44,8 +46,16 @@ class RobotVideo:
     ) -> None:
         self._on_change = on_change
         self.recording = recording
-        self.session = VideoSession(pixels=pixels, recording=recording, delivery=delivery)
-        self.worker = Worker(target, self._update_session, connecting(load))
+        self.worker = Worker(target, self._update_session, connecting(load), picture=self._report)
+        self.meter = PictureMeter(self.worker.clock_offset, self._delivery, self._preview)
+        """Ages of the pictures; what shows them notes them here."""
+        self.session = VideoSession(
+            pixels=pixels,
+            recording=recording,
+            delivery=delivery,
+            robot_now_ns=self.meter.robot_now_ns,
+            on_picture_lost=self.worker.request_key_frame,
+        )
 
     def start(self) -> None:
         """Starts both threads."""
@@ -65,11 +75,25 @@ class RobotVideo:
         if self.session.close(timeout_s) and self.recording:
             self.recording.close()
 
+    # Worker, meter and session need each other: these are called only once all three exist.
+
+    def _report(self) -> PictureReport | None:
+        return self.meter.report()
+
+    def _delivery(self) -> Delivery | None:
+        return self.session.delivery()
+
+    def _preview(self) -> PreviewStatus | None:
+        snapshot = self.worker.latest().snapshot
+        return snapshot.status.preview if snapshot else None
+
     def _update_session(self) -> None:
         state = self.worker.latest()
         if state.link.state is LinkState.CONNECTED and state.snapshot:
             self.session.follow(state.snapshot.status.preview)
         elif state.link.error:
             self.session.gateway_lost(state.link.error)
+        if self.session.latest_frame() is None:
+            self.meter.forget()
         if self._on_change:
             self._on_change()

@@ -15,7 +15,7 @@ from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.errors import StreamError, UndecodableError, no_frame_within
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.frame_queue import FrameQueue
-from console.receiver.options import ReceiverOptions
+from console.receiver.options import ReceiverOptions, RequestKeyFrame
 from console.receiver.recording import Recording
 from console.viewer.decoders import Decoders
 from console.viewer.playback import Playback, PlaybackInputs, playback
@@ -77,8 +77,7 @@ class VideoSession:
         delivery: how packets are delivered.
         robot_now_ns: reads the estimate of the robot's monotonic clock, in ns; None while there is none.
             Without it frames have no capture time.
-        on_picture_lost: requests a key frame, in the receiver's thread; must only hand over. Without it the
-            receiver connects anew.
+        on_picture_lost: requests a key frame; see `ReceiverOptions`. Without it the receiver connects anew.
         connect: opens connections; tests pass a double.
     """
 
@@ -90,7 +89,7 @@ class VideoSession:
         decoders: Decoders | None = None,
         delivery: DeliveryChoice = DeliveryChoice.AUTO,
         robot_now_ns: RobotTime | None = None,
-        on_picture_lost: Callable[[], None] | None = None,
+        on_picture_lost: RequestKeyFrame | None = None,
         connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
@@ -202,7 +201,7 @@ class VideoSession:
             return error
         self._connection = connection
         with closing(connection):
-            end = self._take_frames(queue, address)
+            end = self._take_frames(connection, queue, address)
         return self._decoders.after_undecodable(end) if isinstance(end, UndecodableError) else end
 
     def _options(self, address: StreamAddress) -> ReceiverOptions:
@@ -218,9 +217,14 @@ class VideoSession:
             on_picture_lost=self._on_picture_lost,
         )
 
-    def _take_frames(self, queue: FrameQueue, address: StreamAddress) -> StreamError:
-        connected_s, frame_s = time.monotonic(), None
+    def _take_frames(
+        self, connection: OpenConnection, queue: FrameQueue, address: StreamAddress
+    ) -> StreamError:
+        connected_s, frame_s, rejoins = time.monotonic(), None, connection.delivery.rejoins
         while not self._closing and address == self._address:
+            if connection.delivery.rejoins != rejoins:
+                # It knows why no frame comes, and has done what can be done.
+                connected_s, frame_s, rejoins = time.monotonic(), None, connection.delivery.rejoins
             match queue.take(time.monotonic() + _POLL_S):
                 case Frame() as frame:
                     frame_s = frame.arrival_s

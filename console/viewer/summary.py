@@ -10,6 +10,7 @@ from console.receiver.delivery import Delivery
 from console.receiver.frame import Frame
 from console.receiver.recording import Recording
 from console.viewer.formatting import delivery_text, mebibytes
+from console.viewer.picture_meter import AgeSummary
 
 _MS_PER_S = 1000
 
@@ -30,6 +31,7 @@ class ViewSummary:
         redials: how often the stream was connected to again after it was lost or fell silent.
         recording: file, bytes and gaps of the recording; None without one.
         delivery: how packets were delivered, with the figures of the latest connection; None without one.
+        picture_age: ages of the last frames; None where the robot does not say when it captured them.
     """
 
     pictures: int
@@ -43,6 +45,7 @@ class ViewSummary:
     redials: int
     recording: dict[str, Any] | None
     delivery: Delivery | None = None
+    picture_age: AgeSummary | None = None
 
     def line(self) -> str:
         """Returns the summary for people."""
@@ -55,6 +58,7 @@ class ViewSummary:
             f"{self.fps:.1f} fps" if self.fps else "",
             f"{self.corrupt_pictures} corrupt" if self.corrupt_pictures else "",
             delivery_text(self.delivery),
+            _age_text(self.picture_age),
             f"reconnected {self.redials}x" if self.redials else "",
             _recording_text(self.recording),
         )
@@ -88,7 +92,11 @@ class FrameCounter:
         return self._last_s or self._started_s
 
     def summary(
-        self, redials: int, recording: Recording | None, delivery: Delivery | None = None
+        self,
+        redials: int,
+        recording: Recording | None,
+        delivery: Delivery | None = None,
+        picture_age: AgeSummary | None = None,
     ) -> ViewSummary:
         """Returns the summary of all frames so far."""
         kept: dict[str, Any] | None = None
@@ -112,7 +120,12 @@ class FrameCounter:
                 redials=redials,
                 recording=kept,
                 delivery=delivery,
+                picture_age=picture_age,
             )
+
+
+def _age_text(age: AgeSummary | None) -> str:
+    return f"{age.median_ms:.0f} ms old, 95 % at most {age.p95_ms:.0f} ms" if age else ""
 
 
 def _recording_text(recording: dict[str, Any] | None) -> str:

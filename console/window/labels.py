@@ -5,7 +5,7 @@ from typing import Final
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLabel, QSizePolicy, QWidget
 
 TOP: Final = Qt.AlignmentFlag.AlignTop
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
@@ -47,9 +47,15 @@ class ElidedLabel(PlainLabel):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Draws the elided text."""
-        painter = QPainter(self)
-        fitting = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, self.width())
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, fitting)
+        paint_elided(self)
+
+
+def paint_elided(label: QLabel) -> None:
+    """Draws the text of a label on one line, elided where it does not fit. Within its paint event."""
+    painter = QPainter(label)
+    room = label.contentsRect()
+    fitting = label.fontMetrics().elidedText(label.text(), Qt.TextElideMode.ElideRight, room.width())
+    painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, fitting)
 
 
 def width_of(text: str, *, bold: bool = False) -> int:
@@ -59,7 +65,7 @@ def width_of(text: str, *, bold: bool = False) -> int:
     return label.sizeHint().width()
 
 
-def set_text(label: QLabel | QPushButton, text: str) -> None:
+def set_text(label: QLabel | QAbstractButton, text: str) -> None:
     """Changes a text; laying out the same one again would cost time."""
     if label.text() != text:
         label.setText(text)

@@ -6,25 +6,21 @@ from typing import Any, Generic, TypeVar
 
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QPalette
-from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from console.window.labels import (
-    RIGHT,
     TOP,
     PlainLabel,
     WrappedLabel,
     set_bold,
     set_text,
     set_tool_tip,
-    width_of,
 )
 from console.window.layout import fill
 from console.window.theme import PALETTE_CHANGES, DimLabel, Marker, tinted_ground
-
-_LONGEST_AGE = "59 min 00 s"
 
 
 class TintedLine(QFrame):
@@ -99,44 +95,32 @@ class LineList(QWidget, Generic[LineT]):
 
 
 class StatusLine(TintedLine):
-    """A row of the status: marker, label, mark, text, age; below the text what to do.
+    """A row of the status in a narrow panel: label, mark and age, and below them the text.
 
-    Args:
-        longest_label: sets the width of the labels; empty for rows without any.
-        longest_mark: sets the width of the marks.
-        bold: whether mark and text are always bold; otherwise it is the mark of a severe row alone.
+    The mark of a good row is not shown: its shape says so, and only what is not good deserves a word.
     """
 
-    def __init__(self, longest_label: str, longest_mark: str, *, bold: bool = False) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._bold = bold
-        self.label, self.mark, self.text = PlainLabel(), PlainLabel(), WrappedLabel()
-        self.age, self.remedy = DimLabel(), WrappedLabel()
-        self.label.setFixedWidth(width_of(longest_label))
-        self.mark.setFixedWidth(width_of(longest_mark, bold=True))
-        set_bold(self.text, bold)
-        self.age.setMinimumWidth(width_of(_LONGEST_AGE))
-        self.age.setAlignment(RIGHT)
-        self.grid.addWidget(self.label, 0, 1, TOP)
-        self.label.setHidden(not longest_label)
-        self.grid.addWidget(self.mark, 0, 2, TOP)
-        self.grid.addWidget(self.text, 0, 3)
-        self.grid.addWidget(self.age, 0, 4, TOP)
-        self.grid.addWidget(self.remedy, 1, 3, 1, 2)
-        self.grid.setColumnStretch(3, 1)
+        self.label, self.mark, self.text, self.age = PlainLabel(), PlainLabel(), WrappedLabel(), DimLabel()
+        head = fill(QHBoxLayout(), self.label, self.mark, spacing=8)
+        head.addStretch(1)
+        head.addWidget(self.age)
+        self.grid.addLayout(head, 0, 1)
+        self.grid.addWidget(self.text, 1, 1)
+        self.grid.setColumnStretch(1, 1)
 
     def show_item(self, item: Row) -> None:
         """Shows one row."""
         self.show_style(item.style)
         set_text(self.label, item.label)
         set_text(self.mark, item.mark)
-        set_bold(self.mark, self._bold or item.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
+        self.mark.setHidden(item.style is SeverityStyle.GOOD)
+        set_bold(self.mark, item.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
         set_text(self.text, item.text)
+        self.text.setVisible(bool(item.text))
         set_text(self.age, item.age)
-        set_text(self.remedy, item.remedy)
-        self.remedy.setVisible(bool(item.remedy))
-        what = f"{item.label}: {item.mark}" if item.label else item.mark
-        self.setAccessibleName(f"{what}. {item.text}. {item.remedy or item.age}")
+        self.setAccessibleName(f"{item.label}: {item.mark}. {item.text}. {item.age}")
 
 
 class NoteLine(TintedLine):

@@ -1,130 +1,304 @@
-"""The monitor window: one robot, with everything that an operator looks at."""
+"""The cockpit: one robot, its picture first, with everything that an operator looks at."""
 
 import time
-from functools import partial
+from collections.abc import Callable  # noqa: TC003  # read by the type checker alone
+from typing import Final
 
-from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QCloseEvent, QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from console.client import PreviewProfile
+from console.monitor.alarm import Alarm, Occurrence
 from console.monitor.history import NOTHING, History, values_of
 from console.monitor.link import link_text
-from console.monitor.monitor_state import MonitorState
-from console.monitor.preview_controls import Controls, controls
+from console.monitor.monitor_state import MonitorState, PreviewRequest
+from console.monitor.motion import Motion, motion
+from console.monitor.status_rows import FaultItem
+from console.monitor.trail import Trail
 from console.monitor.worker import Worker
-from console.presentation.preview_switch import PROFILES
+from console.presentation.picture_age import PictureAge, reported_age
+from console.presentation.preview_switch import Note
+from console.presentation.severity_style import FAULT_STYLES
+from console.robots.roster import RobotChoice, Roster
+from console.viewer.playback import PlaybackState
 from console.window import window_settings
+from console.window.alarm_sound import AlarmSound
+from console.window.bottom_strip import BottomStrip
+from console.window.cockpit_keys import cockpit_keys
 from console.window.handover import ThreadHandover
-from console.window.header import ConnectionBanner, Header
-from console.window.keys import bind_keys
+from console.window.key_help import KeyHelp
+from console.window.keys import bind_keys, leave_full_screen
 from console.window.layout import fill
+from console.window.picture_area import PictureArea
 from console.window.plot import Plots
-from console.window.preview_panel import PreviewPanel
+from console.window.preview_actions import PreviewActions
+from console.window.saver import Saver
 from console.window.side_panel import SidePanel
+from console.window.theme import COCKPIT
+from console.window.top_bar import TopBar
 from console.window.video_view import VideoView
+from console.window.window_settings import Choices
 
-_TICK_MS = 500
-_FIRST_SIZE = QSize(1280, 800)
-_DECORATION = QSize(16, 48)
-"""What a desktop puts around a window, roughly."""
-_HANDLE_PX = 10
-_FIRST_DIVISION = (790, 490)
+_TICK_MS: Final = 400
+"""Shorter than a slot of the plots, so that a late tick leaves no gap in a curve."""
+_WIDE_PX: Final = 1100
+"""From this width on, plots stand below the picture while the panel is open; else they are a tab."""
+_LEAST_PLOTS_PX: Final = 64
+_MOST_PLOTS_PX: Final = 170
+_SAVES_END_WITHIN_S: Final = 1.0
 
 
 class MonitorWindow(QWidget):
-    """Shows the latest state after each change, and twice a second besides: ages grow by themselves.
+    """Shows the latest state after each change, and at every tick besides: ages grow by themselves.
 
     Args:
         worker: talks to the gateway; none of its calls here blocks.
-        changes: signals changes of the worker's state.
+        changes: signals changes of the worker's state; the window takes it over.
         video: shows the video.
+        roster: lists the robots to switch to; by default the known ones.
     """
 
-    def __init__(self, worker: Worker, changes: ThreadHandover, video: VideoView) -> None:
+    def __init__(
+        self,
+        worker: Worker,
+        changes: ThreadHandover,
+        video: VideoView,
+        roster: Roster | None = None,
+    ) -> None:
         super().__init__()
         self._worker = worker
-        self._history = History()
-        self._selected: PreviewProfile | None = None
+        self._actions = PreviewActions(worker)
+        self.read_picture_age: Callable[[], PictureAge | None] = self.reported_age
+        """Reads the age of the picture on the screen; by default from the robot's own report."""
+        self._history, self._trail = History(), Trail()
+        self._motion: Motion | None = None
+        self._dismissed: PreviewRequest | None = None
+        self.alarm = Alarm()
+        self.next_robot: RobotChoice | None = None
+        """The robot to open after this window was closed; None to end."""
         self.video = video
-        self.header, self.banner = Header(worker.target), ConnectionBanner()
-        self.preview, self.plots, self.side = PreviewPanel(), Plots(), SidePanel()
-        self.splitter = QSplitter(Qt.Orientation.Horizontal)
+        keys = cockpit_keys(self)
+        self.header = TopBar(worker.target, roster or Roster())
+        self.picture = PictureArea(video, KeyHelp(keys))
+        self.banner, self.toasts = self.picture.banner, self.picture.toasts
+        self.strip, self.plots, self.side = (
+            BottomStrip(),
+            Plots(QBoxLayout.Direction.LeftToRight),
+            SidePanel(),
+        )
+        self.preview = self.strip.preview
+        self.saver, self.sound = Saver(self, self.toasts.show_passing), AlarmSound(self.alarm, self)
+        self.plots.setPalette(COCKPIT)
+        self.plots.setAutoFillBackground(True)
         self._lay_out()
         self._connect(changes)
+        bind_keys(self, keys)
         self.setWindowTitle(f"Robot {worker.target}")
-        # No larger than a small laptop's screen leaves room for.
-        self.resize(_FIRST_SIZE.boundedTo(self.screen().availableSize() - _DECORATION))
-        window_settings.restore(self, self.splitter)
+        chosen = window_settings.restore(self)
+        self.alarm.sound_on = chosen.sound
+        self._panel_open, self._picture_only = chosen.panel, False
+        self.arrange()
         self.refresh()
 
     def refresh(self) -> None:
         """Shows the latest state."""
         state, now_s = self._worker.latest(), time.monotonic()
         link = link_text(state.link, self._worker.target, now_s)
-        self.header.show_state(state, link, now_s)
+        playback = self.video.playback()
+        frozen_s = None if playback.state is PlaybackState.LIVE else playback.frame_age_s
+        self.header.show_state(state, link, now_s, self.read_picture_age(), frozen_s)
         self.banner.show_item(link)
-        self.preview.show_controls(self._controls(state, now_s))
-        self.side.show_state(state, now_s)
+        controls = self._actions.controls(state, now_s)
+        self.preview.show_controls(controls)
+        hidden = state.request is not None and state.request is self._dismissed
+        self.toasts.show_answers(() if hidden else controls.answers)
+        self._show_faults(state)
+        self.side.show_state(state, controls, self.alarm, now_s)
+        if state.snapshot:
+            self.strip.show_teleop(state.snapshot.status.teleop)
+            self._trail.add(state.snapshot.status.odometry, state.received_s)
+        self._motion = motion(state, now_s, self._motion)
+        self.picture.show_motion(self._motion, self._trail)
+        self.sound.check(now_s)
+
+    # Actions of the keys and buttons.
+
+    def switch(self) -> None:
+        """Turns the preview on or off."""
+        self._actions.switch()
+        self.refresh()
+
+    def choose(self, profile: PreviewProfile) -> None:
+        """Requests or selects a profile of the preview."""
+        self._actions.choose(profile)
+        self.refresh()
+
+    def retry(self) -> None:
+        """Ends the pause before the next attempt to connect."""
+        self._worker.retry_now()
+
+    def acknowledge(self, *which: Occurrence) -> None:
+        """Acknowledges these faults, or all of them."""
+        self.alarm.acknowledge(*which)
+        self.refresh()
+
+    def toggle_sound(self) -> None:
+        """Turns the alarm's sound on or off."""
+        self.alarm.sound_on = not self.alarm.sound_on
+        self.refresh()
+
+    def toggle_boxes(self) -> None:
+        """Shows or hides the boxes around objects."""
+        self.video.show_overlay(not self.video.overlay_shown)
+
+    def toggle_panel(self) -> None:
+        """Opens or closes the side panel."""
+        self._panel_open, self._picture_only = not self.side.isVisible(), False
+        self.arrange()
+
+    def toggle_picture_only(self) -> None:
+        """Leaves the window to the picture, and back; the place of STOP stays where a robot can be driven."""
+        self._picture_only = not self._picture_only
+        self.arrange()
+
+    def toggle_help(self) -> None:
+        """Shows or hides the list of keys."""
+        self.picture.key_help.toggle()
+
+    def show_tab(self, number: int) -> None:
+        """Shows a tab of the side panel, which is opened for it."""
+        if not self.side.isVisible():
+            self.toggle_panel()
+        self.side.show_tab(number)
+
+    def search_events(self) -> None:
+        """Moves to the search for events."""
+        self.show_tab(1)
+        self.side.events_tab.search.setFocus()
+
+    def save_picture(self) -> None:
+        """Saves the picture with its status."""
+        self.saver.save_picture(self.video.latest_image(), self._worker.latest(), self.read_picture_age())
+
+    def export_events(self) -> None:
+        """Saves the listed events."""
+        self.saver.export_events(self.side.events.listed, self._worker.latest())
+
+    def show_robots(self) -> None:
+        """Opens the list of robots."""
+        self.header.name.showMenu()
+
+    def escape(self) -> None:
+        """Closes what lies over the picture; with nothing there, goes back to the whole window."""
+        if not self.picture.key_help.isHidden():
+            self.toggle_help()
+        elif self.toasts.notes:
+            request = self._worker.latest().request
+            self._dismissed = request if request and not request.pending else None
+            self.toasts.dismiss()
+            self.refresh()
+        elif self._picture_only:
+            self.toggle_picture_only()
+        else:
+            leave_full_screen(self)
+
+    def arrange(self) -> None:
+        """Shows the parts that this size and the operator's choices call for."""
+        only = self._picture_only
+        panel = self._panel_open and not only
+        self.header.setVisible(not only)
+        self.side.setVisible(panel)
+        self.strip.show_preview(not only)
+        self.header.panel_button.setChecked(panel)
+        below = panel and self.width() >= _WIDE_PX
+        self.side.show_plots_tab(not below)
+        self.plots.setVisible(below)
+        if below:
+            self.plots.setFixedHeight(self._room_for_plots())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Arranges the parts for the new size."""
+        super().resizeEvent(event)
+        self.arrange()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Saves place and size."""
+        """Saves the settings, and waits for a file that is being written."""
         self._timer.stop()
-        window_settings.save(self, self.splitter)
+        window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on))
+        self.saver.job.wait(_SAVES_END_WITHIN_S)
         super().closeEvent(event)
 
+    def _room_for_plots(self) -> int:
+        """Returns the height that the picture's shape leaves below it, within bounds."""
+        width = self.width() - self.side.width()
+        height = self.height() - self.header.height() - self.strip.height()
+        left = height - width / self.video.shape
+        return round(max(_LEAST_PLOTS_PX, min(_MOST_PLOTS_PX, left)))
+
     def _lay_out(self) -> None:
-        left = QWidget()
-        fill(QVBoxLayout(left), (self.video, 1), self.preview, self.plots)
-        self.splitter.addWidget(left)
-        self.splitter.addWidget(self.side)
-        self.splitter.setChildrenCollapsible(False)
-        self.splitter.setHandleWidth(_HANDLE_PX)
-        # A larger window gives its room to the video.
-        self.splitter.setStretchFactor(0, 1)
-        self.splitter.setStretchFactor(1, 0)
-        self.splitter.setSizes(_FIRST_DIVISION)
-        whole = QVBoxLayout(self)
-        whole.addWidget(self.header)
-        whole.addWidget(self.banner)
-        whole.addWidget(self.splitter, 1)
+        column = fill(QVBoxLayout(), (self.picture, 1), self.plots, spacing=0)
+        middle = QHBoxLayout()
+        middle.setSpacing(0)
+        middle.addLayout(column, 1)
+        middle.addWidget(self.side)
+        whole = fill(QVBoxLayout(self), self.header, spacing=0)
+        whole.addLayout(middle, 1)
+        whole.addWidget(self.strip)
 
     def _connect(self, changes: ThreadHandover) -> None:
+        changes.setParent(self)
         changes.delivered.connect(self.refresh)
         self._timer = QTimer(self, interval=_TICK_MS)
         self._timer.timeout.connect(self._tick)
         self._timer.start()
-        self.preview.switched.connect(self._switch)
-        self.preview.chosen.connect(self._choose)
-        self.banner.retry.connect(self._worker.retry_now)
-        profiles = {str(key): partial(self._choose, profile) for key, profile in enumerate(PROFILES, start=1)}
-        bind_keys(self, {"P": self._switch, "Q": self.close, **profiles})
+        self.video.reshaped.connect(self.arrange)
+        self.strip.arranged.connect(self.arrange)
+        self.preview.switched.connect(self.switch)
+        self.preview.chosen.connect(self.choose)
+        self.banner.retry.connect(self.retry)
+        self.side.acknowledged.connect(self._acknowledge_one)
+        self.side.acknowledge.clicked.connect(self._acknowledge_all)
+        self.side.sound.clicked.connect(self.toggle_sound)
+        self.side.events_tab.export_asked.connect(self.export_events)
+        self.header.help_asked.connect(self.toggle_help)
+        self.header.panel_toggled.connect(self.toggle_panel)
+        self.header.name.chosen.connect(self._open_other)
+        self.sound.job.done.connect(self._report_sound)
 
     def _tick(self) -> None:
         state, now_s = self._worker.latest(), time.monotonic()
         known = state.snapshot and not state.outdated(now_s)
         self._history.record(now_s, values_of(state.snapshot.status) if known and state.snapshot else NOTHING)
-        self.plots.show_history(self._history)
+        for plots in (self.plots, self.side.plots):
+            plots.show_history(self._history)
         self.refresh()
 
-    def _controls(self, state: MonitorState, now_s: float) -> Controls:
-        now = controls(state, self._selected, now_s)
-        if now.on:
-            self._selected = None
-        return now
+    def _show_faults(self, state: MonitorState) -> None:
+        """Takes the active faults; while the panel is closed, a new one appears over the picture."""
+        faults = state.snapshot.status.faults if state.snapshot else ()
+        for fault in self.alarm.show_faults(faults):
+            if self.side.isHidden():
+                self.toasts.show_passing(Note(fault.message, FAULT_STYLES[fault.severity]))
 
-    def _switch(self) -> None:
-        now = self._controls(self._worker.latest(), time.monotonic())
-        if now.enabled:
-            self._worker.switch(now.toggled())
-            self.refresh()
+    def _acknowledge_all(self, _checked: bool) -> None:
+        self.acknowledge()
 
-    def _choose(self, profile: PreviewProfile) -> None:
-        now = self._controls(self._worker.latest(), time.monotonic())
-        if not now.enabled:
-            return
-        if desired := now.with_profile(profile):
-            self._worker.switch(desired)
-        else:
-            self._selected = profile
-        self.refresh()
+    def _acknowledge_one(self, item: FaultItem) -> None:
+        if item.occurrence:
+            self.acknowledge(item.occurrence)
+
+    def reported_age(self) -> PictureAge | None:
+        """Returns the robot's own report; None while no viewer reports one."""
+        state = self._worker.latest()
+        if state.snapshot is None or state.outdated(time.monotonic()):
+            return None
+        return reported_age(state.snapshot.status.preview)
+
+    def _report_sound(self, note: Note | None) -> None:
+        if note:
+            self.toasts.show_passing(note)
+
+    def _open_other(self, choice: RobotChoice) -> None:
+        self.next_robot = choice
+        self.close()

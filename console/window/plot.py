@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Sequence
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QPolygonF
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtGui import QFont, QFontMetricsF, QPainter, QPaintEvent, QPalette, QPen, QPolygonF
+from PySide6.QtWidgets import QBoxLayout, QSizePolicy, QWidget
 
 from console.monitor.history import METRICS, SLOTS, History, Metric, top_of_scale
+from console.presentation.formatting import bit_rate
 from console.window.layout import fill
 from console.window.theme import CURVE_ON_DARK, CURVE_ON_LIGHT, dim_text, is_dark, mixed
 
@@ -27,14 +28,20 @@ class Plot(QWidget):
         super().__init__()
         self._metric = metric
         self._series: list[float | None] = []
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self.setToolTip(f"{metric.title} in {metric.unit}: the last two minutes")
 
     @property
     def value_text(self) -> str:
         """The latest value, with its unit."""
         newest = self._series[-1] if self._series else None
-        return NO_DATA if newest is None else f"{newest:.{self._metric.digits}f} {self._metric.unit}"
+        return NO_DATA if newest is None else self._with_unit(newest, self._metric.digits)
+
+    @property
+    def top_text(self) -> str:
+        """The upper end of the scale."""
+        top = top_of_scale(self._metric, self._series)
+        return f"max {self._with_unit(top, 0)}" if top >= 1 else f"max {top:g} {self._metric.unit}"
 
     def show_series(self, series: list[float | None]) -> None:
         """Shows these values, the newest last."""
@@ -43,39 +50,53 @@ class Plot(QWidget):
             self.setAccessibleName(f"{self._metric.title}: {self.value_text}")
             self.update()
 
+    def _with_unit(self, value: float, digits: int) -> str:
+        kilobits = self._metric.unit == "kbit/s"
+        return bit_rate(value) if kilobits else f"{value:.{digits}f} {self._metric.unit}"
+
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Returns a size that lets five stand side by side."""
         line = self.fontMetrics().height()
         return QSize(10 * line, 6 * line)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Returns a size for title and value below each other."""
+        """Returns a size for title and value below each other, and a low curve."""
         line = self.fontMetrics().height()
-        return QSize(7 * line, 6 * line)
+        return QSize(7 * line, 3 * line)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paints title, value and curve."""
         painter = QPainter(self)
         palette = self.palette()
         painter.fillRect(self.rect(), palette.color(QPalette.ColorRole.Base))
-        font = painter.font()
-        font.setPointSizeF(font.pointSizeF() * _SMALL)
-        painter.setFont(font)
+        painter.setFont(self._font())
         line = painter.fontMetrics().height()
         inner = QRectF(self.rect()).adjusted(_MARGIN, _MARGIN - 2, -_MARGIN, -_MARGIN)
-        painter.setPen(dim_text(palette))
-        painter.drawText(inner, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, self._metric.title)
-        self._paint_value(painter, inner.adjusted(0, line, 0, 0), palette)
-        self._paint_curve(painter, inner.adjusted(0, 2 * line + 4, 0, 0), palette)
+        texts = self.texts(inner.width())
+        for row, (left, right) in enumerate(texts):
+            box = inner.adjusted(0, row * line, 0, 0)
+            painter.setPen(dim_text(palette))
+            painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop, right)
+            if row:
+                painter.setFont(self._font(bold=True))
+                painter.setPen(palette.color(QPalette.ColorRole.WindowText))
+            painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, left)
+        self._paint_curve(painter, inner.adjusted(0, len(texts) * line + 4, 0, 0), palette)
 
-    def _paint_value(self, painter: QPainter, box: QRectF, palette: QPalette) -> None:
-        top = top_of_scale(self._metric, self._series)
-        painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop, f"max {top:g}")
-        font = painter.font()
-        font.setBold(True)
-        painter.setFont(font)
-        painter.setPen(palette.color(QPalette.ColorRole.WindowText))
-        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, self.value_text)
+    def texts(self, width: float) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Returns the left and the right text of both lines: no two of them touch, the value is never cut."""
+        title = QFontMetricsF(self._font())
+        value = QFontMetricsF(self._font(bold=True))
+        room = width - value.horizontalAdvance(self.value_text) - _MARGIN
+        top = self.top_text if title.horizontalAdvance(self.top_text) <= room else ""
+        shown = title.elidedText(self._metric.title, Qt.TextElideMode.ElideRight, width)
+        return (shown, ""), (self.value_text, top)
+
+    def _font(self, *, bold: bool = False) -> QFont:
+        font = QFont(self.font())
+        font.setPointSizeF(font.pointSizeF() * _SMALL)
+        font.setBold(bold)
+        return font
 
     def _paint_curve(self, painter: QPainter, box: QRectF, palette: QPalette) -> None:
         colour = CURVE_ON_DARK if is_dark(palette) else CURVE_ON_LIGHT
@@ -113,12 +134,17 @@ class Plot(QWidget):
 
 
 class Plots(QWidget):
-    """All plots, side by side."""
+    """All plots, beside or below each other.
 
-    def __init__(self) -> None:
+    Args:
+        direction: of the row or column.
+    """
+
+    def __init__(self, direction: QBoxLayout.Direction) -> None:
         super().__init__()
         self.all: Sequence[Plot] = [Plot(metric) for metric in METRICS]
-        fill(QHBoxLayout(self), *self.all, spacing=6)
+        fill(QBoxLayout(direction, self), *self.all, spacing=6)
+        self.setAccessibleName("Plots of the last two minutes")
 
     def show_history(self, history: History) -> None:
         """Shows the recorded values."""

@@ -1,24 +1,20 @@
-"""Panel of the preview's controls below the video: switch, profiles, notes."""
+"""The preview's controls, in one row below the picture: state, switch, profiles."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QWidget
 
 from console.client import PreviewProfile
 from console.monitor.preview_controls import Controls
-from console.presentation.preview_switch import PROFILES, Note
-from console.presentation.severity_style import SeverityStyle
-from console.window.header import MarkedWord
+from console.presentation.preview_switch import PROFILES
 from console.window.labels import PlainLabel, set_text
 from console.window.layout import fill
-from console.window.lines import LineList, NoteLine
+from console.window.marked_word import MarkedWord
 
 _TITLES = {
     PreviewProfile.LOW_BW: ("&Low bandwidth", "Key 1"),
     PreviewProfile.BALANCED: ("&Balanced", "Key 2"),
     PreviewProfile.HIGH_QUALITY: ("&High quality", "Key 3"),
 }
-# An empty line: the video above must not jump with every answer.
-_NO_NOTE = (Note("", SeverityStyle.QUIET),)
 
 
 class PreviewPanel(QWidget):
@@ -36,7 +32,6 @@ class PreviewPanel(QWidget):
         self.switch.setToolTip("Key P")
         self.switch.clicked.connect(self.switched)
         self.profiles = {profile: self._profile_button(profile) for profile in PROFILES}
-        self.notes = LineList(NoteLine)
         self._focused: QWidget | None = None
         self._lay_out()
 
@@ -47,7 +42,6 @@ class PreviewPanel(QWidget):
         for profile, button in self.profiles.items():
             _check(button, profile, profile is now.profile)
         self._set_enabled(now.enabled)
-        self.notes.show_items(now.notes or _NO_NOTE)
 
     def _set_enabled(self, enabled: bool) -> None:
         """Enables or disables all buttons. Qt moves the focus away from a disabled one; it is given back."""
@@ -75,8 +69,7 @@ class PreviewPanel(QWidget):
 
     def _lay_out(self) -> None:
         title, profiles = PlainLabel("Preview"), self.profiles.values()
-        row = fill(QHBoxLayout(), title, (self.state, 1), self.switch, 8, *profiles, spacing=6)
-        fill(QVBoxLayout(self), row, self.notes, spacing=4)
+        fill(QHBoxLayout(self), title, (self.state, 1), self.switch, 8, *profiles, spacing=6)
         self.switch.setMinimumWidth(self.switch.sizeHint().width())
 
 

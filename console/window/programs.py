@@ -1,12 +1,22 @@
 """`robotctl monitor` and `robotctl view`: build a window, run it, and close everything behind it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
+from PySide6.QtCore import QCoreApplication, QEvent
+from PySide6.QtWidgets import QWidget
+
+from common.errors import UserError
 from console.monitor.credential_refresh import LoadCredentials
+from console.presentation.picture_age import PictureAge
+from console.presentation.preview_switch import Note
+from console.presentation.severity_style import SeverityStyle
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.recording import Recording
+from console.robots.roster import RobotChoice, Roster
+from console.viewer.picture_meter import PictureMeter
 from console.viewer.robot_video import RobotVideo
 from console.viewer.summary import FrameCounter, ViewSummary
 from console.window.application import application
@@ -19,18 +29,42 @@ _CLOSE_TIMEOUT_S = 0.8
 """For each of the two background threads: a program ends within 2 s."""
 
 
-def run_monitor(target: str, load: LoadCredentials | None = None) -> None:
-    """Shows the monitor window until it is closed.
+def run_monitor(
+    target: str,
+    load: LoadCredentials | None = None,
+    roster: Roster | None = None,
+    login_of: Callable[[RobotChoice], LoadCredentials | None] = lambda _: None,
+) -> None:
+    """Shows the monitor window until it is closed; opens another one for each robot that is switched to.
 
     Args:
         target: the robot's gateway.
         load: reads the stored credentials.
+        roster: lists the robots to switch to; by default the known ones.
+        login_of: returns what reads the stored credentials of another robot.
 
     Raises:
         UserError: the target is not an address, the credentials can't be used, or there is no display.
     """
-    with application("Robot monitor") as app, monitor(target, load):
-        app.exec()
+    notice: Note | None = None
+    with application("Robot monitor") as app:
+        while True:
+            with monitor(target, load, roster) as window:
+                if notice:
+                    window.toasts.show_passing(notice)
+                app.exec()
+                chosen, notice = window.next_robot, None
+            if chosen is None:
+                return
+            other = login_of(chosen)
+            try:
+                if other:
+                    other()
+            except UserError as error:
+                # The window of the present robot opens again, and says why there is no other one.
+                notice = Note(str(error), SeverityStyle.BAD)
+                continue
+            target, load = chosen.target, other
 
 
 def run_view(
@@ -55,16 +89,22 @@ def run_view(
         recording = Recording(record) if record else None
         with viewing(target, recording, counter, load, delivery) as window:
             app.exec()
-    session = window.robot.session
-    return counter.summary(session.redials, recording, session.delivery()), recording
+    session, meter = window.robot.session, window.robot.meter
+    return counter.summary(session.redials, recording, session.delivery(), meter.summary()), recording
 
 
 @contextmanager
-def monitor(target: str, load: LoadCredentials | None = None) -> Iterator[MonitorWindow]:
+def monitor(
+    target: str, load: LoadCredentials | None = None, roster: Roster | None = None
+) -> Iterator[MonitorWindow]:
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
     robot = RobotVideo(target, load, on_change=changes.post)
-    window = MonitorWindow(robot.worker, changes, VideoView(robot.session, robot.detections))
+    video = VideoView(robot.session, robot.detections, robot.meter)
+    window = MonitorWindow(robot.worker, changes, video, roster)
+    # The bar has the age; the card would cover the trail.
+    video.show_age(False)
+    window.read_picture_age = partial(_age_of, robot.meter, window.reported_age)
     with _open(window, robot):
         yield window
 
@@ -80,9 +120,16 @@ def viewing(
     """Opens the window of the video with its background threads; closes them at the end of the block."""
     robot = RobotVideo(target, load, recording=recording, delivery=delivery)
     robot.session.add_frame_listener(counter.count)
-    window = ViewWindow(robot, VideoView(robot.session, robot.detections))
+    window = ViewWindow(robot, VideoView(robot.session, robot.detections, robot.meter))
     with _open(window, robot):
         yield window
+
+
+def _age_of(meter: PictureMeter, reported: Callable[[], PictureAge | None]) -> PictureAge | None:
+    now = meter.reading()
+    if now.age_ms is None:
+        return reported()
+    return PictureAge(now.age_ms, now.error_ms, f"longest part: {now.cause.value}" if now.cause else "")
 
 
 @contextmanager
@@ -93,6 +140,18 @@ def _open(window: MonitorWindow | ViewWindow, robot: RobotVideo) -> Iterator[Non
         yield
     finally:
         window.close()
-        # The shortcuts refer to the window, and it holds the last frame: only Qt can free it.
-        window.deleteLater()
         robot.close(_CLOSE_TIMEOUT_S)
+        _delete(window)
+
+
+def _delete(window: QWidget) -> None:
+    """Deletes a window at once, in this thread, with the hand-overs that it owns.
+
+    Python's garbage collector frees a QObject without a parent in whichever thread it happens to run, while
+    Qt may be delivering an event to it: that ends the process.
+    """
+    for handover in window.findChildren(ThreadHandover):
+        # A thread that did not end in time must not post to what is deleted next.
+        handover.close()
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(window, QEvent.Type.DeferredDelete)

@@ -1,61 +1,116 @@
-"""Side panel: faults with remedies, status by component, events."""
+"""Side panel: active faults, and below them tabs with status, events and, in a narrow window, plots."""
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
+from typing import Final
 
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from console.monitor.alarm import Alarm
 from console.monitor.monitor_state import MonitorState
-from console.monitor.status_rows import component_rows, fault_rows
+from console.monitor.preview_controls import Controls
+from console.monitor.status_rows import component_rows, fault_items
 from console.presentation.formatting import age
-from console.presentation.severity_style import SeverityStyle
-from console.presentation.status_table import Row
-from console.window.event_list import EventList
+from console.window.events_tab import EventsTab
+from console.window.fault_line import FaultLine
 from console.window.labels import set_bold, set_text
 from console.window.layout import fill
-from console.window.lines import LineList, StatusLine
+from console.window.lines import LineList, NoteLine, StatusLine
+from console.window.plot import Plots
 
-_MIN_WIDTH_CHARS = 34
-_NO_FAULT = Row("", "none", SeverityStyle.GOOD, "The robot reports no fault")
-_NO_STATUS = Row("", "", SeverityStyle.QUIET, "No status received yet")
+WIDTH_PX: Final = 300
+_LEAST_FAULTS_PX: Final = 72
+_FAULTS_SHARE: Final = 1, 4
+"""Heights of faults and tabs: fixed, so that a new fault does not move what is below."""
 
 
 class SidePanel(QWidget):
     """The robot's status as text."""
 
+    acknowledged = Signal(object)
+    """A fault's button was pressed; with its FaultItem."""
+
     def __init__(self) -> None:
         super().__init__()
-        self.faults_title, self.status_title = _heading("Faults"), _heading("Status")
-        self.faults = LineList(lambda: StatusLine("", "warning", bold=True))
-        self.components = LineList(lambda: StatusLine("Computer battery", "no data"))
-        self.events = EventList()
-        fill(QVBoxLayout(self), (self._scrolled(), 4), _heading("Events"), (self.events, 1))
+        self.setFixedWidth(WIDTH_PX)
+        self.faults_title = QLabel("Faults")
+        self.faults_title.setTextFormat(Qt.TextFormat.PlainText)
+        set_bold(self.faults_title, True)
+        self.acknowledge = QPushButton("Acknowledge &all")
+        self.acknowledge.setToolTip("Mutes the alarm for the present faults (A)")
+        self.sound = QPushButton("Sound")
+        self.sound.setCheckable(True)
+        self.sound.setToolTip("Alarm sound on or off (M)")
+        self.faults, self.notes = LineList(self._fault_line), LineList(NoteLine)
+        self.components = LineList(StatusLine)
+        self.events_tab = EventsTab()
+        self.events = self.events_tab.list
+        self.plots = Plots(QBoxLayout.Direction.TopToBottom)
+        self.tabs = QTabWidget()
+        self._lay_out()
 
-    def show_state(self, state: MonitorState, now_s: float) -> None:
+    def show_state(self, state: MonitorState, controls: Controls, alarm: Alarm, now_s: float) -> None:
         """Shows the latest state."""
-        none = _NO_STATUS if state.snapshot is None else _NO_FAULT
-        self.faults.show_items(fault_rows(state, now_s) or [none])
+        self.faults.show_items(fault_items(state, alarm, now_s))
+        self.notes.show_items(controls.conditions)
         self.components.show_items(component_rows(state, now_s))
-        received = ""
-        if state.snapshot and state.outdated(now_s):
-            received = f", as of {age(state.snapshot_age_ms(now_s))} ago"
-        set_text(self.faults_title, f"Faults{received}")
-        set_text(self.status_title, f"Status{received}")
+        outdated = state.snapshot is not None and state.outdated(now_s)
+        received = f"as of {age(state.snapshot_age_ms(now_s))} ago" if outdated else ""
+        set_text(self.faults_title, f"Faults, {received}" if received else "Faults")
+        self.acknowledge.setEnabled(alarm.pending > 0)
+        self.sound.setChecked(alarm.sound_on)
+        set_text(self.sound, "Sound on" if alarm.sound_on else "Sound off")
         self.events.show_log(state.events)
 
-    def _scrolled(self) -> QScrollArea:
-        inner = QWidget()
-        parts = (self.faults_title, self.faults, self.status_title, self.components)
-        fill(QVBoxLayout(inner), *parts, margins=(0, 0, 4, 0)).addStretch(1)
-        scroll = QScrollArea()
-        scroll.setWidget(inner)
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setAccessibleName("Faults and status")
-        scroll.setMinimumWidth(_MIN_WIDTH_CHARS * self.fontMetrics().horizontalAdvance("m"))
-        return scroll
+    def show_tab(self, number: int) -> None:
+        """Shows a tab, by its number from 0, and gives it the focus."""
+        if self.tabs.isTabVisible(number):
+            self.tabs.setCurrentIndex(number)
+            self.tabs.tabBar().setFocus()
+
+    def show_plots_tab(self, shown: bool) -> None:
+        """Shows or hides the tab of the plots."""
+        self.tabs.setTabVisible(self.tabs.indexOf(self.plots), shown)
+
+    def _fault_line(self) -> FaultLine:
+        line = FaultLine()
+        line.acknowledged.connect(self.acknowledged)
+        return line
+
+    def _lay_out(self) -> None:
+        buttons = fill(QHBoxLayout(), self.acknowledge, self.sound, spacing=4, margins=(6, 0, 6, 0))
+        title = fill(QHBoxLayout(), self.faults_title, margins=(8, 4, 8, 0))
+        faults = _scrolled("Faults", self.faults, self.notes)
+        faults.setMinimumHeight(_LEAST_FAULTS_PX)
+        status = _scrolled("Status", self.components)
+        for page, name in ((status, "Status"), (self.events_tab, "Events"), (self.plots, "Plots")):
+            self.tabs.addTab(page, name)
+        self.tabs.setDocumentMode(True)
+        self.tabs.setAccessibleName("Status, events, plots")
+        self.tabs.tabBar().setAccessibleName("Status, events, plots (Ctrl+1 to Ctrl+3)")
+        above, below = _FAULTS_SHARE
+        fill(QVBoxLayout(self), title, (faults, above), buttons, (self.tabs, below), spacing=4)
 
 
-def _heading(text: str) -> QLabel:
-    label = QLabel(text)
-    set_bold(label, True)
-    return label
+def _scrolled(name: str, *parts: QWidget) -> QScrollArea:
+    inner = QWidget()
+    fill(QVBoxLayout(inner), *parts, spacing=2).addStretch(1)
+    scroll = QScrollArea()
+    scroll.setWidget(inner)
+    scroll.setWidgetResizable(True)
+    scroll.setFrameShape(QFrame.Shape.NoFrame)
+    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    scroll.setAccessibleName(name)
+    # Its height is the panel's to give, whatever it contains.
+    scroll.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+    return scroll

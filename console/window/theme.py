@@ -19,6 +19,8 @@ COLOURS: Final[Mapping[SeverityStyle, QColor]] = {
 CURVE_ON_LIGHT: Final = QColor("#0072B2")
 CURVE_ON_DARK: Final = QColor("#56B4E9")
 PALETTE_CHANGES: Final = (QEvent.Type.ApplicationPaletteChange, QEvent.Type.PaletteChange)
+COCKPIT: Final = QPalette(QColor("#22262a"))
+"""Palette of what surrounds the picture, on a light desktop, too: the picture is what is looked at."""
 _INK: Final = QColor("#000000")
 """Ink on a coloured shape: black has a contrast (WCAG 2.1, 1.4.3) of 5 or more on all three."""
 _TINT: Final = 0.16
@@ -63,11 +65,13 @@ class DimLabel(PlainLabel):
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Follows the desktop from light to dark."""
         super().changeEvent(event)
-        if event.type() in PALETTE_CHANGES:
+        if event.type() in (*PALETTE_CHANGES, QEvent.Type.ParentChange):
             self._colour()
 
     def _colour(self) -> None:
-        palette, dim = self.palette(), dim_text(QGuiApplication.palette())
+        parent = self.parentWidget()
+        around = parent.palette() if parent else QGuiApplication.palette()
+        palette, dim = self.palette(), dim_text(around)
         if palette.color(self.foregroundRole()) != dim:
             palette.setColor(self.foregroundRole(), dim)
             self.setPalette(palette)

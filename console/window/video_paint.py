@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from console.viewer.formatting import Banner
+from console.viewer.geometry import Box, label_place
 from console.viewer.overlay import Mark
 from console.window.theme import COLOURS
 
@@ -29,8 +30,8 @@ _STEP: Final = 40.0
 _TITLE_FACTOR: Final = 1.35
 
 
-def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
-    """Draws all boxes, then all labels on top."""
+def draw_marks(painter: QPainter, marks: Sequence[Mark], frame: Box) -> None:
+    """Draws all boxes, then all labels on top, within the frame."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for pen in (_HALO, _LINE):
         painter.setPen(pen)
@@ -38,7 +39,7 @@ def draw_marks(painter: QPainter, marks: Sequence[Mark]) -> None:
             painter.drawRect(QRectF(mark.box.x, mark.box.y, mark.box.width, mark.box.height))
     for mark in marks:
         if mark.label:
-            _draw_label(painter, mark)
+            _draw_label(painter, mark, frame)
 
 
 def draw_banner(painter: QPainter, whole: QRectF, text: Banner, *, over_frame: bool) -> None:
@@ -76,12 +77,12 @@ def _write(painter: QPainter, font: QFont, colour: QColor, room: QRectF, text: s
     painter.drawText(room, int(Qt.TextFlag.TextWordWrap), text)
 
 
-def _draw_label(painter: QPainter, mark: Mark) -> None:
+def _draw_label(painter: QPainter, mark: Mark, frame: Box) -> None:
     metrics = QFontMetricsF(painter.font())
-    ground = QRectF(0, 0, metrics.horizontalAdvance(mark.label) + 2 * _PAD, metrics.height() + _PAD)
-    # Above the box; inside it where there is no room above.
-    above = mark.box.y - ground.height()
-    ground.moveTo(mark.box.x, above if above >= 0 else mark.box.y)
+    text = metrics.elidedText(mark.label, Qt.TextElideMode.ElideRight, frame.width - 2 * _PAD)
+    size = metrics.horizontalAdvance(text) + 2 * _PAD, metrics.height() + _PAD
+    place = label_place(mark.box, *size, frame)
+    ground = QRectF(place.x, place.y, place.width, place.height)
     painter.fillRect(ground, _LABEL_GROUND)
     painter.setPen(_LABEL_INK)
-    painter.drawText(QPointF(ground.left() + _PAD, ground.top() + _PAD / 2 + metrics.ascent()), mark.label)
+    painter.drawText(QPointF(ground.left() + _PAD, ground.top() + _PAD / 2 + metrics.ascent()), text)

@@ -1,6 +1,7 @@
 """Widget of the video: the latest frame, boxes around detections, and a banner while it is not live."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
@@ -12,8 +13,10 @@ from console.receiver.frame import Frame
 from console.viewer.formatting import Banner, banner
 from console.viewer.geometry import Box, fitted
 from console.viewer.overlay import marks
-from console.viewer.playback import PlaybackState
+from console.viewer.picture_meter import PictureMeter
+from console.viewer.playback import Playback, PlaybackState
 from console.viewer.session import VideoSession
+from console.window.age_card import AgeCard
 from console.window.handover import ThreadHandover
 from console.window.video_paint import draw_banner, draw_marks
 
@@ -34,31 +37,47 @@ class VideoView(QWidget):
     Args:
         session: source of frames (in BGRx); its owner starts and closes it.
         detections: returns the latest ones without waiting; the painting thread calls it.
+        meter: measures the age of the pictures, which is then shown over the video; None shows none.
     """
 
     painted = Signal()
     """A frame has just been painted for the first time."""
+    reshaped = Signal()
+    """The frame has another shape now, or there is none any more."""
 
-    def __init__(self, session: VideoSession, detections: Callable[[], Detections | None]) -> None:
+    def __init__(
+        self,
+        session: VideoSession,
+        detections: Callable[[], Detections | None],
+        meter: PictureMeter | None = None,
+    ) -> None:
         super().__init__()
         self._session = session
         self._detections = detections
+        self._meter = meter
         self.overlay_shown = True
         """Whether boxes are drawn."""
-        self._ready: tuple[QImage, bytes] | None = None
-        """The latest frame, and the memory of its pixels, which must live as long."""
-        self._painted: tuple[QImage, bytes] | None = None
+        self.age_shown = True
+        """Whether the age of the picture is drawn."""
+        self._age = AgeCard(meter) if meter else None
+        self._ready: tuple[QImage, bytes, Frame] | None = None
+        """The latest frame as an image, and the memory of its pixels, which must live as long."""
+        self._painted: tuple[QImage, bytes, Frame] | None = None
         self._banner: Banner | None = banner(session.playback())
-        self._handover = ThreadHandover()
+        self._shape = (0, 0)
+        self._clear_px = 0
+        self._handover = ThreadHandover(self)
         self._handover.delivered.connect(self.update)
         session.add_frame_listener(self._make_ready)
         self._timer = QTimer(self, interval=_TICK_MS)
         self._timer.timeout.connect(self._check_banner)
+        self._timer.timeout.connect(self._check_age)
         self._timer.start()
         # Every pixel is painted below: Qt need not clear the ground first.
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(_SMALLEST_SIZE)
+        self.setAccessibleName("Live video")
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Returns the size of the usual frame."""
@@ -69,26 +88,66 @@ class VideoView(QWidget):
         self.overlay_shown = shown
         self.update()
 
+    def playback(self) -> Playback:
+        """Returns the state of the video at this moment."""
+        return self._session.playback()
+
+    @property
+    def shape(self) -> float:
+        """Width of the frame by its height; of the usual frame while there is none."""
+        width, height = self._shape
+        return width / height if height else _USUAL_SIZE.width() / _USUAL_SIZE.height()
+
+    def keep_clear(self, room_px: int) -> None:
+        """Keeps the banner out of so much room beside it, where other things lie over the picture."""
+        self._clear_px = room_px
+        self.update()
+
+    def frame_box(self) -> Box:
+        """Returns where the frame is shown; without one the whole widget."""
+        whole = Box(0, 0, self.width(), self.height())
+        return fitted(*self._shape, whole) if all(self._shape) else whole
+
+    def latest_image(self) -> QImage | None:
+        """Returns a copy of the latest frame, without boxes; None when there is none to show."""
+        shown = self._shown()
+        return shown[0].copy() if shown else None
+
+    def _shown(self) -> tuple[QImage, bytes, Frame] | None:
+        """Returns what is shown: no frame once the session has dropped its latest one."""
+        return self._ready if self._session.latest_frame() else None
+
+    def show_age(self, shown: bool) -> None:
+        """Shows or hides the age of the picture."""
+        self.age_shown = shown
+        self.update()
+
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paints frame, boxes and banner."""
+        """Paints frame, boxes, the age and the banner."""
         playback = self._session.playback()
         live = playback.state is PlaybackState.LIVE
-        # No frame is shown once the session has dropped its latest one.
-        shown = self._ready if self._session.latest_frame() else None
+        shown = self._shown()
         painter = QPainter(self)
         if shown is None:
             painter.fillRect(self.rect(), _GROUND)
         else:
-            image, _ = shown
+            image = shown[0]
             box = fitted(image.width(), image.height(), Box(0, 0, self.width(), self.height()))
             self._draw_frame(painter, image, box, live)
             if self.overlay_shown and live:
-                draw_marks(painter, marks(self._detections(), box))
+                draw_marks(painter, marks(self._detections(), box), box)
+            if self.age_shown and self._age:
+                self._age.paint(painter, QRectF(self.rect()))
         if text := banner(playback):
-            draw_banner(painter, QRectF(self.rect()), text, over_frame=shown is not None)
+            clear = self._clear_px if shown else 0
+            room = QRectF(self.rect()).adjusted(clear, 0, -clear, 0)
+            draw_banner(painter, room, text, over_frame=shown is not None)
         painter.end()
         if shown is not self._painted:
             self._painted = shown
+            self._note_shape(shown[0] if shown else None)
+            if self._meter and shown:
+                self._meter.shown(shown[2])
             self.painted.emit()
 
     def _draw_frame(self, painter: QPainter, image: QImage, box: Box, live: bool) -> None:
@@ -100,6 +159,12 @@ class VideoView(QWidget):
         if not live:
             painter.fillRect(target, _VEIL)
 
+    def _note_shape(self, image: QImage | None) -> None:
+        shape = (image.width(), image.height()) if image else (0, 0)
+        if shape != self._shape:
+            self._shape = shape
+            self.reshaped.emit()
+
     def _check_banner(self) -> None:
         """Repaints when time alone has changed the banner: the frame gets older."""
         now = banner(self._session.playback())
@@ -107,9 +172,15 @@ class VideoView(QWidget):
             self._banner = now
             self.update()
 
+    def _check_age(self) -> None:
+        """Repaints when the age has changed: it grows while no frame comes."""
+        if self._age and self._age.refresh():
+            self.update()
+
     def _make_ready(self, frame: Frame) -> None:
         """Copies a new frame and hands it over. In the session's thread."""
         memory = frame.read()
         image = QImage(memory, frame.width, frame.height, frame.stride, QImage.Format.Format_RGB32)
-        self._ready = (image, memory)
+        # The meter needs its times; its buffer belongs to the decoder's pool.
+        self._ready = (image, memory, replace(frame, read=bytes))
         self._handover.post()

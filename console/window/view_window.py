@@ -9,14 +9,15 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from console.monitor.preview_controls import controls
 from console.viewer.formatting import delivery_text, figures_line, live_note, recording_line
 from console.viewer.robot_video import RobotVideo
-from console.window.keys import bind_keys
-from console.window.labels import ElidedLabel, PlainLabel, set_text
+from console.window.keys import Key, bind_keys, full_screen_key, leave_full_screen
+from console.window.labels import ElidedLabel, set_text
 from console.window.layout import fill
 from console.window.theme import DimLabel
 from console.window.video_view import VideoView
+from console.window.window_settings import DECORATION
 
 _TICK_MS = 500
-_KEYS = "P preview   O boxes   F full screen   Q quit"
+_KEYS = "P preview   O boxes   A age   F full screen   Q quit"
 
 
 class ViewWindow(QWidget):
@@ -32,19 +33,22 @@ class ViewWindow(QWidget):
         self.robot = robot
         self._counted = (time.monotonic(), 0)
         self.video = video
-        self.figures, self.notes = PlainLabel(), ElidedLabel()
+        self.figures, self.notes = ElidedLabel(), ElidedLabel()
         self._lay_out()
         # The frame's own size where there is room: Qt alone would take two thirds of the screen.
-        self.resize(self.sizeHint().boundedTo(self.screen().availableSize()))
+        self.resize(self.sizeHint().boundedTo(self.screen().availableSize() - DECORATION))
         self._timer = QTimer(self, interval=_TICK_MS)
         self._timer.timeout.connect(self._refresh)
         self._timer.start()
-        keys = {
-            "P": self._switch,
-            "O": lambda: self.video.show_overlay(not self.video.overlay_shown),
-            "Q": self.close,
-        }
-        bind_keys(self, keys, full_screen=("F", "F11"))
+        keys = (
+            Key(("P",), "preview on or off", self._switch),
+            Key(("O",), "boxes", lambda: self.video.show_overlay(not self.video.overlay_shown)),
+            Key(("A",), "age of the picture", lambda: self.video.show_age(not self.video.age_shown)),
+            Key(("Q",), "quit", self.close),
+            full_screen_key(self, "F", "F11"),
+            Key(("Esc",), "leave the full screen", lambda: leave_full_screen(self)),
+        )
+        bind_keys(self, keys)
         self.setWindowTitle(robot.worker.target)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
@@ -57,7 +61,7 @@ class ViewWindow(QWidget):
         keys = DimLabel(_KEYS)
         keys.setAlignment(Qt.AlignmentFlag.AlignRight)
         line = QHBoxLayout(self._below)
-        fill(line, self.figures, (self.notes, 1), keys, spacing=16, margins=(8, 3, 8, 3))
+        fill(line, (self.figures, 2), (self.notes, 3), keys, spacing=16, margins=(8, 3, 8, 3))
         fill(QVBoxLayout(self), (self.video, 1), self._below, spacing=0)
 
     def _refresh(self) -> None:

@@ -1,30 +1,58 @@
-"""Settings of the window that are kept between runs: place, size, and position of the splitter.
+"""Settings of the window that are kept between runs: place and size, side panel, alarm sound.
 
 Kept in $XDG_CONFIG_HOME/robot-gateway/monitor.ini. A missing or broken file is ignored.
 """
 
-from PySide6.QtCore import QByteArray, QSettings
-from PySide6.QtWidgets import QSplitter, QWidget
+from dataclasses import dataclass
+from typing import Final
 
-_GEOMETRY = "window/geometry"
-_DIVISION = "window/division"
+from PySide6.QtCore import QByteArray, QSettings, QSize, Qt
+from PySide6.QtWidgets import QWidget
+
+_GEOMETRY: Final = "window/geometry"
+_PANEL: Final = "window/panel"
+_SOUND: Final = "alarm/sound"
+_FIRST_SIZE: Final = QSize(1280, 800)
+DECORATION: Final = QSize(16, 48)
+"""What a desktop puts around a window, roughly."""
 
 
-def restore(window: QWidget, splitter: QSplitter) -> None:
-    """Restores the saved settings; Qt ignores invalid ones."""
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """What the operator has chosen.
+
+    Args:
+        panel: whether the side panel is open.
+        sound: whether alarms are heard.
+    """
+
+    panel: bool
+    sound: bool
+
+
+def restore(window: QWidget) -> Choices:
+    """Restores place and size, and returns the operator's choices; the first time the window is maximised."""
     settings = _settings()
-    for key, restore_one in ((_GEOMETRY, window.restoreGeometry), (_DIVISION, splitter.restoreState)):
-        value = settings.value(key)
-        if isinstance(value, QByteArray):
-            restore_one(value)
+    # No larger than a small laptop's screen leaves room for: the size after the maximised one.
+    window.resize(_FIRST_SIZE.boundedTo(window.screen().availableSize() - DECORATION))
+    value = settings.value(_GEOMETRY)
+    if not (isinstance(value, QByteArray) and window.restoreGeometry(value)):
+        window.setWindowState(Qt.WindowState.WindowMaximized)
+    return Choices(_flag(settings, _PANEL, True), _flag(settings, _SOUND, False))
 
 
-def save(window: QWidget, splitter: QSplitter) -> None:
+def save(window: QWidget, choices: Choices) -> None:
     """Saves the settings for the next run."""
     settings = _settings()
     settings.setValue(_GEOMETRY, window.saveGeometry())
-    settings.setValue(_DIVISION, splitter.saveState())
+    settings.setValue(_PANEL, choices.panel)
+    settings.setValue(_SOUND, choices.sound)
     settings.sync()
+
+
+def _flag(settings: QSettings, key: str, default: bool) -> bool:
+    # An INI file has no types: Qt reads back the words that it wrote, and from its cache the values.
+    return {"true": True, "false": False}.get(str(settings.value(key)).lower(), default)
 
 
 def _settings() -> QSettings:

@@ -29,6 +29,10 @@ def event(message: wire.Event) -> Event:
     return read(Event, message, kind=kind, **parts(message))
 
 
+def _client(message: wire.ClientJoined | wire.ClientLeft) -> dict[str, Any]:
+    return {"client_address": printable(message.address), "client_name": printable(message.who)}
+
+
 _Parts = Callable[[wire.Event], dict[str, Any]]
 _NO_KIND: Final[tuple[EventKind, _Parts]] = (EventKind.UNKNOWN, lambda _: {})
 _KINDS: Final[Mapping[str, tuple[EventKind, _Parts]]] = {
@@ -36,11 +40,8 @@ _KINDS: Final[Mapping[str, tuple[EventKind, _Parts]]] = {
     "fault_cleared": (EventKind.FAULT_CLEARED, lambda it: {"fault": read(Fault, it.fault_cleared.fault)}),
     "preview_state_changed": (EventKind.PREVIEW, lambda _: {}),
     "encoder_fallback": (EventKind.ENCODER_FALLBACK, lambda _: {}),
-    "client_joined": (
-        EventKind.CLIENT_JOINED,
-        lambda it: {"client_address": printable(it.client_joined.address)},
-    ),
-    "client_left": (EventKind.CLIENT_LEFT, lambda it: {"client_address": printable(it.client_left.address)}),
+    "client_joined": (EventKind.CLIENT_JOINED, lambda it: _client(it.client_joined)),
+    "client_left": (EventKind.CLIENT_LEFT, lambda it: _client(it.client_left)),
     "control_action": (EventKind.CONTROL, lambda _: {}),
     "robot_mode_changed": (EventKind.MODE, lambda it: {"mode": printable(it.robot_mode_changed.mode)}),
 }

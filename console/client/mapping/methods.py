@@ -5,17 +5,20 @@ from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, Final, Generic, TypeVar
 
+from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.message_factory import GetMessageClass
 
 from console.client import results
 from console.client.mapping import enums
+from console.client.mapping.driving import drive_item
 from console.client.mapping.events import event_item
 from console.client.mapping.reader import read
 from console.client.results import EventPosition, FaultSeverity, PictureReport, PreviewProfile
-from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2
+from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, teleop_pb2
 from omniseer.gateway.v1 import robot_gateway_pb2 as wire
 
 _SERVICE: Final = wire.DESCRIPTOR.services_by_name["RobotGateway"]
+_TELEOP: Final = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
 _MS_PER_S: Final = 1000
 
 ResultT = TypeVar("ResultT")
@@ -37,16 +40,18 @@ class Method(Generic[ResultT]):
         name: As in the schema.
         result: Reads the answer message.
         idempotent: Whether two calls have the effect of one, so that a call may be retried.
+        service: That it belongs to.
     """
 
     name: str
     result: Callable[[Any], ResultT]
     idempotent: bool = True
+    service: ServiceDescriptor = _SERVICE
 
     @property
     def path(self) -> str:
         """The method's path in HTTP/2, as gRPC forms it: /package.Service/Method."""
-        return f"/{_SERVICE.full_name}/{self.name}"
+        return f"/{self.service.full_name}/{self.name}"
 
     def decode(self, data: bytes) -> ResultT:
         """Returns the result of the answer's bytes.
@@ -54,7 +59,8 @@ class Method(Generic[ResultT]):
         Raises:
             DecodeError: They are not an answer of this method.
         """
-        return self.result(GetMessageClass(_SERVICE.methods_by_name[self.name].output_type).FromString(data))
+        answer = GetMessageClass(self.service.methods_by_name[self.name].output_type)
+        return self.result(answer.FromString(data))
 
 
 NO_FIELDS: Final = b""
@@ -119,6 +125,14 @@ REPORT_PICTURE: Final[Method[None]] = Method("ReportPicture", lambda _: None, id
 PING: Final = Method("Ping", partial(read, results.RobotTime))
 WATCH_SYSTEM_STATUS: Final = Method("WatchSystemStatus", partial(read, results.WatchedStatus))
 SUBSCRIBE_EVENTS: Final = Method("SubscribeEvents", event_item)
+SET_TELEOP_ENABLED: Final = Method("SetTeleopEnabled", partial(read, results.TeleopAnswer))
+# A retry would move the robot for longer than requested.
+SEND_TELEOP_COMMAND: Final = Method(
+    "SendTeleopCommand", partial(read, results.TeleopAnswer), idempotent=False
+)
+DRIVE: Final = Method("Drive", drive_item, idempotent=False, service=_TELEOP)
+STOP_ROBOT: Final = Method("StopRobot", partial(read, results.RobotStopped), service=_TELEOP)
+RESET_STOP: Final = Method("ResetStop", partial(read, results.StopReset), idempotent=False, service=_TELEOP)
 METHODS: Final = (
     GET_SYSTEM_STATUS,
     SET_PREVIEW_MODE,
@@ -127,7 +141,11 @@ METHODS: Final = (
     PING,
     REQUEST_KEY_FRAME,
     REPORT_PICTURE,
+    SET_TELEOP_ENABLED,
+    SEND_TELEOP_COMMAND,
+    STOP_ROBOT,
+    RESET_STOP,
 )
 """The unary methods."""
 STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS)
-"""The server-streaming methods. A test compares both lists with the schema."""
+"""The server-streaming methods. A test compares both lists, and DRIVE, with the schema."""

@@ -4,6 +4,17 @@ None means "unknown". Enumerations have a member `UNKNOWN`: the gateway did not 
 than this client and set a value that this client does not know.
 """
 
+from console.client.results.driving import (
+    DriveInhibit,
+    DriveLimits,
+    DriveOpened,
+    DrivePhase,
+    DriveState,
+    RobotStopped,
+    StopLatch,
+    StopReset,
+    Supervision,
+)
 from console.client.results.event import (
     CaughtUp,
     ControlAction,
@@ -55,6 +66,7 @@ from console.client.results.status import (
     RobotTime,
     SystemStatus,
     Teleop,
+    TeleopAnswer,
     TeleopCommand,
     TeleopState,
     Vision,

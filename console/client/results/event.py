@@ -92,6 +92,8 @@ class Event:
     encoder_fallback: EncoderFallback | None = None
     client_address: str | None = None
     """Address of the client that joined or left."""
+    client_name: str | None = None
+    """Its user's name; empty where the gateway has no authentication, or is older than this field."""
     control: ControlAction | None = None
     mode: str | None = None
     """The robot's mode, as the robot names it."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from console.client.results.driving import DriveInhibit, DrivePhase, StopLatch
 from console.client.results.fault import Fault
 from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
@@ -82,6 +83,21 @@ class Teleop:
     last_error: str
     """Why the newest command was refused. Empty when it was accepted."""
     last_command: TeleopCommand
+    phase: DrivePhase
+    inhibits: tuple[DriveInhibit, ...]
+    """Why the robot does not move for its driver."""
+    holder: str
+    """Who drives. Empty when no one does."""
+    stop: StopLatch | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeleopAnswer:
+    """The robot's answer to a switch of driving, or to a single command."""
+
+    accepted: bool
+    message: str
+    teleop: Teleop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,21 +16,24 @@ from console.client.refusal import refusal_in
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES
-from omniseer.gateway.v1 import robot_gateway_pb2
+from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot, refuse_at_once
 from tests.support.running_gateway import raw_unary
 
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+TELEOP = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
+METHODS = [*SERVICE.methods, *TELEOP.methods]
+DRIVE = f"/{TELEOP.full_name}/Drive"
 REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
 OK, UNAUTHENTICATED = grpc.StatusCode.OK, grpc.StatusCode.UNAUTHENTICATED
 DENIED, UNAVAILABLE = grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.UNAVAILABLE
 PATHS = {
-    f"/{SERVICE.full_name}/{method.name}": (
+    f"/{method.containing_service.full_name}/{method.name}": (
         ROLES[method.GetOptions().Extensions[required_role]],
         method.server_streaming,
     )
-    for method in SERVICE.methods
+    for method in METHODS
 } | {REFLECTION: (Role.VIEWER, True)}
 """Every method that needs a role: which, and whether it streams."""
 ANSWERS = dict.fromkeys(PATHS, (OK, "")) | {
@@ -39,6 +42,12 @@ ANSWERS = dict.fromkeys(PATHS, (OK, "")) | {
         grpc.StatusCode.FAILED_PRECONDITION,
         Reason.PREVIEW_NOT_RUNNING,
     )
+}
+# Nor a drive program.
+ANSWERS |= {
+    path: (grpc.StatusCode.FAILED_PRECONDITION, Reason.TELEOP_NOT_CONFIGURED)
+    for path in PATHS
+    if path.startswith(f"/{TELEOP.full_name}/") or "Teleop" in path.rpartition("/")[2]
 }
 """What an empty request leads to, where the role suffices."""
 
@@ -52,11 +61,10 @@ async def called(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[gr
     """The code and the reason that the method ends with, or with which its first answer comes."""
     metadata = login.metadata()
     try:
-        if path == REFLECTION:
+        if path in (REFLECTION, DRIVE):
             both_ways: Any = channel.stream_stream(path)(metadata=metadata, timeout=10)
-            await both_ways.write(
-                reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString()
-            )
+            request = reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString()
+            await both_ways.write(request if path == REFLECTION else b"")
             await both_ways.read()
             both_ways.cancel()
         elif PATHS[path][1]:
@@ -100,7 +108,7 @@ def all_refused(code: grpc.StatusCode, reason: str) -> dict[str, tuple[grpc.Stat
 
 def test_there_is_something_to_refuse() -> None:
     assert {needed for needed, _ in PATHS.values()} >= {Role.VIEWER, Role.OPERATOR}
-    assert len(PATHS) == len(SERVICE.methods) + 1
+    assert len(PATHS) == len(METHODS) + 1
 
 
 async def test_each_token_gives_its_role_and_nothing_else_gives_any(tmp_path: Path) -> None:

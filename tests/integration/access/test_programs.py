@@ -158,7 +158,7 @@ def test_a_login_is_stored_over_another_only_on_request(ground: Path) -> None:
     assert operator(ground, *words).returncode == 0
     again = operator(ground, *words)
     assert again.returncode == 2
-    assert f"robotctl login lab lab.local:1 {login} --replace" in only_line(again.stderr)
+    assert f"robotctl login lab lab.local:1 {login} --offline --replace" in only_line(again.stderr)
     assert operator(ground, *words, "--replace").returncode == 0
 
 

@@ -25,8 +25,35 @@ def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield f"127.0.0.1:{gateway.port}"
 
 
-@pytest.mark.parametrize("example", examples("client.md"), ids=lambda example: f"example-{example.number}")
+ALL = examples("client.md")
+DRIVING = [example for example in ALL if ".drive(" in example.code]
+
+
+@pytest.mark.parametrize(
+    "example",
+    [example for example in ALL if example not in DRIVING],
+    ids=lambda example: f"example-{example.number}",
+)
 def test_an_example_prints_what_it_says(example: Example, target: str, tmp_path: Path) -> None:
+    prints_what_it_says(example, target, tmp_path)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("example", DRIVING, ids=lambda example: f"example-{example.number}")
+def test_an_example_of_driving_moves_a_robot(
+    example: Example,
+    ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path: Path,
+) -> None:
+    from tests.support.driven_robot import driven_robot  # noqa: PLC0415  # needs rclpy
+
+    with driven_robot(tmp_path) as robot:
+        prints_what_it_says(example, robot.target, tmp_path)
+        assert any(each.moves for each in robot.base.heard)
+        assert not robot.base.moves
+
+
+def prints_what_it_says(example: Example, target: str, tmp_path: Path) -> None:
     book = tmp_path / "robotctl/config.toml"
     book.parent.mkdir()
     book.write_text(f'[robots.lab2]\ntarget = "{target}"\n')

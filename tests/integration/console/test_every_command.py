@@ -17,7 +17,7 @@ GROUPS = {"preview": ("on", "off"), "robots": ("add", "remove", "default")}
 WITHOUT_A_ROBOT = {"robots", "login", "logout"}
 WINDOW = {"monitor"}
 # Without further words these would not end by themselves.
-WORDS = {"watch": ("--count", "1"), "view": ("--headless", "--frames", "1")}
+WORDS = {"reset-stop": ("1",), "watch": ("--count", "1"), "view": ("--headless", "--frames", "1")}
 
 
 def names() -> list[str]:

@@ -1,6 +1,7 @@
 """robotctl at a robot that asks who calls: logging in, roles, and a login that is over."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -71,7 +72,7 @@ def test_a_login_that_is_revoked_ends_the_watching_with_one_line(robot: Guarded)
         assert screen.process.wait(ENDS_WITHIN_S) == 1
         (said,) = [line for line in screen.lines() if line.startswith("error: ")]
         assert "no longer valid" in said
-        assert said.endswith("then type: robotctl login NAME HOST:PORT FILE")
+        assert re.search(rf"then type: robotctl login {ROBOT} [\w.]+:\d+ FILE --replace$", said)
         assert screen.manners() == screen.manners_before
     again = robot.robotctl("--robot", ROBOT, "status")
     assert again.returncode == 1

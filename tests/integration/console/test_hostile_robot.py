@@ -78,7 +78,7 @@ def test_nothing_reaches_the_terminal_but_text(
 
 
 def test_an_event_of_the_far_future_is_shown(target: str) -> None:
-    done = robotctl_process("--target", target, "events")
+    done = robotctl_process("--target", target, "events", "--clients")
     assert (done.returncode, done.stderr) == (0, "")
     assert len(done.stdout.splitlines()) == len(event_pb2.Event.DESCRIPTOR.oneofs_by_name["payload"].fields)
 

@@ -132,7 +132,9 @@ def test_a_pipe_gets_one_line_per_update(double: GatewayDouble) -> None:
         assert watching.close() == ""
     assert len(watching.lines) == 3
     for line in watching.lines:
-        assert re.fullmatch(r"\d\d:\d\d:\d\d  health ok \(robot healthy\)  motion 0\.50 m/s .*\n", line), line
+        assert re.fullmatch(
+            r"\d\d:\d\d:\d\d \S+  health ok \(robot healthy\)  motion 0\.50 m/s .*\n", line
+        ), line
         assert "\x1b" not in line
 
 

@@ -53,7 +53,7 @@ class Person:
         press(self.window, Qt.Key.Key_P)
 
     def notes(self) -> str:
-        return " ".join(line.text.text() for line in self.window.preview.notes.shown)
+        return " ".join(note.text for note in self.window.toasts.notes)
 
     def events(self) -> str:
         return "\n".join(self.window.side.events.lines)

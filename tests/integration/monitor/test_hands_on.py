@@ -52,7 +52,9 @@ class Desk:
         until(lambda: self.preview.state.word.text() == word, f"the preview is shown as {word}")
 
     def notes(self) -> list[str]:
-        return [line.text.text() for line in self.preview.notes.shown if line.text.text()]
+        """Answers over the picture, then the robot's own in the side panel."""
+        shown = (*self.window.toasts.lines.shown, *self.window.side.notes.shown)
+        return [line.text.text() for line in shown if line.text.text()]
 
 
 @pytest.fixture(params=[StreamingGatewayDouble, GatewayDouble], ids=["streamed", "polled"])
@@ -141,9 +143,11 @@ def test_while_the_robot_thinks_nothing_can_be_pressed_and_the_focus_comes_back(
 
 
 def test_everything_is_reached_by_the_keyboard(desk_work: Desk) -> None:
+    desk_work.press(Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    until(desk_work.window.side.events.isVisible, "the tab of the events")
     reached: list[QWidget] = []
     desk_work.preview.switch.setFocus()
-    for _ in range(20):
+    for _ in range(40):
         focus = QApplication.focusWidget()
         assert focus
         if focus in reached:
@@ -152,7 +156,11 @@ def test_everything_is_reached_by_the_keyboard(desk_work: Desk) -> None:
         desk_work.press(Qt.Key.Key_Tab)
     buttons = [desk_work.preview.switch, *desk_work.preview.profiles.values()]
     assert reached[: len(buttons)] == buttons
-    assert desk_work.window.side.events in reached
+    window = desk_work.window
+    events = window.side.events_tab
+    bar = (window.header.name, window.header.panel_button, window.header.help_button)
+    for widget in (*bar, window.side.sound, events.severity, events.export, events.search, events.list):
+        assert widget in reached, widget.accessibleName()
 
 
 def test_mnemonics_press_the_buttons(desk_work: Desk) -> None:
@@ -228,9 +236,9 @@ def test_what_the_robot_says_is_never_markup(desk_work: Desk, state: states.Prev
     window = desk_work.window
     until(lambda: MARKUP in window.side.faults.shown[0].text.text(), "the fault")
     until(desk_work.notes, "the robot's notes")
-    assert MARKUP in window.header.name.text()
+    assert MARKUP in shown_by_qt(window.header.name.toolTip())
     assert MARKUP in shown_by_qt(window.header.target.toolTip())
-    assert any(MARKUP in shown_by_qt(line.text.toolTip()) for line in window.preview.notes.shown)
+    assert any(MARKUP in shown_by_qt(line.text.toolTip()) for line in window.side.notes.shown)
     no_widget_takes_markup(window)
     assert type(window.side.events.itemDelegate()) is QStyledItemDelegate, "Qt's own one draws plain text"
 

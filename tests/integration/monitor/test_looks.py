@@ -1,6 +1,7 @@
 """Readable in light and dark, distinguishable without colours, as large as a small laptop's screen allows."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from console.presentation.severity_style import SeverityStyle
+from console.window.cell import SmallLabel
 from console.window.labels import ElidedLabel, WrappedLabel
 from console.window.lines import TintedLine
 from console.window.monitor_window import MonitorWindow
@@ -21,7 +23,7 @@ from tests.support.snapshots import event
 
 READABLE = 4.5
 """Contrast that the Web Content Accessibility Guidelines ask of text (level AA)."""
-SMALL_LAPTOP = (1366, 768)
+SMALL_SCREEN = (1024, 600)
 SETTINGS = "robot-gateway/monitor.ini"
 
 
@@ -37,7 +39,7 @@ def troubled() -> GatewayDouble:
     )
     made.status.faults.add(id="c", component="battery", message="low", active=False, cleared_age_ms=5000)
     made.status.preview.last_error = "the camera was busy"
-    made.overlay.events.append(event(1, "preview running, BALANCED"))
+    made.overlay.events.append(event(1, "preview running, balanced"))
     return made
 
 
@@ -80,6 +82,15 @@ def test_every_text_is_readable(window: MonitorWindow, name: str, ground: QColor
         assert ratio >= READABLE, f"'{label.text()}' on {ground_of(label).name()}: {ratio:.1f}"
 
 
+def test_the_banner_of_a_lost_connection_is_readable() -> None:
+    with monitor("127.0.0.1:9") as window:
+        until(window.banner.isVisible, "the banner")
+        let_pass(0.3)
+        for label in (window.banner.text, window.banner.next_try):
+            ratio = contrast(label.palette().color(label.foregroundRole()), ground_of(label))
+            assert ratio >= READABLE, f"{label.text()}: {ratio:.1f}"
+
+
 def test_a_desktop_that_turns_dark_takes_the_window_along(window: MonitorWindow) -> None:
     line = window.side.faults.shown[0]
     assert isinstance(line, TintedLine)
@@ -108,42 +119,62 @@ def test_shapes_differ_without_any_colour(one: SeverityStyle, other: SeveritySty
     assert differing > 90, f"only {differing} of 1024 pixels differ between {one} and {other}"
 
 
-def test_it_fits_a_small_laptop_and_nothing_is_cut_off(window: MonitorWindow) -> None:
+def test_it_fits_a_small_screen_and_nothing_is_cut_off(window: MonitorWindow) -> None:
     smallest = window.minimumSizeHint()
-    assert smallest.width() <= SMALL_LAPTOP[0]
-    assert smallest.height() <= SMALL_LAPTOP[1]
+    assert smallest.width() <= SMALL_SCREEN[0]
+    assert smallest.height() <= SMALL_SCREEN[1]
     window.resize(smallest)
     let_pass(0.3)
     keep_screenshot(window, "smallest")
     words: list[QPushButton | QLabel] = [*window.findChildren(QPushButton), *window.findChildren(QLabel)]
     for word in words:
-        gives_way = isinstance(word, ElidedLabel | WrappedLabel)
+        gives_way = isinstance(word, ElidedLabel | SmallLabel | WrappedLabel)
         if word.isVisible() and word.text() and not gives_way:
             assert word.width() >= word.sizeHint().width(), f"'{word.text()}' is cut off"
 
 
-def open_and_close(change: tuple[int, int] | None = None) -> tuple[int, int, list[int]]:
+@dataclass(frozen=True)
+class Left:
+    """How a window was left."""
+
+    size: tuple[int, int]
+    maximised: bool
+    panel: bool
+    sound: bool
+
+
+def open_and_close(change: tuple[int, int] | None = None) -> Left:
     with monitor("127.0.0.1:9") as window:
         let_pass(0.1)
         if change:
+            window.showNormal()
             window.resize(*change)
-            window.splitter.setSizes([600, change[0] - 600])
+            window.toggle_panel()
+            window.toggle_sound()
             let_pass(0.1)
-        return window.width(), window.height(), window.splitter.sizes()
+        size = (window.width(), window.height())
+        return Left(size, window.isMaximized(), window.side.isVisible(), window.alarm.sound_on)
 
 
 def test_it_opens_as_it_was_left() -> None:
     left = open_and_close((1400, 900))
-    assert left[:2] == (1400, 900)
+    assert left == Left((1400, 900), maximised=False, panel=False, sound=True)
     assert open_and_close() == left
+
+
+FIRST = Left((1920, 1080), maximised=True, panel=True, sound=False)
+
+
+def test_the_first_time_it_is_maximised_with_its_panel_and_without_sound() -> None:
+    assert open_and_close() == FIRST
 
 
 @pytest.mark.parametrize(
     "content",
     [
         b"\xff\xfe\x00nonsense[[[",
-        b"[window]\ngeometry=@ByteArray(xyz)\ndivision=@ByteArray(\\0\\0\\0)\n",
-        b"[window]\ngeometry=7\ndivision=@Variant(\\0\\0\\0\\x7f)\n",
+        b"[window]\ngeometry=@ByteArray(xyz)\npanel=perhaps\n",
+        b"[window]\ngeometry=7\npanel=@Variant(\\0\\0\\0\\x7f)\n",
         b"",
     ],
 )
@@ -151,12 +182,11 @@ def test_a_broken_settings_file_is_ignored(own_settings: Path, content: bytes) -
     file = own_settings / SETTINGS
     file.parent.mkdir(parents=True)
     file.write_bytes(content)
-    width, height, _ = open_and_close()
-    assert (width, height) == (1280, 800)
-    assert open_and_close((1300, 850))[:2] == open_and_close()[:2], "it is mended by the next good one"
+    assert open_and_close() == FIRST
+    assert open_and_close((1300, 850)) == open_and_close(), "it is mended by the next good one"
 
 
 def test_a_settings_file_that_can_not_be_written_is_ignored(own_settings: Path) -> None:
     file = own_settings / SETTINGS
     file.mkdir(parents=True)
-    assert open_and_close()[:2] == (1280, 800)
+    assert open_and_close() == FIRST

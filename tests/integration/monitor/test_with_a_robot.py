@@ -18,6 +18,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 
 from bench.loop_delay import LoopDelay
+from console.window.fault_line import FaultLine
 from console.window.lines import StatusLine
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
@@ -29,6 +30,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(240)]
 
 LOOP_DELAY_P99_MS = 30.0
 CLOSES_WITHIN_S = 2.0
+WINDOW = (1280, 800)
 
 
 @dataclass
@@ -51,10 +53,10 @@ class Watch:
     def names(self) -> list[str]:
         return [line.label.text() for line in self.window.side.components.shown]
 
-    def faults(self) -> list[StatusLine]:
+    def faults(self) -> list[FaultLine]:
         return list(self.window.side.faults.shown)
 
-    def fault_says(self, words: str) -> StatusLine:
+    def fault_says(self, words: str) -> FaultLine:
         return until(lambda: next((f for f in self.faults() if words in f.text.text()), None), words)
 
     def health_is(self, word: str) -> None:
@@ -86,6 +88,8 @@ class Watch:
 @pytest.fixture
 def watch(ros_domain: int, tmp_path: Path) -> Iterator[Watch]:  # noqa: ARG001  # for its effect
     with whole_robot(tmp_path) as robot, monitor(robot.target) as window:
+        window.showNormal()
+        window.resize(*WINDOW)
         made = Watch(robot, window)
         made.health_is("OK")
         yield made
@@ -125,7 +129,7 @@ def test_a_day_at_the_window(watch: Watch) -> None:
     watch.robot.kill_preview()
     watch.preview_is("FAULTED")
     watch.fault_says("preview service")
-    reason = watch.window.preview.notes.shown[0]
+    reason = watch.window.side.notes.shown[0]
     until(reason.text.text, "the reason is shown")
     watch.mark_is("Video", "STALE")
     keep_screenshot(watch.window, "preview-faulted")

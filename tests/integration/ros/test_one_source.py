@@ -11,9 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 
+from common.ros_node import ros_node
 from gateway.config import DEFAULT_SOURCES
 from gateway.ros import source as source_module
-from gateway.ros.lifetime import ros_node
 from gateway.ros.source import Source
 from gateway.ros.subscription import subscribe
 from gateway.status import values

@@ -94,7 +94,7 @@ def test_one_publisher_that_fits_is_enough(talker: Talker) -> None:
         wait_for(Publishers(2))
 
 
-def test_another_type_is_told_apart(talker: Talker) -> None:
+def test_another_type_is_distinguished(talker: Talker) -> None:
     with watching(BATTERY) as (board, wait_for), talking("second") as second:
         talker.publisher(BATTERY.topic, Odometry)
         wait_for(Publishers(1, wrong_type=True))

@@ -177,7 +177,8 @@ def test_a_preview_that_is_off_is_one_line_and_1() -> None:
     with serving(GatewayDouble()) as port:
         done = robotctl_process("--target", f"127.0.0.1:{port}", "view", "--headless", "--frames", "3")
     assert done.returncode == 1
-    assert only_line(done.stderr) == "error: the preview is off. Type: robotctl preview on"
+    expected = f"error: the preview is off. Type: robotctl --target 127.0.0.1:{port} preview on"
+    assert only_line(done.stderr) == expected
 
 
 @contextmanager
@@ -199,7 +200,7 @@ def test_a_stream_that_does_not_come_is_one_line_and_3() -> None:
     assert done.returncode == 3
     said = only_line(done.stderr)
     assert "no frame for 4 s: the preview is running; no SRT listener answers" in said
-    assert said.endswith("Look at: robotctl doctor")
+    assert said.endswith(f"Look at: robotctl --target {target} doctor")
 
 
 def test_a_faulted_preview_is_one_line_and_1() -> None:

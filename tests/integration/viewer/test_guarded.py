@@ -63,7 +63,7 @@ def test_without_a_valid_login_there_is_no_video(robot: Guarded) -> None:
     code, said, complaints = view(robot)
     assert (code, said) == (1, "")
     assert "was revoked" in only_line(complaints)
-    assert complaints.endswith("then type: robotctl login NAME HOST:PORT FILE\n")
+    assert complaints.endswith(f"then type: robotctl login {ROBOT} {robot.target} FILE --replace\n")
     stranger = robotctl_process("--target", robot.target, "view", "--headless", "--frames", "1")
     assert (stranger.returncode, stranger.stdout) == (3, "")
     assert "robotctl login" in only_line(stranger.stderr)
@@ -87,8 +87,8 @@ def test_the_window_names_the_missing_role_and_takes_a_new_login_over(robot: Gua
         )
         card = banner(window.robot.session.playback())
         assert card
-        assert "was revoked. Ask this robot's administrator for a login" in card.detail
-        assert "then type: robotctl login NAME HOST:PORT FILE" in card.detail
+        assert "was revoked. Ask this robot's administrator for a new login" in card.detail
+        assert "then type: robotctl login NAME HOST:PORT FILE --replace" in card.detail
         robot.log_in("dora", Role.OPERATOR)
         until(
             lambda: window.robot.session.playback().state is PlaybackState.OFF,

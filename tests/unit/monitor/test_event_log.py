@@ -28,8 +28,8 @@ def test_a_fault_says_how_bad_it_is_and_who_has_it() -> None:
 
 
 def test_a_component_is_not_named_twice() -> None:
-    running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, BALANCED")
-    assert line_of(running, 0) == EventLine(5000.5, "preview running, BALANCED", SeverityStyle.QUIET)
+    running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, balanced")
+    assert line_of(running, 0) == EventLine(5000.5, "preview running, balanced", SeverityStyle.QUIET)
 
 
 def test_a_cleared_fault_says_so() -> None:

@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 
 from console.client import Unreachable
+from console.monitor.alarm import Alarm
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import MonitorState
-from console.monitor.status_rows import component_rows, fault_rows
+from console.monitor.status_rows import component_rows, fault_items, fault_rows
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row
 from omniseer.gateway.v1 import fault_pb2, overlay_pb2
@@ -52,7 +53,7 @@ def test_a_healthy_robot_has_no_fault() -> None:
 def test_a_healthy_robot() -> None:
     rows = by_label(heard())
     motion = "0.50\u00a0m/s, turning\u00a0+0.30\u00a0rad/s"
-    assert rows["Motion"] == Row("Motion", "fresh", SeverityStyle.GOOD, motion, "12 ms")
+    assert rows["Motion"] == Row("Motion", "fresh", SeverityStyle.GOOD, motion, "")
     assert (rows["Objects"].mark, rows["Objects"].style) == ("no data", SeverityStyle.QUIET)
     assert "Network" not in rows, "a part that the robot never reported has no row"
 
@@ -72,8 +73,8 @@ def test_stale_is_a_word_and_a_style() -> None:
 
 
 def test_ages_count_on_between_two_answers() -> None:
-    motion = by_label(heard(), NOW_S + 1)["Motion"]
-    assert (motion.age, motion.mark) == ("1.0 s", "fresh")
+    motion = by_label(heard(), NOW_S + 1.99)["Motion"]
+    assert (motion.age, motion.mark) == ("2.0 s", "fresh")
 
 
 @pytest.mark.parametrize("silent_s", [2.1, 60.0])
@@ -97,3 +98,32 @@ def test_a_gateway_counts_as_up_only_while_it_answers() -> None:
     state = heard(snapshot(change))
     assert (by_label(state)["Gateway"].text, by_label(state)["Gateway"].age) == ("2 clients", "1 min 30 s")
     assert "Gateway" not in by_label(state, NOW_S + 60)
+
+
+def test_a_fault_waits_for_its_acknowledgement() -> None:
+    state, alarm = heard(snapshot(with_faults)), Alarm()
+    assert state.snapshot
+    alarm.show_faults(state.snapshot.status.faults)
+    assert [item.pending for item in fault_items(state, alarm, NOW_S)] == [True, False]
+    alarm.acknowledge()
+    assert [item.pending for item in fault_items(state, alarm, NOW_S)] == [False, False]
+
+
+def test_without_an_active_fault_a_line_says_so_above_the_cleared_ones() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.faults.add(id="x", component="battery", message="low", active=False, cleared_age_ms=5000)
+
+    items = fault_items(heard(snapshot(change)), Alarm(), NOW_S)
+    assert [item.row.mark for item in items] == ["none", "cleared"]
+
+
+def test_a_silent_robot_is_not_known_to_be_without_a_fault() -> None:
+    now, later = (fault_items(heard(), Alarm(), at_s)[0].row for at_s in (NOW_S, NOW_S + 60))
+    assert (now.style, later.style) == (SeverityStyle.GOOD, SeverityStyle.QUIET)
+
+
+def test_a_message_that_begins_with_its_component_is_not_doubled() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.faults.add(id="x", component="odometry", message="Odometry stopped coming", active=True)
+
+    assert fault_rows(heard(snapshot(change)), NOW_S)[0].text == "Odometry stopped coming"

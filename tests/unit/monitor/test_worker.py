@@ -13,6 +13,7 @@ from common.backoff import Backoff
 from common.errors import UserError
 from console.client import (
     CaughtUp,
+    Clock,
     DeadlineExceeded,
     DesiredPreview,
     Event,
@@ -20,10 +21,12 @@ from console.client import (
     EventPosition,
     FaultSeverity,
     GatewayError,
+    KeyFrameAnswer,
     NotAllowed,
     Offset,
     Outage,
     OverlaySnapshot,
+    PictureReport,
     PreviewChange,
     PreviewProfile,
     Refused,
@@ -31,7 +34,7 @@ from console.client import (
     Unsupported,
     WatchedStatus,
 )
-from console.client.results import EventKind
+from console.client.results import EventKind, RobotTime
 from console.monitor.conversation import RetryBackoff
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState
@@ -41,6 +44,8 @@ from tests.support.waiting import wait_until
 
 NEVER_S = 1e6
 AT_ONCE_S = 0.0
+ROBOT_NS = 5_000_000_000_000
+"""What the robot's clock shows at each ping."""
 
 
 class PlayedRobot:
@@ -62,6 +67,10 @@ class PlayedRobot:
         self.streamed: list[Event | EventGap | CaughtUp | Outage | GatewayError] = []
         self.asked_after: list[EventPosition | None] = []
         self.another_login = False
+        self.clock = Clock()
+        self.key_frames: list[int | None] = []
+        self.pictures: list[PictureReport] = []
+        self.old = False
 
     @property
     def client(self) -> "PlayedRobot":
@@ -104,7 +113,20 @@ class PlayedRobot:
         self.pings += 1
         if self.ping_error:
             raise self.ping_error
+        now_s = time.monotonic()
+        self.clock.note(now_s, RobotTime(boot_id="1", monotonic_ns=ROBOT_NS, wall_clock_unix_ns=0), now_s)
         return Offset(0.0, 0.0)
+
+    async def request_key_frame(self, newest_pts: int | None = None) -> KeyFrameAnswer:
+        self.key_frames.append(newest_pts)
+        if self.old:
+            raise Unsupported("an older robot")
+        return KeyFrameAnswer(forced=True)
+
+    async def report_picture(self, report: PictureReport) -> None:
+        self.pictures.append(report)
+        if self.old:
+            raise Unsupported("an older robot")
 
     async def overlay(self) -> OverlaySnapshot:
         self.looks += 1
@@ -412,3 +434,70 @@ def test_a_fault_of_our_own_does_not_look_like_a_robot_that_stands_still() -> No
     assert "ZeroDivisionError" in str(state.link.error)
     assert worker.close(10)
     assert replace(state) == worker.latest()
+
+
+def test_the_robots_clock_is_known_from_the_first_ping_on() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        offset = wait_until(worker.clock_offset, "an offset")
+        assert (time.monotonic() + offset.seconds) * 1e9 == pytest.approx(ROBOT_NS, abs=30e9)
+        robot.error = Unreachable("gone")
+        robot.ping_error = robot.error
+        reached(worker, LinkState.LOST)
+        assert worker.clock_offset(), "video goes on without the gateway"
+
+
+def test_a_key_frame_is_requested_while_the_robot_answers() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        wait_until(lambda: worker.request_key_frame(7), "it takes requests")
+        wait_until(lambda: robot.key_frames == [7], "the request")
+        robot.error = robot.ping_error = Unreachable("gone")
+        reached(worker, LinkState.LOST)
+        assert not worker.request_key_frame(8)
+    assert not worker.request_key_frame(9)
+
+
+def test_requests_are_spaced_and_the_newest_of_those_in_between_is_sent() -> None:
+    robot = PlayedRobot()
+    with following(robot) as worker:
+        begun_s = time.monotonic()
+        wait_until(lambda: worker.request_key_frame(0), "it takes requests")
+        wait_until(lambda: robot.key_frames == [0], "the first request")
+        for pts in range(1, 100):
+            assert worker.request_key_frame(pts)
+        wait_until(lambda: len(robot.key_frames) >= 2, "the second request")
+        assert time.monotonic() - begun_s > 0.33
+    assert robot.key_frames == [0, 99]
+
+
+def test_an_older_robot_is_asked_once() -> None:
+    robot = PlayedRobot()
+    robot.old = True
+    with following(robot) as worker:
+        wait_until(lambda: worker.request_key_frame(1), "it might take requests")
+        wait_until(lambda: not worker.request_key_frame(2), "it does not")
+        assert len(robot.key_frames) == 1
+        assert worker.latest().link.state is LinkState.CONNECTED
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_the_picture_is_reported_once_a_second(old: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("console.monitor.viewer_feedback._REPORT_S", 0.01)
+    robot = PlayedRobot()
+    robot.old = old
+    shown: list[PictureReport] = []
+
+    def picture() -> PictureReport | None:
+        """None at first, as long as no picture is shown."""
+        shown.append(PictureReport(picture_age_ms=len(shown)))
+        return shown[-1] if len(shown) > 3 else None
+
+    worker = Worker("robot", lambda: None, robot.connect, picture=picture)
+    worker.start()
+    try:
+        wait_until(lambda: len(robot.pictures) >= (1 if old else 3), "reports")
+        assert worker.latest().link.state is LinkState.CONNECTED
+    finally:
+        assert worker.close(10)
+    assert robot.pictures == shown[3 : 4 if old else 3 + len(robot.pictures)]

@@ -35,6 +35,10 @@ class Played:
     payloads: list[bytes] = field(default_factory=list)
     reports: list[Delivery] = field(default_factory=list)
     requests_s: list[float] = field(default_factory=list)
+    requested_pts: list[int | None] = field(default_factory=list)
+    takes_requests: bool = True
+    received: int = 0
+    lost_share: float = 0.0
     full_until_s: float = 0.0
     stopping: threading.Event = field(default_factory=threading.Event)
     until_s: float = 110.0
@@ -50,11 +54,12 @@ class Played:
 
     def receive(self) -> tuple[int, bytes] | None:
         if self.packets and self.packets[0][0] <= self.now_s:
+            self.received += 1
             return self.packets.popleft()[1:]
         return None
 
     def statistics(self) -> LinkStatistics:
-        return LinkStatistics(self.rtt_ms, lost=3)
+        return LinkStatistics(self.rtt_ms, 3 + round(self.lost_share * self.received), self.received)
 
     def record(self, payload: bytes) -> None:
         self.payloads.append(payload)
@@ -68,8 +73,10 @@ class Played:
     def check(self) -> None:
         pass
 
-    def request(self) -> None:
+    def request(self, newest_pts: int | None) -> bool:
         self.requests_s.append(self.now_s)
+        self.requested_pts.append(newest_pts)
+        return self.takes_requests
 
     @property
     def shown(self) -> list[int]:
@@ -115,7 +122,9 @@ def test_every_frame_of_a_clean_link_is_decoded(played: Played) -> None:
     send(played, 60)
     found = played.run()
     assert played.shown == list(range(60))
-    assert found == Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=20.0, lost=3, wait_ms=250)
+    assert found == Delivery(
+        kind=DeliveryChoice.DIRECT, rtt_ms=20.0, lost=3, wait_ms=250, loss_percent=found.loss_percent
+    )
 
 
 def test_a_late_packet_is_waited_for(played: Played) -> None:
@@ -149,6 +158,19 @@ def test_a_key_frame_is_requested_at_once_and_again_while_none_comes(played: Pla
     steps = [b - a for a, b in pairwise(played.requests_s)]
     assert len(steps) >= 2
     assert all(step == pytest.approx(0.5, abs=0.02) for step in steps)
+    # Not that of the newest whole frame, the one before 7: a key frame after that may be what is lost.
+    requested = [pts or 0 for pts in played.requested_pts]
+    assert requested[0] >= 7 * TICKS
+    assert requested == sorted(requested)
+
+
+def test_where_no_request_is_made_the_connection_is_made_anew(played: Played) -> None:
+    """An older robot, or one whose gateway does not answer."""
+    send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
+    played.takes_requests = False
+    found = played.run(on_picture_lost=played.request)
+    assert played.now_s == pytest.approx(100 + 7 / 30 + FIRST_WAIT_S + 0.2, abs=0.03)
+    assert found.rejoins == 1
 
 
 def test_without_a_request_the_connection_is_made_anew(played: Played) -> None:
@@ -215,3 +237,29 @@ def test_figures_of_earlier_connections_are_kept(played: Played) -> None:
 @pytest.mark.parametrize(("rtt_ms", "expected_s"), [(0, 0.2), (20, 0.25), (80, 0.55), (1000, 0.6)])
 def test_the_wait_follows_the_round_trip_within_bounds(rtt_ms: float, expected_s: float) -> None:
     assert wait_s(rtt_ms) == pytest.approx(expected_s)
+
+
+def test_on_a_link_that_loses_a_part_of_every_frame_the_connection_is_made_anew(played: Played) -> None:
+    """One that is narrower than the stream: key frames are asked for in vain."""
+    send(played, 300, lose=lambda frame, packet: frame >= 60 and packet % 2 == 1)
+    played.lost_share = 0.5
+    found = played.run(on_picture_lost=played.request)
+    assert played.shown == list(range(60))
+    assert found.rejoins == 1
+    assert played.now_s == pytest.approx(100 + 60 / 30 + 0.6 + played.rtt_ms / 1000, abs=0.05)
+
+
+def test_a_stream_that_pauses_is_not_stuck(played: Played) -> None:
+    send(played, 60)
+    played.lost_share = 0.5
+    assert played.run(on_picture_lost=played.request).rejoins == 0
+    assert played.stopping.is_set(), "8 s after the last packet"
+
+
+def test_the_loss_of_the_last_second_is_reported(played: Played) -> None:
+    send(played, 200)
+    played.lost_share = 0.125
+    played.until_s = 105.0
+    played.run()
+    assert played.reports[0].loss_percent is None
+    assert played.reports[-1].loss_percent == pytest.approx(12.5, abs=0.5)

@@ -6,7 +6,8 @@ pytest_plugins = ["pytester"]
 
 LEAVES = {
     "process": ("process", "subprocess.Popen(['sleep', '5'], start_new_session=True)"),
-    "orphan": ("process", "subprocess.run(['sh', '-c', 'setsid sleep 5 &'])"),
+    # A copy of the shell: an orphan in execve(2) is only noticed at the end of the session.
+    "orphan": ("process", "subprocess.run(['sh', '-c', '(sleep 5; true) &'])"),
     "zombie": ("process", "KEPT.append(subprocess.Popen(['true']))"),
     "thread": ("thread", "threading.Thread(target=threading.Event().wait, args=(30,), daemon=True).start()"),
     "listener": ("socket", "KEPT.append(socket.create_server(('127.0.0.1', 0)))"),

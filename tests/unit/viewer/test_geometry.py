@@ -1,6 +1,6 @@
 import pytest
 
-from console.viewer.geometry import Box, fitted, on_frame
+from console.viewer.geometry import Box, fitted, label_place, on_frame
 
 WINDOW = Box(0, 0, 1600, 900)
 
@@ -54,3 +54,24 @@ def test_a_box_outside_the_frame_or_without_area_is_not_drawn(box: Box) -> None:
 def test_a_box_that_is_not_a_number_is_not_drawn() -> None:
     assert on_frame(Box(float("nan"), 0, 10, 10), 1280, 720, Box(0, 0, 640, 360)) is None
     assert on_frame(Box(0, 0, float("nan"), 10), 1280, 720, Box(0, 0, 640, 360)) is None
+
+
+FRAME = Box(100, 50, 800, 450)
+
+
+@pytest.mark.parametrize(
+    ("box", "place"),
+    [
+        pytest.param(Box(200, 200, 80, 80), Box(200, 180, 120, 20), id="above"),
+        pytest.param(Box(200, 55, 80, 80), Box(200, 55, 120, 20), id="no room above"),
+        pytest.param(Box(850, 200, 50, 80), Box(780, 180, 120, 20), id="at the right edge"),
+        pytest.param(Box(100, 50, 800, 450), Box(100, 50, 120, 20), id="the whole frame"),
+        pytest.param(Box(100, 495, 20, 5), Box(100, 475, 120, 20), id="at the bottom"),
+    ],
+)
+def test_a_label_stays_in_the_frame(box: Box, place: Box) -> None:
+    assert label_place(box, 120, 20, FRAME) == place
+
+
+def test_a_label_wider_than_the_frame_begins_at_its_left_edge() -> None:
+    assert label_place(Box(500, 200, 10, 10), 2000, 20, FRAME).x == FRAME.x

@@ -184,12 +184,17 @@ def test_a_session_that_never_began_can_be_closed() -> None:
 
 
 def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> None:
-    requests: list[str] = []
+    requests: list[int | None] = []
+
+    def request(newest_pts: int | None) -> bool:
+        requests.append(newest_pts)
+        return True
+
     session = VideoSession(
         connect=exchange.connect,
         delivery=DeliveryChoice.SRT,
         robot_now_ns=lambda: 5_000_000_000,
-        on_picture_lost=lambda: requests.append("key frame"),
+        on_picture_lost=request,
     )
     assert session.delivery() is None
     session.start()
@@ -201,5 +206,34 @@ def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> Non
     assert options.delivery is DeliveryChoice.SRT
     assert options.capture is None, "the endpoint names no offset"
     assert options.on_picture_lost
-    options.on_picture_lost()
-    assert requests == ["key frame"]
+    assert options.on_picture_lost(90_000)
+    assert requests == [90_000]
+
+
+def test_frames_get_capture_times_where_the_endpoint_has_an_offset(exchange: Exchange) -> None:
+    session = VideoSession(connect=exchange.connect, robot_now_ns=lambda: 5_000_000_000)
+    session.start()
+    session.follow(preview(PreviewState.RUNNING, capture_offset_ns=-3_600_000_000_000))
+    called(exchange, 1)
+    assert session.close()
+    capture = exchange.options[0].capture
+    assert capture
+    assert capture.offset_ns == -3_600_000_000_000
+    assert capture.robot_now_ns() == 5_000_000_000
+
+
+def test_a_connection_that_is_made_anew_by_itself_is_not_silent(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    session.follow(preview(PreviewState.RUNNING))
+    called(exchange, 1)
+    exchange.show()
+    wait_until(session.latest_frame, "a frame")
+    until_s = time.monotonic() + 2.5
+    while time.monotonic() < until_s:
+        exchange.delivery = replace(exchange.delivery, rejoins=exchange.delivery.rejoins + 1)
+        time.sleep(0.5)
+    assert len(exchange.calls) == 1
+    exchange.show()
+    wait_until(lambda: session.frames == 2, "a frame")
+    called(exchange, 2)

@@ -138,7 +138,8 @@ def test_a_reason_counts_more_than_the_code(reason: Reason) -> None:
 def test_what_to_do_fits_the_reason_and_else_the_family() -> None:
     assert "with that role" in str(refused(NotAllowedError("ben is viewer")))
     assert "share one" in str(refused(TooMuchError("too much", Reason.TOO_MANY_STREAMS)))
-    assert errors.NotAllowed.advice in str(refused(TooMuchError("no", Reason.CREDENTIAL_REVOKED)))
+    assert errors.NotAllowed.advice in str(refused(TooMuchError("no", Reason.CREDENTIAL_MISSING)))
+    assert "FILE --replace" in str(refused(TooMuchError("no", Reason.CREDENTIAL_REVOKED)))
 
 
 def test_the_fields_of_a_bad_request_are_named() -> None:

@@ -18,7 +18,18 @@ from google.protobuf.message_factory import GetMessageClass
 
 from console.client import results
 from console.client.mapping import enums
+from console.client.mapping.driving import (
+    DriveCommand,
+    command_request,
+    enabled_request,
+    join_request,
+    open_request,
+    reset_request,
+    stop_request,
+    velocity_request,
+)
 from console.client.mapping.methods import (
+    DRIVE,
     METHODS,
     STREAMS,
     SUBSCRIBE_EVENTS,
@@ -50,6 +61,7 @@ from omniseer.gateway.v1 import (
     source_pb2,
     states_pb2,
     system_status_pb2,
+    teleop_pb2,
 )
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import alternatives, changes, fields_of, fill_distinctly, is_alternative
@@ -65,9 +77,18 @@ FILES: Final = (
     robot_gateway_pb2,
     states_pb2,
     system_status_pb2,
+    teleop_pb2,
 )
-SERVICE: Final = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-ALL_METHODS: Final[tuple[Method[Any], ...]] = (*METHODS, *STREAMS)
+ANSWERS: Final = {
+    method.name: method
+    for service in (
+        robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
+        teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+    )
+    for method in service.methods
+}
+"""Every method of the contract by its name, which no other has."""
+ALL_METHODS: Final[tuple[Method[Any], ...]] = (*METHODS, *STREAMS, DRIVE)
 DECODERS: Final = {method.name: method.decode for method in ALL_METHODS}
 
 ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
@@ -85,6 +106,9 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.VideoCodec, preview_pb2.VideoCodec),
         (results.StreamTransport, preview_pb2.StreamTransport),
         (results.StreamContainer, preview_pb2.StreamContainer),
+        (results.DrivePhase, teleop_pb2.DrivePhase),
+        (results.DriveInhibit, teleop_pb2.DriveInhibit),
+        (results.Supervision, teleop_pb2.Supervision),
     )
 }
 
@@ -135,6 +159,8 @@ RENAMED: Final[Mapping[str, str]] = {
     "Event.control_action": "control",
     "ClientJoined.address": "client_address",
     "ClientLeft.address": "client_address",
+    "ClientJoined.who": "client_name",
+    "ClientLeft.who": "client_name",
     "SubscribeEventsResponse.caught_up": "position",
 }
 """Field -> its place in the result of its message, where that is not its own name."""
@@ -143,6 +169,8 @@ INLINED: Final = {
     "SystemStatus.health",
     "SubscribeEventsResponse.event",
     "SubscribeEventsResponse.gap",
+    "DriveResponse.opened",
+    "DriveResponse.state",
     "Event.fault_raised",
     "Event.fault_cleared",
     "Event.client_joined",
@@ -237,6 +265,9 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "DetectionOverlayStatus.available": ("age_ms", "source_width_px", "source_height_px", "count"),
     "WatchSystemStatusResponse.detections": ("detections",),
+    "TeleopStatus.stop": ("stop",),
+    "DriveState.stop": ("stop",),
+    "DriveState.picture_age_ms": ("picture_age_ms",),
 }
 """Flag that may be down, or field that may be unset -> what is None then in the result of its message."""
 
@@ -252,6 +283,11 @@ EMPTY_IS_UNKNOWN: Final = {
 """Texts that are None in the result when they are empty."""
 
 INFINITE_IS_KEPT: Final = {
+    *(f"DriveLimits.{field.name}" for field in teleop_pb2.DriveLimits.DESCRIPTOR.fields),
+    "DriveState.vx_mps",
+    "DriveState.vy_mps",
+    "DriveState.wz_rad_s",
+    "DriveState.speed_limit_mps",
     "TeleopStatus.max_linear_mps",
     "TeleopStatus.max_angular_rad_s",
     "VideoFormat.fps",
@@ -275,7 +311,15 @@ EVENT_KINDS: Final[Mapping[str, EventKind]] = {
 }
 """Payload of an event -> `Event.kind`, which no field feeds."""
 
-EVENT_PARTS: Final = ("fault", "preview", "encoder_fallback", "client_address", "control", "mode")
+EVENT_PARTS: Final = (
+    "fault",
+    "preview",
+    "encoder_fallback",
+    "client_address",
+    "client_name",
+    "control",
+    "mode",
+)
 """The parts of an `Event` that its payload feeds; those of other payloads are None."""
 
 UNIQUE_TYPES: Final = (int, float, str)
@@ -347,12 +391,15 @@ def expected_of_field(message: Message, field: FieldDescriptor, place: str) -> F
         return {}
     destination = place if name in INLINED else below(place, RENAMED.get(name, field.name))
     value = getattr(message, field.name)
+    if not field.message_type and field.is_repeated:
+        items = {f"{destination}[{index}]": expected_value(field, item) for index, item in enumerate(value)}
+        return items or {destination: ()}
     if not field.message_type:
         return {destination: expected_value(field, value)}
     if not field.is_repeated:
         return expected(value, destination)
-    items = [expected(item, f"{destination}[{index}]") for index, item in enumerate(value)]
-    return dict(chain.from_iterable(item.items() for item in items)) if items else {destination: ()}
+    parts = [expected(item, f"{destination}[{index}]") for index, item in enumerate(value)]
+    return dict(chain.from_iterable(part.items() for part in parts)) if parts else {destination: ()}
 
 
 def expected_value(field: FieldDescriptor, value: object) -> object:
@@ -406,7 +453,7 @@ def mismatches(wanted: Flat, found: Flat) -> Iterator[str]:
 
 CASES: Final = [
     (method.name, members)
-    for method in SERVICE.methods
+    for method in ANSWERS.values()
     if method.output_type.fields
     for members in alternatives(method.output_type)
 ]
@@ -419,7 +466,7 @@ def case_id(method: str, members: tuple[str, ...]) -> str:
 
 
 def filled_answer(method: str, members: tuple[str, ...]) -> Message:
-    answer = GetMessageClass(SERVICE.methods_by_name[method].output_type)()
+    answer = GetMessageClass(ANSWERS[method].output_type)()
     fill_distinctly(answer, members)
     return answer
 
@@ -474,7 +521,7 @@ def answer_messages() -> set[str]:
 
 
 def test_an_answer_without_fields_has_no_result() -> None:
-    without = [method.name for method in SERVICE.methods if not method.output_type.fields]
+    without = [method.name for method in ANSWERS.values() if not method.output_type.fields]
     assert {name: DECODERS[name](b"") for name in without} == {"ReportPicture": None}
 
 
@@ -559,6 +606,36 @@ def test_every_field_of_a_picture_report_is_set() -> None:
     assert {field.name for field, _ in short.ListFields()} == {"picture_age_ms"}
 
 
+def test_every_field_of_the_requests_of_driving_is_set() -> None:
+    command = DriveCommand(
+        sequence=1,
+        held=True,
+        vx_mps=0.25,
+        vy_mps=0.5,
+        wz_rad_s=0.75,
+        echo_monotonic_ns=2,
+        picture_monotonic_ns=3,
+        valid_until_monotonic_ns=4,
+        input_device="gamepad",
+    )
+    request = teleop_pb2.DriveRequest.FromString(command_request(command)).command
+    assert {field.name: value for field, value in request.ListFields()} == asdict(command)
+    assert set(asdict(command)) == set(request.DESCRIPTOR.fields_by_name)
+    opening = teleop_pb2.DriveRequest.FromString(
+        open_request("a" * 99, results.Supervision.LINE_OF_SIGHT, take_over=True)
+    ).open
+    assert opening == teleop_pb2.DriveOpen(
+        client_name="a" * 64, take_over=True, supervision=teleop_pb2.SUPERVISION_LINE_OF_SIGHT
+    )
+    joining = teleop_pb2.DriveRequest.FromString(join_request("tool", "session")).open
+    assert joining == teleop_pb2.DriveOpen(client_name="tool", session_id="session")
+    assert teleop_pb2.StopRobotRequest.FromString(stop_request("why")).reason == "why"
+    assert teleop_pb2.ResetStopRequest.FromString(reset_request(7)).stop_id == 7
+    assert robot_gateway_pb2.SetTeleopEnabledRequest.FromString(enabled_request(True)).enabled
+    velocity = robot_gateway_pb2.SendTeleopCommandRequest.FromString(velocity_request(0.25, 0.5, 0.75))
+    assert (velocity.linear_x_mps, velocity.linear_y_mps, velocity.angular_z_rad_s) == (0.25, 0.5, 0.75)
+
+
 def test_every_kind_of_event_has_a_word() -> None:
     payloads = event_pb2.Event.DESCRIPTOR.oneofs_by_name["payload"].fields
     kinds = {decoded_event(event_with(field.name)).kind for field in payloads}
@@ -587,17 +664,18 @@ def test_an_item_from_a_newer_gateway_is_none() -> None:
 
 def test_every_message_of_the_contract_is_a_request_or_below_an_answer() -> None:
     """A message that no method carries would escape the tests above."""
-    seen = {method.input_type.full_name for method in SERVICE.methods}
-    seen |= {method.output_type.full_name for method in SERVICE.methods}
+    seen = {method.input_type.full_name for method in ANSWERS.values()}
+    seen |= {method.output_type.full_name for method in ANSWERS.values()}
+    seen |= {f"omniseer.gateway.v1.{name}" for name in ("DriveOpen", "DriveCommand")}  # in a DriveRequest
     seen |= answer_messages()
     declared = {m.full_name for file in FILES for m in file.DESCRIPTOR.message_types_by_name.values()}
     assert seen == declared
 
 
 def test_every_method_of_the_contract_is_known() -> None:
-    assert sorted(DECODERS) == sorted(SERVICE.methods_by_name)
+    assert sorted(DECODERS) == sorted(ANSWERS)
     assert {method.path for method in ALL_METHODS} == {
-        f"/omniseer.gateway.v1.RobotGateway/{method.name}" for method in SERVICE.methods
+        f"/{method.containing_service.full_name}/{method.name}" for method in ANSWERS.values()
     }
 
 

@@ -17,6 +17,7 @@ from console.doctor import network, robot
 from console.doctor.examination import examine, reached
 from console.doctor.srt_probe import answers_as_srt, induction, is_answer
 from omniseer.gateway.v1 import states_pb2 as states
+from omniseer.gateway.v1 import teleop_pb2
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.source_pb2 import SOURCE_STATE_QOS_MISMATCH, SOURCE_STATE_SILENT
 from tests.support.gateway_double import GatewayDouble, serving
@@ -217,3 +218,21 @@ print(network.name_finding("lab1.local").what)
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
     )
     assert done.stdout == "'lab1.local' does not resolve: no answer within 0.1 s\n"
+
+
+def test_a_robot_that_is_not_set_up_for_driving_has_no_finding_of_it(double: GatewayDouble) -> None:
+    assert "driving" not in examined(double)
+
+
+def test_what_keeps_a_robot_from_being_driven_is_found(double: GatewayDouble) -> None:
+    teleop = double.status.teleop
+    teleop.state, teleop.enabled, teleop.holder = states.TELEOP_ENABLED, True, "anna"
+    assert "anna drives" in examined(double)["driving"].what
+    teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_BASE_ABSENT)
+    found = examined(double)["driving"]
+    assert (found.verdict, found.remedy) == (Verdict.NOTE, "Type on the robot: robot-drive doctor")
+    teleop.stop.stop_id, teleop.stop.by = 7, "ben"
+    assert "reset-stop 7" in examined(double)["driving"].remedy
+    teleop.Clear()
+    teleop.state = states.TELEOP_DISABLED
+    assert "disabled" in examined(double)["driving"].what

@@ -30,16 +30,16 @@ def test_a_healthy_robot(message: overlay_pb2.OverlaySnapshot) -> None:
     rows = by_label(view(message))
     assert list(rows) == ["Motion", "Vision", "Objects", "Battery"]
     assert rows["Motion"] == Row(
-        "Motion", "fresh", SeverityStyle.GOOD, "0.50\u00a0m/s, turning\u00a0+0.30\u00a0rad/s", "12 ms"
-    )
+        "Motion", "fresh", SeverityStyle.GOOD, "0.50\u00a0m/s, turning\u00a0+0.30\u00a0rad/s", ""
+    ), "no age in milliseconds while all is well"
     assert rows["Vision"].text == "29.5\u00a0fps, inference\u00a012.5\u00a0ms"
     assert rows["Battery"].text == "78\u00a0%"
     assert (rows["Objects"].mark, rows["Objects"].style) == ("no data", SeverityStyle.QUIET)
 
 
 def test_ages_count_on_and_fresh_values_become_stale(message: overlay_pb2.OverlaySnapshot) -> None:
-    later = replace(view(message), silent_ms=988)
-    assert (by_label(later)["Motion"].mark, by_label(later)["Motion"].age) == ("fresh", "1.0 s")
+    later = replace(view(message), silent_ms=1988)
+    assert (by_label(later)["Motion"].mark, by_label(later)["Motion"].age) == ("fresh", "2.0 s")
     outdated = by_label(replace(later, outdated=True))
     assert {row.mark for row in outdated.values()} == {"STALE", "no data"}
     assert outdated["Motion"].style is SeverityStyle.WARNING

@@ -72,8 +72,11 @@ def test_no_file_is_an_empty_book(path: Path) -> None:
         ("a = " + "[" * 3000, "not TOML"),
         ("a = " + "9" * 5000, "not TOML"),
         ('default = ["lab1"]', "is not one of its robots"),
-        ("defualt = 'lab1'", "unknown key 'defualt'. Allowed: default, robots"),
-        ("[robots.lab1]\ntarget = 'a'\ntoken = 'x'", "unknown key 'robots.lab1.token'. Allowed: target, ca_"),
+        ("defualt = 'lab1'", "unknown key 'defualt'. Did you mean 'default'? Allowed: default, robots"),
+        (
+            "[robots.lab1]\ntarget = 'a'\ntoken = 'x'",
+            "unknown key 'robots.lab1.token'. Did you mean 'token_file'? Allowed: ",
+        ),
         ("robots = 3", "'robots' is not a table"),
         ("[robots]\nlab1 = 'a:1'", "'robots.lab1' is not a table"),
         ("[robots.lab1]", "robots.lab1 has no target"),

@@ -1,9 +1,9 @@
 import json
 import math
 
-from console.cli.json_form import json_form
 from console.client.mapping.methods import GET_SYSTEM_STATUS
 from console.client.results import PreviewState
+from console.presentation.json_form import json_form
 from tests.support.gateway_double import healthy_status
 
 

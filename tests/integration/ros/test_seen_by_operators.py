@@ -215,7 +215,7 @@ def single(number: float) -> float:
     return float(struct.unpack("f", struct.pack("f", number))[0])
 
 
-def test_a_mismatch_is_told_in_words_without_ros_names(talker: Talker, tmp_path: Path) -> None:
+def test_a_mismatch_is_reported_in_words_without_ros_names(talker: Talker, tmp_path: Path) -> None:
     sources = [
         {
             **source.model_dump(mode="json", exclude_none=True),

@@ -1,0 +1,276 @@
+"""robotctl drive: drives the robot by the keys of this terminal, within sight of it."""
+
+import asyncio
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Final
+
+import typer
+
+from common.errors import UserError
+from common.version import project_version
+from console.cli import drive_keys
+from console.cli.drive_keys import Action, Hands
+from console.cli.keyboard import Keyboard, has_keyboard
+from console.cli.session import Session, print_json, with_session
+from console.client import (
+    AsyncGatewayClient,
+    DriveOptions,
+    DrivePhase,
+    DriveSession,
+    DriveState,
+    GatewayError,
+    Supervision,
+)
+from console.client.results import TeleopState
+from console.presentation.json_form import json_form
+
+_TICK_S: Final = 0.02
+_DRAW_EVERY: Final = 10
+"""Ticks between two lines on the terminal."""
+_ANSWER_WITHIN_S: Final = 0.2
+"""How long a terminal may take to say which keyboard protocol it speaks."""
+
+TakeOverOption = Annotated[
+    bool,
+    typer.Option("--take-over", help="Take the lease from another driver, who has not held for 2 s."),
+]
+EnableOption = Annotated[bool, typer.Option("--enable", help="Enable driving first, for all.")]
+SpeedOption = Annotated[
+    float | None,
+    typer.Option("--speed", min=0.01, max=5, metavar="M/S", help="Speed.", show_default="what is permitted"),
+]
+TurnOption = Annotated[
+    float | None,
+    typer.Option(
+        "--turn", min=0.01, max=10, metavar="RAD/S", help="Turning rate.", show_default="what is permitted"
+    ),
+]
+
+
+@with_session
+def drive(
+    session: Session,
+    *,
+    take_over: TakeOverOption = False,
+    enable: EnableOption = False,
+    speed: SpeedOption = None,
+    turn: TurnOption = None,
+) -> None:
+    """Drive the robot by the keyboard, with your own eyes on it, where the robot permits that.
+
+    w s or the arrows: forward, back. a d or the arrows: turn. q e: sideways. Space stops the robot until r
+    resets that. x, Esc or Ctrl-C: end. The robot moves while a key is down; where the terminal does not
+    report releases, for 0.3 s after each press.
+    """
+    asyncio.run(_drive(session, take_over=take_over, enable=enable, speeds=(speed, turn)))
+
+
+async def _drive(
+    session: Session, *, take_over: bool, enable: bool, speeds: tuple[float | None, float | None]
+) -> None:
+    options = DriveOptions(
+        take_over=take_over,
+        supervision=Supervision.LINE_OF_SIGHT,
+        input_device="keyboard",
+        client_name=f"robotctl {project_version()}",
+    )
+    async with session.connect_async() as client:
+        if (await client.status()).teleop.state is TeleopState.UNKNOWN:
+            raise UserError("this robot is not set up for driving", "See docs/driving.md")
+        if not has_keyboard():
+            raise UserError("driving needs a terminal to type in", "Type the command in a terminal")
+        if enable:
+            answer = await client.set_driving_enabled(True)
+            if not answer.accepted:
+                raise UserError(f"the robot refused: {answer.message}")
+        async with client.drive(options) as driving:
+            await _Cockpit(session, client, driving, speeds).run()
+
+
+class _Cockpit:
+    """The keyboard, the session and the line on the terminal."""
+
+    def __init__(
+        self,
+        session: Session,
+        client: AsyncGatewayClient,
+        driving: DriveSession,
+        speeds: tuple[float | None, float | None],
+    ) -> None:
+        limits = driving.limits
+        assert limits is not None, "it is open"  # noqa: S101  # the session has them from its opening
+        self._session = session
+        self._client = client
+        self._driving = driving
+        self._speed_mps = speeds[0] or limits.line_of_sight_mps
+        self._turn_rad_s = speeds[1] or limits.line_of_sight_rad_s
+        self._shown: object = None
+        self._note = ""
+        self._begun = False
+        """Whether the robot was ready once: a key that is down before would be a hold without a beginning."""
+        self._calls: set[asyncio.Task[None]] = set()
+        self._ending = False
+
+    async def run(self) -> None:
+        """Drives until a key ends it.
+
+        Raises:
+            GatewayError: The session has ended.
+        """
+        keyboard = Keyboard()
+        keyboard.take()
+        try:
+            releases = await _reports_releases(keyboard)
+            hands = Hands(releases=releases)
+            with self._until_signalled(), _reading(keyboard, self._take, hands), _modes(releases):
+                ticks = 0
+                while not self._ending:
+                    self._driving.check()
+                    self._hold(hands)
+                    if ticks % _DRAW_EVERY == 0:
+                        self._show()
+                    ticks += 1
+                    await asyncio.sleep(_TICK_S)
+        finally:
+            self._driving.release()
+            keyboard.give_back()
+            for call in self._calls:
+                call.cancel()
+            if not self._session.as_json:
+                print(file=self._session.out.file)
+
+    @contextmanager
+    def _until_signalled(self) -> Iterator[None]:
+        """Has SIGINT, SIGTERM and SIGHUP end the driving in order while the block lasts."""
+        loop, numbers = asyncio.get_running_loop(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        for number in numbers:
+            loop.add_signal_handler(number, self._end)
+        try:
+            yield
+        finally:
+            for number in numbers:
+                loop.remove_signal_handler(number)
+
+    def _end(self) -> None:
+        self._ending = True
+
+    def _take(self, typed: str | None, hands: Hands) -> None:
+        if typed is None:
+            hands.release()
+            self._ending = True
+            return
+        for action in hands.take(typed, time.monotonic()):
+            match action:
+                case Action.QUIT:
+                    self._ending = True
+                case Action.STOP:
+                    hands.release()
+                    self._call(self._stop())
+                case Action.RESET:
+                    self._call(self._reset())
+        self._hold(hands)
+
+    def _hold(self, hands: Hands) -> None:
+        self._begun = self._begun or self._driving.is_ready
+        parts = hands.velocity(time.monotonic())
+        if parts is None or not self._begun:
+            self._driving.release()
+            return
+        forward, left, turn = parts
+        self._driving.hold(forward * self._speed_mps, left * self._speed_mps, turn * self._turn_rad_s)
+
+    def _call(self, call: Any) -> None:
+        task = asyncio.create_task(call)
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
+    async def _stop(self) -> None:
+        try:
+            self._note = (await self._client.stop_robot("by the driver's keyboard")).message
+        except GatewayError as error:
+            self._note = str(error)
+
+    async def _reset(self) -> None:
+        state = self._driving.state
+        if state is None or state.stop is None:
+            return
+        try:
+            self._note = (await self._client.reset_stop(state.stop.stop_id)).message
+        except GatewayError as error:
+            self._note = str(error)
+
+    def _show(self) -> None:
+        state = self._driving.state
+        if state is None:
+            return
+        if self._session.as_json:
+            key = state.phase, state.inhibits, state.stop and state.stop.stop_id
+            if key != self._shown:
+                self._shown = key
+                print_json(self._session.out, json_form(state), on_one_line=True)
+            return
+        line = _line(state, self._driving, self._note) if self._begun else self._driving.reasons()
+        if line != self._shown:
+            self._shown = line
+            width = self._session.out.width - 1
+            print(f"\r\x1b[2K{line[:width]}", end="", file=self._session.out.file, flush=True)
+
+
+def _line(state: DriveState, driving: DriveSession, note: str) -> str:
+    speeds = f"{state.vx_mps:+.2f} {state.vy_mps:+.2f} m/s {state.wz_rad_s:+.2f} rad/s"
+    moves = state.phase in {DrivePhase.ARMED, DrivePhase.DRIVING, DrivePhase.STOPPING} and not state.inhibits
+    words = (note if moves else driving.reasons()) or "hold w a s d to drive, space stops, x ends"
+    return f"{state.phase.value}  {speeds}  {words}"
+
+
+async def _reports_releases(keyboard: Keyboard) -> bool:
+    """Returns whether the terminal reports releases, as far as it says so in time."""
+    print(drive_keys.ASK_FOR_RELEASES, end="", file=sys.stderr, flush=True)
+    answer, loop = "", asyncio.get_running_loop()
+    until_s = loop.time() + _ANSWER_WITHIN_S
+    while (found := drive_keys.reports_releases(answer)) is None and loop.time() < until_s:
+        readable = loop.create_future()
+        loop.add_reader(keyboard.fileno, _wake, readable)
+        try:
+            async with asyncio.timeout_at(until_s):
+                await readable
+        except TimeoutError:
+            break
+        finally:
+            loop.remove_reader(keyboard.fileno)
+        answer += keyboard.typed() or ""
+    return bool(found)
+
+
+def _wake(readable: "asyncio.Future[None]") -> None:
+    if not readable.done():
+        readable.set_result(None)
+
+
+@contextmanager
+def _reading(keyboard: Keyboard, take: Any, hands: Hands) -> Iterator[None]:
+    loop = asyncio.get_running_loop()
+    loop.add_reader(keyboard.fileno, lambda: take(keyboard.typed(), hands))
+    try:
+        yield
+    finally:
+        loop.remove_reader(keyboard.fileno)
+
+
+@contextmanager
+def _modes(releases: bool) -> Iterator[None]:
+    """Has the terminal report releases, where it can, and its focus, while the block lasts.
+
+    On standard error, which is the terminal also where standard output is a file.
+    """
+    begin = drive_keys.BEGIN if releases else drive_keys.FOCUS_BEGIN
+    print(begin, end="", file=sys.stderr, flush=True)
+    try:
+        yield
+    finally:
+        end = drive_keys.END if releases else drive_keys.FOCUS_END
+        print(end, end="", file=sys.stderr, flush=True)

@@ -1,0 +1,423 @@
+"""A driver's session: hold to run, over two lanes, and no way to forget the stop.
+
+Commands go out 50 times a second, whether the driver holds or not, each on two connections; the copy that
+arrives first counts. Each says until when it is valid on the robot's clock: the newest instant that the robot
+has sent, plus the time since it arrived, plus 250 ms. So a command that was held up on its way moves nothing,
+whatever the two clocks show.
+"""
+
+import asyncio
+import contextlib
+import math
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Final, Self, TypeAlias
+
+from common.backoff import Backoff
+from common.broadcast import Broadcast
+from common.version import project_version
+from console.client.errors import GatewayError, GatewayFailed, Refused, Unreachable
+from console.client.mapping.driving import DriveCommand, command_request, join_request, open_request
+from console.client.mapping.methods import DRIVE
+from console.client.results import (
+    DriveInhibit,
+    DriveLimits,
+    DriveOpened,
+    DrivePhase,
+    DriveState,
+    Supervision,
+)
+from console.client.transport import Duplex, GrpcTransport
+
+HOLD_COUNTS_S: Final = 0.1
+"""A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs."""
+VALID_S: Final = 0.25
+"""Longest validity of a command after the echoed instant has arrived."""
+COMMANDS_PER_S: Final = 50
+MAX_UNACKNOWLEDGED: Final = 10
+"""Commands on their way on one lane; what would queue behind them is too old to count."""
+LANES: Final = 2
+_FAREWELL_S: Final = 0.3
+"""How long the end of a session waits for its last release to arrive."""
+_FIRST_PAUSE_S: Final = 0.1
+_LONGEST_PAUSE_S: Final = 1.0
+_REJOINS: Final = 3
+_NS_PER_S: Final = 1_000_000_000
+
+
+_Lane: TypeAlias = Duplex[DriveOpened | DriveState | None]
+
+
+@dataclass(frozen=True, slots=True)
+class DriveOptions:
+    """How a session is opened.
+
+    Attributes:
+        take_over: Whether to take the lease from another driver.
+        supervision: How the driver sees the robot.
+        picture: Returns when the picture that the driver sees now was captured, in ns of the robot's
+            monotonic clock; None without one. Called 50 times a second in the session's loop; must not wait.
+        input_device: What the driver steers with, for the robot's audit log.
+        client_name: The driver's program, for the same.
+    """
+
+    take_over: bool = False
+    supervision: Supervision = Supervision.PICTURE
+    picture: Callable[[], int | None] | None = None
+    input_device: str = "program"
+    client_name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Hold:
+    vx_mps: float
+    vy_mps: float
+    wz_rad_s: float
+    at_s: float
+
+
+class DriveSession:
+    """A lease and its lanes, while the `async with` block lasts; its end is a release.
+
+    `hold` and `release` may be called from any thread, all else in the session's loop.
+
+    Args:
+        connect: Opens a connection for one lane.
+        options: How to open the session.
+        opens_within_s: Deadline of the opening.
+
+    Attributes:
+        limits: What the robot accepts.
+        state: The robot's newest; None before the first.
+    """
+
+    def __init__(
+        self, connect: Callable[[], GrpcTransport], options: DriveOptions, opens_within_s: float
+    ) -> None:
+        self._connect = connect
+        self._options = options
+        self._opens_within_s = opens_within_s
+        self._name = options.client_name or f"robotctl {project_version()}"
+        self._hold: _Hold | None = None
+        self._released = True
+        """Whether a command that is no hold has left since the last hold: only then a new one begins."""
+        self._sequence = 0
+        self._command = b""
+        self._command_holds = False
+        self._armed_at = 0
+        """The newest command when the robot said that it was armed."""
+        self._echo: tuple[int, float] = 0, 0.0
+        """The newest instant of the robot, in ns, and when it arrived here."""
+        self._changes = Broadcast()
+        self._sends = Broadcast()
+        self._session_id = ""
+        self._open_lanes = 0
+        self._ending = False
+        self._error: GatewayError | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.limits: DriveLimits | None = None
+        self.state: DriveState | None = None
+
+    async def __aenter__(self) -> Self:
+        """Opens the session.
+
+        Raises:
+            GatewayError: The robot refuses, or does not answer.
+        """
+        self._loop = asyncio.get_running_loop()
+        try:
+            lane = await self._first_lane()
+        except BaseException:
+            await self._close()
+            raise
+        self._tasks += [
+            asyncio.create_task(self._keep_lane(lane), name="drive lane 1"),
+            *(
+                asyncio.create_task(self._keep_lane(None), name=f"drive lane {number}")
+                for number in range(2, LANES + 1)
+            ),
+            asyncio.create_task(self._send(), name="drive commands"),
+        ]
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Releases, and closes the session when the release is on its way."""
+        self._hold, self._ending = None, True
+        self._make_command()
+        self._sends.notify_all()
+        try:
+            await self._changes.wait_until(lambda: self._open_lanes == 0, _FAREWELL_S)
+        finally:
+            await self._close()
+
+    @property
+    def error(self) -> GatewayError | None:
+        """Why the session has ended; None while it lasts."""
+        return self._error
+
+    @property
+    def open_lanes(self) -> int:
+        """Lanes that are connected."""
+        return self._open_lanes
+
+    def hold(self, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0) -> None:
+        """Holds, with a velocity in the robot's frame; counts for 100 ms, so it has to be repeated.
+
+        Motion begins with a hold after a release, while the robot has no reason not to move. After a reason,
+        or a stop, it takes another release and another hold.
+
+        Raises:
+            ValueError: A velocity is not finite.
+        """
+        if not all(map(math.isfinite, (vx_mps, vy_mps, wz_rad_s))):
+            raise ValueError("a velocity has to be finite")
+        self._hold = _Hold(vx_mps, vy_mps, wz_rad_s, time.monotonic())
+
+    def release(self) -> None:
+        """Releases: the robot stops. Sent at once, and with every command until the next hold."""
+        held, self._hold = self._hold, None
+        if held and self._loop and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._send_now)
+
+    async def hold_for(
+        self, seconds: float, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0
+    ) -> None:
+        """Holds for a time, then releases.
+
+        Raises:
+            GatewayError: The session has ended.
+        """
+        until_s = time.monotonic() + seconds
+        try:
+            while time.monotonic() < until_s:
+                self.check()
+                self.hold(vx_mps, vy_mps, wz_rad_s)
+                await asyncio.sleep(1 / COMMANDS_PER_S)
+        finally:
+            self.release()
+
+    async def ready(self, within_s: float = 2.0) -> DriveState:
+        """Waits until a hold would move the robot, and returns the state then.
+
+        Raises:
+            GatewayError: The session has ended, or the robot has reasons not to move.
+        """
+        await self._changes.wait_until(lambda: self._error is not None or self.is_ready, within_s)
+        self.check()
+        if self.state is None or not self.is_ready:
+            raise Refused(f"the robot does not move: {self.reasons()}", "Remove the reason, then hold again")
+        return self.state
+
+    def reasons(self) -> str:
+        """Returns why the robot does not move, for people."""
+        state = self.state
+        if state is None:
+            return "it has not reported its state yet"
+        if state.stop:
+            why = f": {state.stop.reason}" if state.stop.reason else ""
+            return f"it is stopped by {state.stop.by}{why} (stop {state.stop.stop_id})"
+        words = [*(SENTENCES[each] for each in state.inhibits), *state.problems]
+        return "; ".join(dict.fromkeys(words)) or f"it is {state.phase.value}"
+
+    def check(self) -> None:
+        """Raises the `GatewayError` that has ended the session, if it has ended."""
+        if self._error:
+            raise self._error
+
+    async def states(self) -> AsyncIterator[DriveState]:
+        """Yields the newest state whenever there is one that was not yielded yet.
+
+        Raises:
+            GatewayError: The session has ended.
+        """
+        last: DriveState | None = None
+        while True:
+            await self._changes.wait_until(lambda: self._error is not None or self.state is not last)  # noqa: B023
+            self.check()
+            if self.state and self.state is not last:
+                last = self.state
+                yield last
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a hold would move the robot."""
+        state = self.state
+        if state is None or state.phase is not DrivePhase.ARMED or state.inhibits:
+            return False
+        # A hold begins after a release that the robot has seen since it was armed.
+        return state.newest_sequence > self._armed_at and not self._command_holds
+
+    # --- commands ---
+
+    async def _send(self) -> None:
+        """Makes a command every 20 ms; after a delay of this program it does not make up for missed ones."""
+        due_s = time.monotonic()
+        while True:
+            self._send_now()
+            due_s = max(due_s + 1 / COMMANDS_PER_S, time.monotonic())
+            await asyncio.sleep(due_s - time.monotonic())
+
+    def _send_now(self) -> None:
+        # Without an echo a command would be valid at no time.
+        if not self._ending and self._echo[0]:
+            self._make_command()
+            self._sends.notify_all()
+
+    def _make_command(self) -> None:
+        now_s, hold = time.monotonic(), self._hold
+        if hold and now_s - hold.at_s > HOLD_COUNTS_S:
+            hold = None
+        if hold is None and self._command_holds:
+            self._released = False
+        if hold and not self._command_holds and not self._released:
+            # The release before it has not left yet; without it this would be the same hold, going on.
+            hold = None
+        self._sequence += 1
+        self._command_holds = hold is not None
+        echo_ns, echo_at_s = self._echo
+        valid_until_ns = echo_ns + int((now_s - echo_at_s + VALID_S) * _NS_PER_S)
+        self._command = command_request(
+            DriveCommand(
+                sequence=self._sequence,
+                held=hold is not None,
+                vx_mps=hold.vx_mps if hold else 0.0,
+                vy_mps=hold.vy_mps if hold else 0.0,
+                wz_rad_s=hold.wz_rad_s if hold else 0.0,
+                echo_monotonic_ns=echo_ns,
+                picture_monotonic_ns=self._picture_ns(),
+                valid_until_monotonic_ns=valid_until_ns,
+                input_device=self._options.input_device,
+            )
+        )
+
+    def _picture_ns(self) -> int:
+        return (self._options.picture() or 0) if self._options.picture else 0
+
+    # --- lanes ---
+
+    async def _first_lane(self) -> tuple[GrpcTransport, _Lane]:
+        options = self._options
+        opening = open_request(self._name, options.supervision, take_over=options.take_over)
+        return await self._open_lane(opening)
+
+    async def _open_lane(self, opening: bytes) -> tuple[GrpcTransport, _Lane]:
+        transport = self._connect()
+        try:
+            async with asyncio.timeout(self._opens_within_s):
+                lane = transport.open_both_ways(DRIVE)
+                await lane.write(opening)
+                opened = await lane.read()
+        except TimeoutError:
+            await transport.close()
+            raise Unreachable(f"no lane was opened within {self._opens_within_s:g} s") from None
+        except BaseException:
+            await transport.close()
+            raise
+        if isinstance(opened, DriveOpened):
+            self._session_id, self.limits = opened.session_id, opened.limits
+        return transport, lane
+
+    async def _keep_lane(self, opened: tuple[GrpcTransport, _Lane] | None) -> None:
+        """Keeps one lane open as long as another is: the last one's end is the session's."""
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        while not self._ending and self._error is None:
+            try:
+                transport, lane = opened or await self._open_lane(join_request(self._name, self._session_id))
+                backoff.reset()
+                await self._serve_lane(transport, lane)
+            except GatewayError as error:
+                # Where the gateway ends a call while a command is written, gRPC's asyncio client makes up an
+                # internal error. To join the session again has the gateway say why, if it is over.
+                made_up = isinstance(error, GatewayFailed) and backoff.failures < _REJOINS
+                if isinstance(error, Refused) or (self._open_lanes == 0 and not made_up):
+                    self._lose(error)
+                    return
+            opened = None
+            await asyncio.sleep(backoff.next_s())
+
+    async def _serve_lane(self, transport: GrpcTransport, lane: _Lane) -> None:
+        """Writes commands and reads states.
+
+        Raises:
+            GatewayError: The lane has ended.
+        """
+        acknowledged = _Acknowledged()
+        self._open_lanes += 1
+        writer = asyncio.create_task(self._write(lane, acknowledged), name="drive lane, commands")
+        try:
+            while True:
+                item = await lane.read()
+                if isinstance(item, DriveState):
+                    acknowledged.sequence = item.newest_sequence
+                    self._take(item)
+        finally:
+            self._open_lanes -= 1
+            writer.cancel()
+            await asyncio.gather(writer, return_exceptions=True)
+            lane.cancel()
+            await transport.close()
+            self._changes.notify_all()
+
+    async def _write(self, lane: _Lane, acknowledged: "_Acknowledged") -> None:
+        """Writes the newest command whenever there is a new one; those in between are skipped."""
+        written = 0
+        while True:
+            await self._sends.wait_until(lambda: self._sequence > written)  # noqa: B023  # read at once
+            written, holds, last = self._sequence, self._command_holds, self._ending
+            if written - acknowledged.sequence > MAX_UNACKNOWLEDGED and acknowledged.sequence and not last:
+                continue
+            with contextlib.suppress(GatewayError):  # The reader finds out why the lane has ended.
+                await lane.write(self._command)
+                self._released = self._released or not holds
+                if last:
+                    await lane.finish()
+                    return
+
+    def _take(self, state: DriveState) -> None:
+        if state.monotonic_ns <= self._echo[0]:
+            return  # The other lane was faster.
+        self._echo = state.monotonic_ns, time.monotonic()
+        if self.state is None or self.state.phase is not DrivePhase.ARMED:
+            self._armed_at = self._sequence
+        self.state = state
+        self._changes.notify_all()
+
+    def _lose(self, error: GatewayError) -> None:
+        if self._error is None and not self._ending:
+            self._error, self._hold = error, None
+        self._changes.notify_all()
+
+    async def _close(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+
+@dataclass(slots=True)
+class _Acknowledged:
+    """The newest command that the robot has confirmed on one lane."""
+
+    sequence: int = 0
+
+
+SENTENCES: Final = {
+    DriveInhibit.UNKNOWN: "the robot gives a reason that this program does not know",
+    DriveInhibit.COMMAND_LATE: "commands arrive too late",
+    DriveInhibit.LOOP_LATE: "the robot's states arrive too late",
+    DriveInhibit.PICTURE_MISSING: "there is no picture",
+    DriveInhibit.PICTURE_STALE: "the picture is too old",
+    DriveInhibit.ROBOT_STOP: "the robot's own stop is active",
+    DriveInhibit.BASE_ABSENT: "nothing on the robot takes the velocity commands",
+    DriveInhibit.OUTRANKED: "another source of commands has priority on the robot",
+    DriveInhibit.DRIVE_LOST: "the robot's drive program does not answer",
+    DriveInhibit.ACCESS_ENDED: "the driver's access has ended",
+}
+"""Each reason for people. Total: a test checks it."""

@@ -1,0 +1,141 @@
+"""Texts of the bar above the picture: health, battery, link, age of the picture, mode, time. Pure."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from console.client.results import FaultSeverity, Freshness, Sample
+from console.monitor.link import LinkState, LinkText
+from console.monitor.monitor_state import MonitorState
+from console.presentation.formatting import UNKNOWN, joined, plural, quantity
+from console.presentation.picture_age import PictureAge
+from console.presentation.severity_style import HEALTH_STYLES, SeverityStyle
+from console.presentation.status_table import health_summary
+from console.presentation.value_style import (
+    LOSS_PERCENT,
+    PICTURE_AGE_MS,
+    ROUND_TRIP_MS,
+    WIFI_DBM,
+    of_battery,
+    worst,
+)
+
+_COUNTED: Final = (FaultSeverity.ERROR, FaultSeverity.WARNING)
+
+
+@dataclass(frozen=True, slots=True)
+class BarItem:
+    """One item of the bar.
+
+    Args:
+        word: the value.
+        detail: the line below it.
+        style: how good the value is.
+        tip: the whole text; empty where word and detail say all.
+    """
+
+    word: str
+    detail: str
+    style: SeverityStyle = SeverityStyle.QUIET
+    tip: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryItem(BarItem):
+    """The item of the battery.
+
+    Args:
+        charge_percent: what the gauge shows; None while it is unknown.
+    """
+
+    charge_percent: float | None = None
+
+
+def health_item(state: MonitorState, now_s: float) -> BarItem:
+    """Returns the health with the counts of errors and warnings."""
+    if state.snapshot is None:
+        return BarItem("not known", "no status yet")
+    status, health = state.snapshot.status, state.snapshot.status.health
+    summary = health_summary(status)
+    if state.outdated(now_s):
+        return BarItem("not known", joined(f"last known: {health.state.value.upper()}", summary))
+    severities = [fault.severity for fault in status.faults if fault.active]
+    counts = joined(
+        *(plural(number, severity.value) for severity in _COUNTED if (number := severities.count(severity)))
+    )
+    detail = joined(counts, health.summary)
+    return BarItem(health.state.value.upper(), detail, HEALTH_STYLES[health.state], summary)
+
+
+def battery_item(state: MonitorState, now_s: float) -> BatteryItem:
+    """Returns the charge of the traction battery."""
+    if state.snapshot is None:
+        return BatteryItem(UNKNOWN, "battery")
+    battery = state.snapshot.status.platform.power.lipo_battery
+    charge = battery.charge_percent if battery.available else None
+    if not battery.available or battery.present is False:
+        return BatteryItem(UNKNOWN, "no battery")
+    found = of_battery(battery)
+    word = quantity(charge, "%", 0)
+    if _is_stale(battery, state, now_s):
+        return BatteryItem(word, "STALE", SeverityStyle.WARNING, charge_percent=charge)
+    charging = "charging" if battery.charging else ""
+    voltage = "" if battery.voltage_v is None else quantity(battery.voltage_v, "V")
+    detail = joined(found.word, charging, voltage) or "battery"
+    return BatteryItem(word, detail, found.style, charge_percent=charge)
+
+
+def link_item(state: MonitorState, link: LinkText, now_s: float) -> BarItem:
+    """Returns the connection's state; while connected with round trip, loss of the video, and Wi-Fi."""
+    if state.link.state is not LinkState.CONNECTED or state.snapshot is None:
+        return BarItem(link.mark, link.detail, link.style)
+    status = state.snapshot.status
+    measured, network = status.preview.measured, status.platform.network
+    loss = None if _is_stale(measured, state, now_s) else measured.worst_loss_percent
+    signal = None if _is_stale(network, state, now_s) else network.wifi_signal_dbm
+    found = worst(
+        (ROUND_TRIP_MS.judge(state.link.answer_ms), LOSS_PERCENT.judge(loss), WIFI_DBM.judge(signal))
+    )
+    parts = (
+        found.word,
+        quantity(state.link.answer_ms, "ms", 0),
+        "" if loss is None else f"loss {quantity(loss, '%')}",
+        "" if signal is None else f"Wi-Fi {signal} dBm",
+    )
+    tip = f"{link.mark}: round trip to the gateway, packet loss of the video, signal of the robot's Wi-Fi"
+    return BarItem(link.mark, " \u00b7 ".join(filter(None, parts)), found.style, tip)
+
+
+def picture_item(age: PictureAge | None, frozen_s: float | None) -> BarItem:
+    """Returns the age of the picture on the screen.
+
+    Args:
+        age: the reading; None without one.
+        frozen_s: how long the picture has been frozen; None while it is live, or without a picture.
+    """
+    if frozen_s is not None:
+        return BarItem(f"> {quantity(frozen_s, 's')}", "picture frozen", SeverityStyle.BAD)
+    if age is None:
+        return BarItem(UNKNOWN, "picture age")
+    found = PICTURE_AGE_MS.judge(age.age_ms)
+    error = "" if age.error_ms is None else f" \u00b1 {age.error_ms:.0f}"
+    detail = joined(found.word, "picture age")
+    return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, age.cause)
+
+
+def mode_item(state: MonitorState) -> BarItem:
+    """Returns the robot's mode; a mode that is published on change only stays valid when stale."""
+    mode = state.snapshot.status.mission.mode if state.snapshot else None
+    return BarItem(mode or UNKNOWN, "mode")
+
+
+def clock_item(clock: Callable[[], datetime] = lambda: datetime.now().astimezone()) -> BarItem:
+    """Returns this computer's time and its zone."""
+    now = clock()
+    offset = f"{now:%z}"
+    return BarItem(f"{now:%H:%M:%S}", f"UTC{offset[:3]}:{offset[3:5]}")
+
+
+def _is_stale(sample: Sample, state: MonitorState, now_s: float) -> bool:
+    return sample.freshness is Freshness.STALE or state.outdated(now_s)

@@ -1,0 +1,102 @@
+"""How good the values of a part are: a fresh value may still be a bad one.
+
+The limits are the defaults of the gateway's fault rules (docs/configuration.md, `faults`) where it has one,
+so that a value and its fault agree; beyond `bad` an operator should act at once.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from console.client import results
+from console.presentation.severity_style import SeverityStyle
+
+
+class Judgement(NamedTuple):
+    """A style, and the word for it; the word is empty for good values."""
+
+    style: SeverityStyle
+    word: str
+
+
+GOOD: Final = Judgement(SeverityStyle.GOOD, "")
+_ORDER: Final = (SeverityStyle.QUIET, SeverityStyle.GOOD, SeverityStyle.WARNING, SeverityStyle.BAD)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits of one figure; where `bad` is below `warning`, low values are the bad ones.
+
+    Args:
+        warning: from here on a value is a warning.
+        bad: from here on it is an error.
+        word: says which way it is off.
+    """
+
+    warning: float
+    bad: float
+    word: str
+
+    def judge(self, value: float | None) -> Judgement:
+        """Returns the judgement of a value; an unknown one is not worse than any other."""
+        if value is None:
+            return GOOD
+        sign = -1 if self.bad < self.warning else 1
+        if sign * value >= sign * self.bad:
+            return Judgement(SeverityStyle.BAD, self.word)
+        if sign * value >= sign * self.warning:
+            return Judgement(SeverityStyle.WARNING, self.word)
+        return GOOD
+
+
+CHARGE_PERCENT: Final = Limits(20, 10, "LOW")
+TEMPERATURE_C: Final = Limits(85, 95, "HOT")
+CPU_PERCENT: Final = Limits(95, 101, "BUSY")
+MEMORY_PERCENT: Final = Limits(92, 97, "FULL")
+DISK_PERCENT: Final = Limits(95, 98, "FULL")
+WIFI_DBM: Final = Limits(-75, -85, "WEAK")
+LOSS_PERCENT: Final = Limits(2, 10, "LOSSY")
+ROUND_TRIP_MS: Final = Limits(150, 400, "SLOW")
+PICTURE_AGE_MS: Final = Limits(400, 1000, "LATE")
+
+
+def worst(judgements: Iterable[Judgement]) -> Judgement:
+    """Returns the most severe one, the first of equals."""
+    return max(judgements, key=lambda one: _ORDER.index(one.style))
+
+
+def of_battery(battery: results.Battery) -> Judgement:
+    """Judges the charge; one that is being charged is at most a warning."""
+    if battery.present is False:
+        return Judgement(SeverityStyle.QUIET, "")
+    found = CHARGE_PERCENT.judge(battery.charge_percent)
+    if battery.charging and found.style is SeverityStyle.BAD:
+        return Judgement(SeverityStyle.WARNING, found.word)
+    return found
+
+
+def of_compute(compute: results.Compute) -> Judgement:
+    """Judges load, temperature, memory and disk."""
+    return worst(
+        (
+            Judgement(SeverityStyle.WARNING, "HOT") if compute.thermal_throttled else GOOD,
+            TEMPERATURE_C.judge(compute.cpu_temperature_c),
+            MEMORY_PERCENT.judge(compute.ram_used_percent),
+            DISK_PERCENT.judge(compute.disk_used_percent),
+            CPU_PERCENT.judge(compute.cpu_percent),
+        )
+    )
+
+
+def of_network(network: results.Network) -> Judgement:
+    """Judges the connection and the strength of the signal."""
+    if network.connected is False:
+        return Judgement(SeverityStyle.BAD, "DOWN")
+    return WIFI_DBM.judge(network.wifi_signal_dbm)
+
+
+def of_video(measured: results.PreviewMeasurement) -> Judgement:
+    """Judges loss and round trip of the worst viewer."""
+    return worst(
+        (LOSS_PERCENT.judge(measured.worst_loss_percent), ROUND_TRIP_MS.judge(measured.worst_rtt_ms))
+    )

@@ -1,0 +1,155 @@
+"""Measures the age of the pictures that a viewer shows."""
+
+import secrets
+import statistics
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import takewhile
+from typing import Final
+
+from console.client import Offset, PictureDelivery, PictureReport, PreviewStatus
+from console.receiver.delivery import Delivery, DeliveryChoice
+from console.receiver.frame import Frame
+from console.viewer.picture_reading import AgeCause, PictureReading, ShownPicture, age_now_ms, reading
+
+_KEPT: Final = 3600
+"""Pictures: a minute at 60 frames/s."""
+HISTORY_SLOTS: Final = 120
+SLOT_S: Final = 0.5
+_LONGEST_MS: Final = 60_000
+"""The robot takes no larger age or round trip."""
+_PERCENTILES: Final = 20
+_MS_PER_S: Final = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgeSummary:
+    """Ages of the last pictures, at most 3600, from capture to the screen; without one, to the decoder.
+
+    Args:
+        median_ms: half of them were younger.
+        p95_ms: 95 % of them were younger.
+        worst_ms: the oldest.
+        error_ms: bound of the error of all ages.
+        cause: why the last picture was older than 150 ms; None if it was not.
+    """
+
+    median_ms: float
+    p95_ms: float
+    worst_ms: float
+    error_ms: float
+    cause: AgeCause | None
+
+
+class PictureMeter:
+    """Notes every picture when it is shown. Thread-safe; nothing here blocks.
+
+    Args:
+        clock_offset: returns the offset of the robot's clock; None while it is not known.
+        delivery: returns how packets are delivered.
+        preview: returns the robot's latest status; None before the first.
+    """
+
+    def __init__(
+        self,
+        clock_offset: Callable[[], Offset | None],
+        delivery: Callable[[], Delivery | None] = lambda: None,
+        preview: Callable[[], PreviewStatus | None] = lambda: None,
+    ) -> None:
+        self._clock_offset = clock_offset
+        self._delivery = delivery
+        self._preview = preview
+        self._viewer_id = secrets.token_hex(4)
+        self._lock = threading.Lock()
+        self._shown: deque[ShownPicture] = deque(maxlen=_KEPT)
+        self._reported_s = 0.0
+
+    def robot_now_ns(self) -> int | None:
+        """Returns the estimate of the robot's monotonic clock; None while there is none."""
+        offset = self._clock_offset()
+        return None if offset is None else round((time.monotonic() + offset.seconds) * 1e9)
+
+    def shown(self, frame: Frame) -> None:
+        """Notes that a frame has just been shown for the first time."""
+        offset, now_s = self._clock_offset(), time.monotonic()
+        if frame.capture_ns is None or offset is None:
+            return
+        age_ms = (now_s + offset.seconds) * _MS_PER_S - frame.capture_ns / 1e6
+        own_ms = None if frame.received_s is None else (now_s - frame.received_s) * _MS_PER_S
+        picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms)
+        with self._lock:
+            self._shown.append(picture)
+
+    def forget(self) -> None:
+        """Notes that no picture is on the screen any more."""
+        with self._lock:
+            self._shown.clear()
+
+    def reading(self) -> PictureReading:
+        """Returns the reading of this moment."""
+        return reading(self.latest(), self._delivery(), self._preview(), time.monotonic())
+
+    def latest(self) -> ShownPicture | None:
+        """Returns the latest picture of known age; None when none is on the screen."""
+        with self._lock:
+            return self._shown[-1] if self._shown else None
+
+    def history(self) -> list[float | None]:
+        """Returns the largest age in each half second of the last minute, the newest last.
+
+        None stands for half a second without a new picture.
+        """
+        newest = int(time.monotonic() / SLOT_S)
+        worst: list[float | None] = [None] * HISTORY_SLOTS
+        for picture in self._pictures():
+            slot = HISTORY_SLOTS - 1 - newest + int(picture.at_s / SLOT_S)
+            if 0 <= slot < HISTORY_SLOTS:
+                worst[slot] = max(worst[slot] or 0.0, picture.age_ms)
+        return worst
+
+    def summary(self) -> AgeSummary | None:
+        """Returns the ages of the last pictures; None without one of known age."""
+        pictures = self._pictures()
+        if not pictures:
+            return None
+        ages_ms = [picture.age_ms for picture in pictures]
+        # Of one value there are no percentiles but itself.
+        p95_ms = statistics.quantiles(ages_ms * 2, n=_PERCENTILES, method="inclusive")[-1]
+        last = pictures[-1]
+        return AgeSummary(
+            median_ms=round(statistics.median(ages_ms), 1),
+            p95_ms=round(p95_ms, 1),
+            worst_ms=round(max(ages_ms), 1),
+            error_ms=round(max(picture.error_ms for picture in pictures), 2),
+            cause=reading(last, self._delivery(), self._preview(), last.at_s).cause,
+        )
+
+    def report(self) -> PictureReport | None:
+        """Returns the worst age since the last report; None without a picture of known age."""
+        now_s = time.monotonic()
+        since_s, self._reported_s = self._reported_s, now_s
+        pictures = self._pictures()
+        if not pictures:
+            return None
+        ages_ms = [age_now_ms(pictures[-1], now_s)]
+        ages_ms += [each.age_ms for each in takewhile(lambda each: each.at_s > since_s, reversed(pictures))]
+        delivery = self._delivery()
+        rtt_ms = delivery.rtt_ms if delivery else None
+        direct = delivery is not None and delivery.kind is DeliveryChoice.DIRECT
+        return PictureReport(
+            viewer_id=self._viewer_id,
+            picture_age_ms=min(_LONGEST_MS, round(max(ages_ms))),
+            picture_age_error_ms=min(_LONGEST_MS, round(pictures[-1].error_ms)),
+            rtt_ms=None if rtt_ms is None else min(_LONGEST_MS, round(rtt_ms)),
+            loss_percent=delivery.loss_percent if delivery else None,
+            packets_held=delivery.waited if delivery else 0,
+            packets_given_up=delivery.given_up if delivery else 0,
+            delivery=PictureDelivery.DIRECT if direct else PictureDelivery.SRT_LATENCY,
+        )
+
+    def _pictures(self) -> tuple[ShownPicture, ...]:
+        with self._lock:
+            return tuple(self._shown)

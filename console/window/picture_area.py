@@ -1,0 +1,94 @@
+"""The picture, edge to edge, with what lies over it: gauges, trail, messages, connection banner, keys."""
+
+from typing import Final
+
+from PySide6.QtCore import QEvent, QRect, Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from console.monitor.motion import Motion
+from console.monitor.trail import Trail
+from console.window.connection_banner import ConnectionBanner
+from console.window.gauge import Gauge
+from console.window.key_help import KeyHelp
+from console.window.layout import fill
+from console.window.theme import COCKPIT
+from console.window.toasts import Toasts
+from console.window.trail_view import TrailView
+from console.window.video_view import VideoView
+
+_EDGE_PX: Final = 8
+_GAUGE_SHARE: Final = 1 / 6
+_SMALLEST_GAUGE_PX: Final = 64
+_LARGEST_GAUGE_PX: Final = 140
+_WIDEST_MESSAGE_PX: Final = 560
+
+
+class PictureArea(QWidget):
+    """Places everything by the picture itself, not by its letterbox. The upper left corner is reserved.
+
+    Args:
+        video: the picture.
+        key_help: the list of keys.
+    """
+
+    def __init__(self, video: VideoView, key_help: KeyHelp) -> None:
+        super().__init__()
+        self.setPalette(COCKPIT)
+        self.video, self.key_help = video, key_help
+        self.banner, self.toasts = ConnectionBanner(), Toasts()
+        self.speed = Gauge("Speed", "m/s")
+        self.turn = Gauge("Turn rate, left is positive", "rad/s", directed=True)
+        self.trail, self._trail_place = TrailView(), QRect()
+        fill(QVBoxLayout(self), (video, 1))
+        for overlay in (self.speed, self.turn, self.trail, self.toasts, self.banner, key_help):
+            overlay.setParent(self)
+        # Not inside the paint event that found the new shape.
+        video.reshaped.connect(self.place, Qt.ConnectionType.QueuedConnection)
+
+    def show_motion(self, motion: Motion | None, trail: Trail) -> None:
+        """Shows the gauges, on a robot that has odometry, and its trail as soon as it has moved."""
+        self.speed.setVisible(motion is not None)
+        self.turn.setVisible(motion is not None)
+        if motion:
+            self.speed.show_reading(motion.speed, stale=motion.stale)
+            self.turn.show_reading(motion.turn, stale=motion.stale)
+        self.trail.setVisible(trail.moved)
+        self.trail.show_trail(trail)
+
+    def place(self) -> None:
+        """Places everything anew."""
+        box = self.video.frame_box()
+        left, right = round(box.x) + _EDGE_PX, round(box.right) - _EDGE_PX
+        top, bottom = round(box.y) + _EDGE_PX, round(box.bottom) - _EDGE_PX
+        side = max(_SMALLEST_GAUGE_PX, min(_LARGEST_GAUGE_PX, round(box.height * _GAUGE_SHARE)))
+        self.speed.setGeometry(left, bottom - side, side, side)
+        self.turn.setGeometry(right - side, bottom - side, side, side)
+        self._trail_place = QRect(right - side, top, side, side)
+        self.video.keep_clear(side + 2 * _EDGE_PX)
+        self._place_messages()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Places everything in the new size."""
+        super().resizeEvent(event)
+        self.place()
+
+    def event(self, event: QEvent) -> bool:
+        """Places messages anew when one of them appears, or needs another height."""
+        done = super().event(event)
+        if event.type() is QEvent.Type.LayoutRequest:
+            self._place_messages()
+        return done
+
+    def _place_messages(self) -> None:
+        width = self.width()
+        self.banner.setGeometry(0, 0, width, self.banner.heightForWidth(width))
+        top = 0 if self.banner.isHidden() else self.banner.height()
+        self.trail.setGeometry(self._trail_place)
+        self.trail.move(self._trail_place.left(), max(self._trail_place.top(), top + _EDGE_PX))
+        room = min(_WIDEST_MESSAGE_PX, width - 2 * _EDGE_PX)
+        height = self.toasts.height_for(room)
+        self.toasts.setGeometry((width - room) // 2, top + _EDGE_PX, room, min(height, self.height() // 2))
+        size = self.key_help.sizeHint().boundedTo(self.size())
+        corner = (self.width() - size.width()) // 2, (self.height() - size.height()) // 2
+        self.key_help.setGeometry(*corner, size.width(), size.height())

@@ -1,0 +1,437 @@
+"""The cockpit: picture first, nothing jumps, each action has a key, everything has a name."""
+
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject, QRect, Qt
+from PySide6.QtGui import QImage, QShortcut
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+from shiboken6 import isValid
+
+from common.errors import UserError
+from console.monitor.event_log import EventLine
+from console.presentation.picture_age import PictureAge
+from console.presentation.severity_style import SeverityStyle
+from console.robots.robots_file import Robot, RobotsFile
+from console.robots.roster import RobotChoice, Roster
+from console.window import saver
+from console.window.cockpit_keys import cockpit_keys
+from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor
+from tests.support.cockpit import (
+    PICTURE,
+    CockpitRobot,
+    resting_robot,
+    seeing_robot,
+    with_teleop,
+    with_trouble,
+)
+from tests.support.qt import keep_screenshot, let_pass, press, until
+
+pytestmark = pytest.mark.gst
+
+WINDOW = (1280, 800)
+CLOSED_SHARE, OPEN_SHARE = 0.80, 0.50
+"""Least share of the window's pixels that are the picture's own."""
+CTRL = Qt.KeyboardModifier.ControlModifier
+OTHER = RobotChoice("lab2", "10.0.0.2:50051", known=True)
+FOUND = RobotChoice("arm & hand", "10.0.0.3:50051", known=False)
+
+
+@dataclass
+class Cockpit:
+    """An operator in front of the window."""
+
+    window: MonitorWindow
+    robot: CockpitRobot
+
+    def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        press(self.window, key, modifier)
+
+    def sized(self, width: int, height: int) -> None:
+        self.window.showNormal()
+        self.window.resize(width, height)
+        until(lambda: (self.window.width(), self.window.height()) == (width, height), "the size")
+        let_pass(0.3)
+
+    def share(self) -> float:
+        """Of the window's pixels, those of the picture, counted on the screen."""
+        image = self.window.grab().toImage()
+        box = self.window.video.frame_box()
+        origin = self.window.video.mapTo(self.window, self.window.video.rect().topLeft())
+        assert origin.x() + box.right <= image.width()
+        assert origin.y() + box.bottom <= image.height()
+        return box.width * box.height / (image.width() * image.height())
+
+    def where(self) -> dict[str, QRect]:
+        """Places of what must not move."""
+        window = self.window
+        parts: dict[str, QWidget] = {
+            "picture": window.video,
+            "tabs": window.side.tabs,
+            "switch": window.preview.switch,
+            "link": window.header.link,
+            "clock": window.header.clock,
+        }
+        return {
+            name: QRect(part.mapTo(window, part.rect().topLeft()), part.size())
+            for name, part in parts.items()
+        }
+
+    def note(self, words: str) -> str:
+        return until(lambda: next((n.text for n in self.window.toasts.notes if words in n.text), ""), words)
+
+
+@contextmanager
+def in_front_of(robot: CockpitRobot) -> Iterator[Cockpit]:
+    roster = Roster(lambda: RobotsFile(Path("x"), {"lab2": Robot(target=OTHER.target)}), lambda: [FOUND])
+    with monitor(robot.target, roster=roster) as window:
+        made = Cockpit(window, robot)
+        made.sized(*WINDOW)
+        until(lambda: window.header.link.word.text().startswith("connected"), "the connection")
+        yield made
+
+
+@pytest.fixture
+def cockpit() -> Iterator[Cockpit]:
+    """A robot whose preview is off."""
+    with resting_robot() as robot, in_front_of(robot) as made:
+        yield made
+
+
+@pytest.fixture
+def seeing(tmp_path: Path) -> Iterator[Cockpit]:
+    """A robot with live video."""
+    (tmp_path / "robot").mkdir()
+    with seeing_robot(tmp_path / "robot") as robot, in_front_of(robot) as made:
+        painted: list[None] = []
+        made.window.video.painted.connect(lambda: painted.append(None))
+        until(lambda: len(painted) > 3, "the picture")
+        yield made
+
+
+@pytest.mark.parametrize("teleop", [False, True], ids=["status only", "with driving"])
+def test_the_picture_fills_the_window(seeing: Cockpit, teleop: bool) -> None:
+    cockpit = seeing
+    if teleop:
+        with_teleop(cockpit.robot.gateway)
+        until(cockpit.window.strip.driving.isVisible, "the place of driving")
+        let_pass(0.3)
+    assert cockpit.share() >= OPEN_SHARE
+    cockpit.press(Qt.Key.Key_F9)
+    let_pass(0.3)
+    assert cockpit.share() >= CLOSED_SHARE
+    keep_screenshot(cockpit.window, f"panel-closed{'-driving' if teleop else ''}")
+    cockpit.press(Qt.Key.Key_F9)
+    let_pass(0.3)
+    assert cockpit.share() >= OPEN_SHARE
+
+
+def test_the_picture_alone_and_back(cockpit: Cockpit) -> None:
+    before = cockpit.where()
+    cockpit.press(Qt.Key.Key_F)
+    let_pass(0.3)
+    assert cockpit.window.video.size() == cockpit.window.size()
+    keep_screenshot(cockpit.window, "picture-only")
+    cockpit.press(Qt.Key.Key_Escape)
+    let_pass(0.3)
+    assert cockpit.where() == before
+
+
+def test_where_a_robot_is_driven_stop_keeps_its_place(cockpit: Cockpit) -> None:
+    stop = cockpit.window.strip.driving.stop_place
+    assert not stop.isVisible()
+    with_teleop(cockpit.robot.gateway)
+    until(stop.isVisible, "the place of STOP")
+
+    def place() -> QRect:
+        let_pass(0.3)
+        return QRect(stop.mapTo(cockpit.window, stop.rect().topLeft()), stop.size())
+
+    first = place()
+    for key in (Qt.Key.Key_F9, Qt.Key.Key_F9, Qt.Key.Key_F, Qt.Key.Key_F):
+        cockpit.press(key)
+        assert place() == first
+        assert stop.isVisible()
+    assert not stop.findChildren(QPushButton), "no button that does nothing"
+
+
+def test_plots_are_a_tab_in_a_narrow_window(cockpit: Cockpit) -> None:
+    side, plots = cockpit.window.side, cockpit.window.plots
+    tab = side.tabs.indexOf(side.plots)
+    assert plots.isVisible()
+    assert not side.tabs.isTabVisible(tab)
+    cockpit.sized(1099, 700)
+    assert not plots.isVisible()
+    cockpit.press(Qt.Key.Key_3, CTRL)
+    assert side.plots.isVisible()
+    keep_screenshot(cockpit.window, "plots-tab")
+    cockpit.sized(1100, 700)
+    assert plots.isVisible()
+    assert not side.tabs.isTabVisible(tab)
+
+
+def test_nothing_jumps(cockpit: Cockpit) -> None:
+    window, before = cockpit.window, cockpit.where()
+    cockpit.robot.gateway.status.preview.last_error = "the camera was busy " * 5
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: len(window.side.faults.shown) == 3, "the faults")
+    cockpit.robot.gateway.accept = False
+    cockpit.press(Qt.Key.Key_P)
+    cockpit.note("The robot refused")
+    keep_screenshot(window, "trouble")
+    assert cockpit.where() == before
+    cockpit.robot.gateway.hold.clear()
+    until(window.banner.isVisible, "the banner of a lost connection")
+    let_pass(0.3)
+    least = 2 * window.fontMetrics().height()
+    assert window.banner.height() >= least, "the error, and the next attempt"
+    assert window.banner.button.height() >= window.fontMetrics().height()
+    top, below = window.banner.geometry().bottom(), window.toasts.geometry().top()
+    assert below > top, "the answer is not covered"
+    assert window.picture.trail.geometry().top() > top, "nor is the trail"
+    assert window.toasts.height() >= window.fontMetrics().height()
+    keep_screenshot(window, "banner")
+    assert cockpit.where() == before
+    cockpit.robot.gateway.hold.set()
+    until(window.banner.isHidden, "back again")
+
+
+def test_a_message_is_closed_with_esc(cockpit: Cockpit) -> None:
+    cockpit.robot.gateway.accept = False
+    cockpit.press(Qt.Key.Key_P)
+    cockpit.note("The robot refused")
+    cockpit.press(Qt.Key.Key_Escape)
+    until(lambda: not cockpit.window.toasts.notes, "no message")
+    let_pass(0.6)
+    assert not cockpit.window.toasts.notes
+    cockpit.press(Qt.Key.Key_P)
+    cockpit.note("The robot refused")
+
+
+def test_gauges_and_trail_stand_in_the_corners_of_the_picture(seeing: Cockpit) -> None:
+    cockpit = seeing
+    picture = cockpit.window.picture
+    until(picture.speed.isVisible, "the gauges")
+    until(picture.trail.isVisible, "the robot has moved")
+    assert (picture.speed.value_text, picture.turn.value_text) == ("0.50", "+0.30")
+    cockpit.sized(1000, 800)
+    cockpit.press(Qt.Key.Key_F9)
+    let_pass(0.3)
+    box = cockpit.window.video.frame_box()
+    corners = {
+        picture.speed: (box.x, box.bottom),
+        picture.turn: (box.right, box.bottom),
+        picture.trail: (box.right, box.y),
+    }
+    for overlay, (x, y) in corners.items():
+        shown = overlay.geometry()
+        assert min(abs(shown.left() - x), abs(shown.right() + 1 - x)) <= 9, overlay.accessibleName()
+        assert min(abs(shown.top() - y), abs(shown.bottom() + 1 - y)) <= 9, overlay.accessibleName()
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: "stale" in picture.speed.accessibleName(), "an old speed is marked")
+
+
+def test_the_bar_says_it_at_a_glance(cockpit: Cockpit) -> None:
+    bar = cockpit.window.header
+    assert bar.height() == 48
+    until(lambda: bar.battery.word.text() == "78 %", "the battery")
+    until(lambda: bar.picture.word.text() == "118 ms", "the age of the picture")
+    assert bar.mode.word.text() == "manual"
+    assert "Wi-Fi -58 dBm" in bar.link.detail.text()
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: bar.battery.detail.text().startswith("LOW"), "a low battery")
+    assert bar.health.detail.text().startswith("1 error, 1 warning")
+
+
+def test_another_reading_of_the_pictures_age_may_be_given(cockpit: Cockpit) -> None:
+    shown = cockpit.window.header.picture.word
+    cockpit.window.read_picture_age = lambda: PictureAge(83.4, 5.0, "link")
+    until(lambda: shown.text() == "83 \u00b1 5 ms", "the reading")
+    cockpit.window.read_picture_age = lambda: None
+    until(lambda: shown.text() == "-", "no reading")
+
+
+def test_a_picture_is_saved_with_its_status(
+    seeing: Cockpit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cockpit = seeing
+    monkeypatch.setattr(saver, "folder", lambda: tmp_path / "new")
+    cockpit.press(Qt.Key.Key_S)
+    cockpit.note("Saved")
+    (picture,) = (tmp_path / "new").glob("lab-1-*.png")
+    image = QImage(str(picture))
+    assert (image.width(), image.height()) == PICTURE
+    record = json.loads(picture.with_suffix(".json").read_text(encoding="utf-8"))
+    assert record["status"]["platform"]["power"]["lipo_battery"]["charge_percent"] == 78
+    assert record["picture"]["age"]["age_ms"] == 118
+
+
+def test_a_picture_that_can_not_be_saved_is_reported(
+    seeing: Cockpit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cockpit = seeing
+    occupied = tmp_path / "occupied"
+    occupied.write_text("a file, no folder")
+    monkeypatch.setattr(saver, "folder", lambda: occupied)
+    cockpit.press(Qt.Key.Key_S)
+    cockpit.note("Not saved")
+
+
+def test_without_a_picture_nothing_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(saver, "folder", lambda: tmp_path / "new")
+    with monitor("127.0.0.1:9") as window:
+        press(window, Qt.Key.Key_S)
+        until(lambda: any("no picture" in note.text for note in window.toasts.notes), "why")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_fault_is_acknowledged_and_the_alarm_falls_silent(cockpit: Cockpit) -> None:
+    window, played = cockpit.window, threading.Event()
+    window.sound.play = played.set
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: window.alarm.pending == 2, "both faults wait")
+    let_pass(0.6)
+    assert not played.is_set(), "the sound is off by default"
+    cockpit.press(Qt.Key.Key_M)
+    until(played.is_set, "the alarm is heard")
+    first = window.side.faults.shown[0]
+    first.button.click()
+    until(lambda: window.alarm.pending == 1, "one is acknowledged")
+    assert not first.button.isVisible()
+    cockpit.press(Qt.Key.Key_A)
+    until(lambda: window.alarm.pending == 0, "all are acknowledged")
+    let_pass(0.3)
+    played.clear()
+    let_pass(3.5)
+    assert not played.is_set()
+
+
+def test_a_sound_device_that_fails_is_reported(cockpit: Cockpit) -> None:
+    def fail() -> None:
+        raise UserError("no alarm can be heard: no such device", "Check this computer's sound device")
+
+    cockpit.window.sound.play = fail
+    with_trouble(cockpit.robot.gateway)
+    cockpit.press(Qt.Key.Key_M)
+    cockpit.note("no alarm can be heard")
+
+
+def test_a_new_fault_appears_over_the_picture_while_the_panel_is_closed(cockpit: Cockpit) -> None:
+    cockpit.press(Qt.Key.Key_F9)
+    with_trouble(cockpit.robot.gateway)
+    cockpit.note("odometry stopped coming on /odom")
+
+
+def test_a_cleared_fault_is_one_grey_line(cockpit: Cockpit) -> None:
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: len(cockpit.window.side.faults.shown) == 3, "the faults")
+    let_pass(0.3)
+    active, _, cleared = cockpit.window.side.faults.shown
+    assert cleared.mark.text() == "cleared"
+    assert not cleared.text.isVisible()
+    assert cleared.height() < 2 * cleared.fontMetrics().height()
+    assert active.height() > 3 * active.fontMetrics().height()
+
+
+def test_events_are_searched_filtered_and_exported(
+    cockpit: Cockpit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(saver, "folder", lambda: tmp_path)
+    window = cockpit.window
+    events = window.side.events_tab
+    log = window._worker.latest().events.with_lines(  # the double streams no events
+        [
+            EventLine(1.0, "preview running, BALANCED"),
+            EventLine(2.0, "warning: disk: nearly full", SeverityStyle.WARNING),
+            EventLine(3.0, "error: lidar: stopped", SeverityStyle.BAD),
+        ]
+    )
+    events.list.show_log(log)
+    cockpit.press(Qt.Key.Key_F, CTRL)
+    until(events.search.hasFocus, "the search has the focus")
+    events.search.setText("LIDAR")
+    assert len(events.list.lines) == 1
+    events.search.clear()
+    events.severity.setCurrentIndex(1)
+    assert len(events.list.lines) == 2
+    cockpit.press(Qt.Key.Key_E, CTRL)
+    cockpit.note("Saved 2 events")
+    (file,) = tmp_path.glob("*.events.jsonl")
+    assert [json.loads(line)["severity"] for line in file.read_text().splitlines()] == ["warning", "error"]
+    keep_screenshot(window, "events")
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_F1, Qt.Key.Key_Question])
+def test_the_keys_are_shown(cockpit: Cockpit, key: Qt.Key) -> None:
+    keys = cockpit.window.picture.key_help
+    cockpit.press(key)
+    until(keys.isVisible, "the list of keys")
+    let_pass(0.2)
+    assert cockpit.window.picture.rect().contains(keys.geometry())
+    keep_screenshot(cockpit.window, "keys")
+    cockpit.press(Qt.Key.Key_Escape)
+    assert not keys.isVisible()
+
+
+def test_every_key_of_the_list_is_bound_and_no_key_twice(cockpit: Cockpit) -> None:
+    listed = [name for key in cockpit_keys(cockpit.window) for name in key.names]
+    bound = [each.key().toString() for each in cockpit.window.findChildren(QShortcut)]
+    assert sorted(listed) == sorted(bound)
+    assert len(set(listed)) == len(listed)
+
+
+def test_letters_typed_into_the_search_are_no_keys(cockpit: Cockpit) -> None:
+    cockpit.press(Qt.Key.Key_F, CTRL)
+    search = cockpit.window.side.events_tab.search
+    until(search.hasFocus, "the search has the focus")
+    asked = len(cockpit.robot.gateway.preview_requests)
+    for key in (Qt.Key.Key_P, Qt.Key.Key_Q, Qt.Key.Key_S, Qt.Key.Key_1):
+        press(search, key)
+    assert search.text() == "pqs1"
+    assert cockpit.window.isVisible()
+    assert len(cockpit.robot.gateway.preview_requests) == asked
+
+
+def test_everything_that_takes_the_focus_has_a_name_for_screen_readers(cockpit: Cockpit) -> None:
+    window = cockpit.window
+    with_trouble(cockpit.robot.gateway)
+    until(lambda: len(window.side.faults.shown) == 3, "the faults")
+    cockpit.sized(1024, 600)
+    for tab in range(3):
+        window.side.show_tab(tab)
+        let_pass(0.2)
+        nameless = [
+            each
+            for each in window.findChildren(QWidget)
+            if each.isVisible()
+            and each.focusPolicy() is not Qt.FocusPolicy.NoFocus
+            and not (each.accessibleName() or (isinstance(each, QPushButton | QLabel) and each.text()))
+        ]
+        assert not nameless
+    picture = window.picture
+    painted = (window.video, picture.speed, picture.turn, picture.trail, *window.side.plots.all)
+    assert all(each.accessibleName() for each in painted)
+
+
+def test_the_switcher_lists_known_and_discovered_robots(cockpit: Cockpit) -> None:
+    menu = cockpit.window.header.name.robots
+    cockpit.window.header.name.fill()
+    texts = [action.text() for action in menu.actions()]
+    assert texts == ["lab2  (10.0.0.2:50051)", "arm && hand  (10.0.0.3:50051, found on the network)"]
+    menu.actions()[1].trigger()
+    until(lambda: not cockpit.window.isVisible(), "this window is closed")
+    assert cockpit.window.next_robot == FOUND
+
+
+def test_a_window_is_gone_before_its_program_goes_on() -> None:
+    """Left to the garbage collector, it may end in any thread, which aborts the process."""
+    with resting_robot() as robot, monitor(robot.target) as window:
+        let_pass(0.3)
+        parts: list[QObject] = [window, *window.findChildren(QObject)]
+    assert not any(isValid(part) for part in parts)

@@ -1,0 +1,57 @@
+"""The windows on screens from 1024x600 to 4K; each screenshot is an artefact."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.qt import KEPT_IN
+
+pytestmark = [pytest.mark.gst, pytest.mark.timeout(180)]
+
+ROOT = Path(__file__).parents[3]
+ENDS_WITHIN_S = 150
+
+
+def shot(situation: str, width: int, height: int, scale: int = 1) -> Mapping[str, Any]:
+    """Takes a screenshot in a process of its own; returns what the window reports of itself."""
+    file = KEPT_IN / f"{situation}-{width}x{height}.png"
+    command = [sys.executable, "-m", "tests.support.window_shots", situation]
+    command += [str(width), str(height), str(scale), str(file)]
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, timeout=ENDS_WITHIN_S, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    found: Mapping[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("situation", "width", "height", "scale", "share"),
+    [
+        ("trouble", 1024, 600, 1, 0.47),
+        ("driving", 1280, 800, 1, 0.50),
+        ("panel-closed", 1280, 800, 1, 0.80),
+        ("cockpit", 1920, 1080, 1, 0.65),
+        ("cockpit", 3840, 2160, 2, 0.65),
+    ],
+)
+def test_the_cockpit_fills_the_screen(
+    situation: str, width: int, height: int, scale: int, share: float
+) -> None:
+    found = shot(situation, width, height, scale)
+    assert found["maximised"], "the first time"
+    assert found["pixels"] == [width, height]
+    assert found["window"] == found["screen"] == [width // scale, height // scale]
+    assert found["picture_share"] >= share
+
+
+def test_the_view_fits_a_small_screen() -> None:
+    found = shot("view", 1024, 600)
+    assert found["window"][0] <= 1024
+    assert found["window"][1] <= 600
+    assert found["least"][0] <= 640, "it can be made smaller, too"

@@ -1,0 +1,219 @@
+"""The age that a viewer shows, judged by stamps in the frames; and what the robot learns of it."""
+
+import statistics
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bench.video.camera import Camera, camera
+from bench.video.viewing import capture_time
+from console.client import GatewayClient, PreviewProfile, PreviewStatus
+from console.receiver.delivery import DeliveryChoice
+from console.receiver.frame import Frame, PixelFormat
+from console.viewer.headless import watch_headless
+from console.viewer.robot_video import RobotVideo
+from tests.support.promise import keeps
+from tests.support.udp_link import Impairment, UdpLink
+from tests.support.video_ground import VideoGround, video_ground
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.gst
+
+ERROR_MS = 2.0
+FRAMES = 60
+PATIENCE_S = 25.0
+RTT_MS = 40.0
+KEY_FRAME_MS = 60.0
+"""Beyond a round trip, a picture is torn for no longer."""
+RARE_LOSS = 0.004
+TIMES = 9
+
+
+@pytest.fixture(scope="module")
+def stamping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
+    """A camera that draws the time of capture into each frame."""
+    with camera(tmp_path_factory.mktemp("camera")) as made:
+        yield made
+
+
+@contextmanager
+def filmed(directory: Path, source: Camera) -> Iterator[VideoGround]:
+    """A robot with that camera, its preview on."""
+    settings = {"source": {"kind": "gst", "description": source.source}, "adaptive": {"enabled": False}}
+    with video_ground(directory, settings, small=False) as ground:
+        ground.switch_on()
+        yield ground
+
+
+@contextmanager
+def showing(ground: VideoGround, port: int | None = None) -> Iterator[RobotVideo]:
+    """A viewer that shows each frame as it comes; over another port, if there is one."""
+    robot = RobotVideo(ground.target, pixels=PixelFormat.I420)
+    if port:
+        follow = robot.session.follow
+
+        def over_the_link(preview: PreviewStatus) -> None:
+            assert preview.endpoint
+            follow(replace(preview, endpoint=replace(preview.endpoint, port=port)))
+
+        robot.session.follow = over_the_link  # type: ignore[method-assign]
+    robot.session.add_frame_listener(robot.meter.shown)
+    robot.start()
+    try:
+        yield robot
+    finally:
+        robot.close(10)
+
+
+@pytest.mark.timed
+def test_the_age_is_true(tmp_path: Path, stamping: Camera) -> None:
+    """Of the frames that were handed over soonest: a busy machine reads the shared memory late."""
+    with filmed(tmp_path, stamping) as ground, showing(ground) as robot:
+        errors_ms: list[float] = []
+
+        def note(frame: Frame) -> None:
+            shown_s, shown_ms = time.monotonic(), robot.meter.reading().age_ms
+            stamped_s = capture_time(frame)
+            if stamped_s is not None and shown_ms is not None:
+                errors_ms.append(abs((shown_s - stamped_s) * 1000 - shown_ms))
+
+        robot.session.add_frame_listener(note)
+
+        def error_ms() -> float:
+            errors_ms.clear()
+            wait_until(lambda: len(errors_ms) >= FRAMES, "frames", PATIENCE_S)
+            found = sorted(errors_ms)
+            print(f"{found[0]:.2f} to {found[-1]:.2f} ms, {statistics.median(found):.2f} ms in the middle")
+            return statistics.median(found)
+
+        keeps(ERROR_MS, "ms between the age that is shown and that of the stamp", error_ms)
+        bound = robot.meter.reading()
+        assert bound.error_ms is not None
+        assert bound.error_ms < 20
+
+
+def test_the_robot_learns_the_worst_age(tmp_path: Path, stamping: Camera) -> None:
+    with filmed(tmp_path, stamping) as ground, showing(ground), GatewayClient(ground.target) as client:
+
+        def reported() -> PreviewStatus | None:
+            preview = client.status().preview
+            return preview if preview.measured.reporting_viewer_count else None
+
+        measured = wait_until(reported, "a report", PATIENCE_S).measured
+        assert measured.reporting_viewer_count == 1
+        assert measured.worst_picture_age_ms is not None
+        assert 0 < measured.worst_picture_age_ms < 10_000
+
+
+def test_a_torn_picture_is_repaired_by_a_key_frame_of_the_robot(
+    tmp_path: Path, stamping: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A packet is given up; no torn frame is shown; the key frame comes long before the regular one."""
+    monkeypatch.setattr("console.receiver.reception.wait_s", lambda _rtt_ms: 0.01)
+    monkeypatch.setattr("console.receiver.reception._FIRST_S", 0.0)
+    with filmed(tmp_path, stamping) as ground, UdpLink(ground.preview.port) as link:
+        link.impairment.delay_s = 0.02
+        with showing(ground, link.port) as robot, GatewayClient(ground.target) as client:
+            seen: list[Frame] = []
+            robot.session.add_frame_listener(seen.append)
+            wait_until(lambda: len(seen) > FRAMES, "frames", PATIENCE_S)
+            wait_until(lambda: robot.worker.request_key_frame(None), "the robot takes requests", PATIENCE_S)
+            link.impairment.loss = 0.05
+            wait_until(lambda: (now := robot.session.delivery()) and now.given_up > 3, "losses", PATIENCE_S)
+            link.impairment.loss = 0.0
+            before = len(seen)
+            wait_until(lambda: len(seen) > before + FRAMES, "frames again", PATIENCE_S)
+            served = {each.method: each.served for each in client.info().methods}
+    assert served["RequestKeyFrame"] > 0
+    assert not any(frame.corrupt for frame in seen)
+    delivery = robot.session.delivery()
+    assert delivery
+    assert (delivery.kind, delivery.rejoins) == (DeliveryChoice.DIRECT, 0)
+
+
+@pytest.mark.timed
+def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
+    tmp_path: Path, stamping: Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the moment that a packet is given up to the next whole frame; half of the times are judged.
+
+    A key frame has many packets: it is often hit itself, and then another one has to come.
+    """
+    monkeypatch.setattr("console.receiver.reception.wait_s", lambda _rtt_ms: 0.01)
+    monkeypatch.setattr("console.receiver.reception._FIRST_S", 0.0)
+    way = Impairment(delay_s=RTT_MS / 2000)
+    with (
+        filmed(tmp_path, stamping) as ground,
+        UdpLink(ground.preview.port, way) as link,
+        showing(ground, link.port) as robot,
+    ):
+        seen: list[Frame] = []
+        lost_s: list[float] = []
+        request = robot.worker.request_key_frame
+
+        def requested(newest_pts: int | None) -> bool:
+            lost_s.append(time.monotonic())
+            return request(newest_pts)
+
+        robot.session._on_picture_lost = requested
+        robot.session.add_frame_listener(seen.append)
+        wait_until(lambda: len(seen) > FRAMES, "frames", PATIENCE_S)
+        wait_until(lambda: request(None), "the robot takes requests", PATIENCE_S)
+
+        def torn_ms() -> float:
+            lost_s.clear()
+            way.loss = RARE_LOSS
+            wait_until(lambda: len(lost_s) >= TIMES, "losses", 3 * PATIENCE_S)
+            way.loss = 0.0
+            at_s, before = lost_s[-1], len(seen)
+            wait_until(lambda: len(seen) > before and seen[-1].arrival_s > at_s, "a frame", PATIENCE_S)
+            arrivals_s = [frame.arrival_s for frame in seen]
+            found = [(next(one for one in arrivals_s if one > lost) - lost) * 1000 for lost in lost_s]
+            print(", ".join(f"{one:.0f}" for one in found), "ms")
+            return statistics.median(found)
+
+        keeps(RTT_MS + KEY_FRAME_MS, "ms from a lost packet to the next whole frame", torn_ms)
+        assert not any(frame.corrupt for frame in seen)
+
+
+def test_an_older_robot_is_viewed_without_ages(tmp_path: Path) -> None:
+    """A gateway that names no offset: frames have no capture time, and nothing is reported."""
+    with video_ground(tmp_path) as ground:
+        ground.switch_on()
+        robot = RobotVideo(ground.target, pixels=PixelFormat.I420)
+        follow = robot.session.follow
+
+        def as_an_older_one(preview: PreviewStatus) -> None:
+            assert preview.endpoint
+            follow(replace(preview, endpoint=replace(preview.endpoint, capture_offset_ns=None)))
+
+        robot.session.follow = as_an_older_one  # type: ignore[method-assign]
+        robot.session.add_frame_listener(robot.meter.shown)
+        robot.start()
+        try:
+            wait_until(lambda: robot.session.frames > 30, "frames", PATIENCE_S)
+            assert robot.meter.reading().age_ms is None
+            assert robot.meter.reading().rtt_ms is not None
+            assert robot.meter.report() is None
+        finally:
+            robot.close(10)
+
+
+def test_headless_tells_the_age(tmp_path: Path) -> None:
+    with video_ground(tmp_path) as ground:
+        ground.switch_on(PreviewProfile.BALANCED)
+        begun_s = time.monotonic()
+        summary = watch_headless(
+            ground.target, frames=FRAMES, patience_s=PATIENCE_S, recording=None, stop=threading.Event()
+        )
+        took_ms = (time.monotonic() - begun_s) * 1000
+    age = summary.picture_age
+    assert age
+    assert 0 < age.median_ms <= age.p95_ms <= age.worst_ms < took_ms
+    assert 0 <= age.error_ms < took_ms
+    assert " ms old, 95 % at most " in summary.line()

@@ -1,0 +1,110 @@
+"""What typed keys do to the robot, with and without reports of their release."""
+
+import pytest
+
+from console.cli.drive_keys import ACTIONS, DIRECTIONS, TAP_S, Action, Hands, reports_releases
+
+
+def test_without_releases_a_press_counts_for_a_moment() -> None:
+    hands = Hands(releases=False)
+    assert hands.velocity(0.0) is None
+    assert hands.take("w", 0.0) == []
+    assert hands.velocity(TAP_S - 0.01) == (1, 0, 0)
+    assert hands.velocity(TAP_S) is None
+
+
+def test_a_repeated_key_goes_on() -> None:
+    hands = Hands(releases=False)
+    for number in range(40):
+        hands.take("a", number / 30)
+        assert hands.velocity(number / 30 + 0.03) == (0, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("typed", "velocity"),
+    [
+        ("w", (1, 0, 0)),
+        ("S", (-1, 0, 0)),
+        ("q", (0, 1, 0)),
+        ("e", (0, -1, 0)),
+        ("d", (0, 0, -1)),
+        ("\x1b[A", (1, 0, 0)),
+        ("\x1b[B", (-1, 0, 0)),
+        ("\x1b[D", (0, 0, 1)),
+        ("\x1bOC", (0, 0, -1)),
+        ("wd", (1, 0, -1)),
+        ("ws", (0, 0, 0)),
+    ],
+)
+def test_each_key_has_its_direction(typed: str, velocity: tuple[int, int, int]) -> None:
+    hands = Hands(releases=False)
+    hands.take(typed, 0.0)
+    assert hands.velocity(0.0) == velocity
+
+
+def test_with_releases_a_key_counts_while_it_is_down() -> None:
+    hands = Hands(releases=True)
+    hands.take("\x1b[119;1:1u", 0.0)
+    assert hands.velocity(60.0) == (1, 0, 0)
+    hands.take("\x1b[119;1:2u\x1b[1;1:1D", 61.0)
+    assert hands.velocity(61.0) == (1, 0, 1)
+    hands.take("\x1b[119;1:3u", 62.0)
+    assert hands.velocity(62.0) == (0, 0, 1)
+    hands.take("\x1b[1;1:3D", 63.0)
+    assert hands.velocity(63.0) is None
+
+
+def test_a_terminal_that_loses_the_focus_releases_everything() -> None:
+    hands = Hands(releases=True)
+    hands.take("\x1b[119u", 0.0)
+    hands.take("\x1b[O", 1.0)
+    assert hands.velocity(1.0) is None
+    hands.take("\x1b[I", 2.0)
+    assert hands.velocity(2.0) is None
+
+
+@pytest.mark.parametrize(
+    ("typed", "actions"),
+    [
+        (" ", [Action.STOP]),
+        ("\x1b[32;1:1u", [Action.STOP]),
+        ("\x1b[32;1:2u", []),
+        ("\x1b[32;1:3u", []),
+        ("r", [Action.RESET]),
+        ("x", [Action.QUIT]),
+        ("\x1b", [Action.QUIT]),
+        ("\x1b[27u", [Action.QUIT]),
+        ("\x1b[99;5u", [Action.QUIT]),
+        ("\x1b[99;5:3u", [Action.QUIT]),
+        ("\x03", [Action.QUIT]),
+        ("w r", [Action.STOP, Action.RESET]),
+        ("z\x1b[15~\x1b[57441;2:1u\x1b[u", []),
+    ],
+)
+def test_actions_come_once_for_each_press(typed: str, actions: list[Action]) -> None:
+    assert Hands(releases=True).take(typed, 0.0) == actions
+
+
+def test_a_sequence_may_arrive_in_pieces() -> None:
+    hands = Hands(releases=True)
+    for piece in ("\x1b[11", "9;1", ":1", "u"):
+        assert hands.take(piece, 0.0) == []
+    assert hands.velocity(0.0) == (1, 0, 0)
+
+
+def test_no_key_has_two_meanings() -> None:
+    assert not DIRECTIONS.keys() & ACTIONS.keys()
+
+
+@pytest.mark.parametrize(
+    ("answer", "reports"),
+    [
+        ("", None),
+        ("\x1b[?1u", None),
+        ("\x1b[?62;c", False),
+        ("\x1b[?0u\x1b[?62;4c", True),
+        ("\x1b[?62;22c\x1b[?1u", True),
+    ],
+)
+def test_a_terminal_says_whether_it_reports_releases(answer: str, reports: bool | None) -> None:
+    assert reports_releases(answer) is reports

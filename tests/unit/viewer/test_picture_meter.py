@@ -1,0 +1,138 @@
+"""The meter on a clock that the test plays; the robot's is an hour ahead."""
+
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from console.client import Offset, PictureDelivery
+from console.receiver.delivery import Delivery, DeliveryChoice
+from console.viewer.picture_meter import HISTORY_SLOTS, PictureMeter
+from tests.unit.receiver.frames import frame
+
+OFFSET_S = 3600.0
+
+
+@dataclass
+class Played:
+    """Clock, link and meter."""
+
+    now_s: float = 100.0
+    offset: Offset | None = field(default_factory=lambda: Offset(OFFSET_S, 0.0015))
+    delivery: Delivery | None = None
+
+    def __post_init__(self) -> None:
+        self.meter = PictureMeter(lambda: self.offset, lambda: self.delivery)
+
+    def show(self, age_ms: float, own_ms: float | None = None) -> None:
+        """Shows a frame that was captured so long ago."""
+        captured_ns = round((self.now_s + OFFSET_S) * 1e9 - age_ms * 1e6)
+        received_s = None if own_ms is None else self.now_s - own_ms / 1000
+        self.meter.shown(replace(frame(), capture_ns=captured_ns, received_s=received_s))
+
+
+@pytest.fixture
+def played(monkeypatch: pytest.MonkeyPatch) -> Played:
+    made = Played()
+    monkeypatch.setattr("console.viewer.picture_meter.time.monotonic", lambda: made.now_s)
+    return made
+
+
+def test_the_age_is_from_capture_to_shown_with_the_clocks_error(played: Played) -> None:
+    played.show(17.25)
+    found = played.meter.reading()
+    assert found.age_ms == pytest.approx(17.25, abs=1e-3)
+    assert found.error_ms == pytest.approx(1.5)
+    assert played.meter.robot_now_ns() == round(3700.0 * 1e9)
+
+
+def test_without_a_clock_or_a_capture_time_there_is_no_age(played: Played) -> None:
+    played.meter.shown(frame())
+    played.offset = None
+    played.show(20)
+    assert played.meter.reading().age_ms is None
+    assert played.meter.robot_now_ns() is None
+    assert played.meter.report() is None
+    assert played.meter.summary() is None
+
+
+def test_a_picture_that_is_gone_has_no_age(played: Played) -> None:
+    played.show(20)
+    played.meter.forget()
+    assert played.meter.reading().age_ms is None
+
+
+def test_the_worst_age_since_the_last_report_is_reported(played: Played) -> None:
+    played.delivery = Delivery(
+        kind=DeliveryChoice.DIRECT, rtt_ms=20.4, loss_percent=1.5, waited=7, given_up=2
+    )
+    for age_ms in (20, 180, 30):
+        played.show(age_ms)
+        played.now_s += 0.03
+    first = played.meter.report()
+    assert first
+    assert (first.picture_age_ms, first.picture_age_error_ms, first.rtt_ms) == (180, 2, 20)
+    assert (first.loss_percent, first.packets_held, first.packets_given_up) == (1.5, 7, 2)
+    assert first.delivery is PictureDelivery.DIRECT
+    played.now_s += 0.03
+    played.show(40)
+    second = played.meter.report()
+    assert second
+    assert (second.picture_age_ms, second.viewer_id) == (40, first.viewer_id)
+
+
+def test_a_frozen_picture_is_reported_with_its_age_now(played: Played) -> None:
+    played.show(20)
+    played.now_s += 2.5
+    report = played.meter.report()
+    assert report
+    assert report.picture_age_ms == 2520
+    played.now_s += 1e6
+    report = played.meter.report()
+    assert report
+    assert report.picture_age_ms == 60_000
+
+
+def test_two_viewers_have_two_names(played: Played) -> None:
+    other = Played(played.now_s)
+    for each in (played, other):
+        each.show(20)
+    reports = played.meter.report(), other.meter.report()
+    assert all(reports)
+    assert len({report.viewer_id for report in reports if report}) == 2
+
+
+def test_the_history_has_the_largest_age_of_each_half_second(played: Played) -> None:
+    for age_ms in (20, 90, 30):
+        played.show(age_ms)
+    played.now_s += 1.0
+    played.show(40)
+    history = played.meter.history()
+    assert len(history) == HISTORY_SLOTS
+    assert history[-3:] == [pytest.approx(90, abs=1e-3), None, pytest.approx(40, abs=1e-3)]
+    assert set(history[:-3]) == {None}
+    played.now_s += 1000.0
+    assert set(played.meter.history()) == {None}
+
+
+def test_the_summary_has_percentiles(played: Played) -> None:
+    for number in range(100):
+        played.show(10 + number)
+    found = played.meter.summary()
+    assert found
+    assert (found.median_ms, found.worst_ms, found.error_ms) == (59.5, 109.0, 1.5)
+    assert found.p95_ms == pytest.approx(104, abs=1)
+    assert found.cause is None
+
+
+def test_one_picture_is_its_own_percentile(played: Played) -> None:
+    played.show(200, own_ms=190)
+    found = played.meter.summary()
+    assert found
+    assert (found.median_ms, found.p95_ms, found.worst_ms) == (200, 200, 200)
+    assert found.cause is not None
+
+
+def test_many_pictures_take_no_more_memory(played: Played) -> None:
+    for _ in range(10_000):
+        played.show(20)
+    assert len(played.meter._pictures()) == 3600
