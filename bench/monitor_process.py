@@ -43,6 +43,8 @@ def main() -> None:
         app.quit()
 
     with monitor(target) as window:
+        # The first time it is maximised.
+        window.showNormal()
         window.resize(width, height)
         window.video.painted.connect(on_painted)
         QTimer.singleShot(_GIVE_UP_AFTER_S * 1000, app.quit)

@@ -20,8 +20,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from bench.ros_talker import TOPICS
+from common.ros_node import ros_node
 from gateway.config import SourceSettings
-from gateway.ros.lifetime import ros_node
 from gateway.ros.readers import reader_for
 from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source

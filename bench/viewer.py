@@ -22,7 +22,9 @@ from bench.rows import Row
 from bench.video import product, stamp
 from bench.video.camera import HEIGHT_PX, WIDTH_PX, camera
 from bench.video.viewing import watch
-from console.viewer.session import VideoSession
+from bench.video.window import Glance
+from console.viewer.picture_meter import PictureMeter
+from console.viewer.robot_video import RobotVideo
 from console.window.video_view import VideoView
 
 NAME = "viewer.extra_latency_frames"
@@ -31,6 +33,7 @@ SETTLE_S = 1.0
 WATCH_S = 3.0
 LATENCY_MS = 20
 FPS = 30
+_CLOSE_TIMEOUT_S = 5.0
 
 
 def run(_names: list[str]) -> list[Row]:
@@ -60,26 +63,30 @@ def extra_latency_ms(workdir: Path, rounds: int, watch_s: float = WATCH_S) -> Ge
             with robot.viewer() as receiver:
                 watch(receiver, SETTLE_S)
                 bare = statistics.median(one.latency_ms for one in watch(receiver, watch_s))
-            painted = statistics.median(_painted_ms(robot, watch_s))
+            painted = statistics.median(one.latency_ms for one in painted_frames(robot, watch_s))
             log(f"decoded after {bare:.1f} ms, painted after {painted:.1f} ms")
             yield painted - bare
 
 
-def _painted_ms(robot: product.Robot, watch_s: float) -> list[float]:
-    """Returns the time from capture to painted of each frame that the window showed, in ms."""
-    found: list[float] = []
-    with _window(robot) as view:
+def painted_frames(robot: product.Robot, watch_s: float, settle_s: float = SETTLE_S) -> list[Glance]:
+    """Returns the frames that the window showed, by when they had been painted."""
+    found: list[Glance] = []
+    with _window(robot) as (view, meter):
 
         def look() -> None:
-            seen_s = time.monotonic()
-            captured_s = read_stamp(on_screen(view))
+            seen_s, shown = time.monotonic(), meter.latest()
+            captured_s = read_stamp(_stamp_on_screen(view))
             if captured_s is not None:
-                found.append((seen_s - captured_s) * 1000)
+                # The viewer's age is that of the moment when it had painted the frame.
+                error_ms = abs((shown.at_s - captured_s) * 1000 - shown.age_ms) if shown else None
+                found.append(Glance(captured_s, seen_s, error_ms=error_ms))
 
-        _let_pass(SETTLE_S)
+        _let_pass(settle_s)
         # A timer of 0 ms fires after the painting, when the screen has the new frame.
-        view.painted.connect(lambda: QTimer.singleShot(0, look))
+        painted = view.painted.connect(lambda: QTimer.singleShot(0, look))
         _let_pass(watch_s)
+        # Else the view and this function would keep each other, and the robot's connections with them.
+        view.painted.disconnect(painted)
     return found
 
 
@@ -88,6 +95,14 @@ def on_screen(widget: QWidget) -> QImage:
     window = widget.window()
     whole = window.screen().grabWindow(window.winId()).toImage()
     return whole.copy(QRect(widget.mapTo(window, QPoint(0, 0)), widget.size()))
+
+
+def _stamp_on_screen(widget: QWidget) -> QImage:
+    """Returns the upper left corner as it was painted: more of it would take the time of the next frame."""
+    window = widget.window()
+    corner = widget.mapTo(window, QPoint(0, 0))
+    found = window.screen().grabWindow(window.winId(), corner.x(), corner.y(), stamp.WIDTH_PX, stamp.BLOCK_PX)
+    return found.toImage()
 
 
 def read_stamp(frame: QImage) -> float | None:
@@ -99,21 +114,23 @@ def read_stamp(frame: QImage) -> float | None:
 
 
 @contextmanager
-def _window(robot: product.Robot) -> Iterator[VideoView]:
+def _window(robot: product.Robot) -> Iterator[tuple[VideoView, PictureMeter]]:
     # Works without a screen, and shows no window where there is one.
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     _app = QApplication.instance() or QApplication(["bench"])
-    session = VideoSession()
-    session.start()
-    view = VideoView(session, lambda: None)
+    followed = RobotVideo(robot.client.target)
+    view = VideoView(followed.session, lambda: None, followed.meter)
+    # What is painted in the corner must not hide the stamp.
+    view.show_age(False)
     try:
         view.resize(WIDTH_PX, HEIGHT_PX)
         view.show()
-        session.follow(robot.client.status().preview)
-        yield view
+        followed.start()
+        yield view, followed.meter
     finally:
         view.close()
-        session.close()
+        view.deleteLater()
+        followed.close(_CLOSE_TIMEOUT_S)
 
 
 def _let_pass(seconds: float) -> None:

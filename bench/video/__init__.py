@@ -31,6 +31,28 @@ _MODULES = {
         f"video.dark_ms_{failure}"
         for failure in ("error", "no_output", "empty", "hang", "crash", "profile_change", "key_frame")
     ),
+    "bench.video.age_default": (
+        "video.age_default",
+        "video.age_default_ms",
+        "video.age_default_p99_ms",
+        "video.age_error_ms",
+    ),
+    "bench.video.sixty_fps": ("video.age_60_ms", "video.age_60_delivered_percent"),
+    "bench.video.receiver_cpu": ("video.receiver_cpu",),
+    "bench.video.age_lossy": tuple(
+        f"video.age_{link}{figure}"
+        for link in ("lossy", "very_lossy", "far")
+        for figure in ("", "_ms", "_p95_ms", "_delivered_percent", "_torn")
+    ),
+    "bench.video.age_narrow": (
+        "video.age_narrow_p95_ms",
+        "video.age_narrow_worst_ms",
+        "video.age_narrow_torn",
+        "video.age_narrow_fixed_worst_ms",
+        "video.age_narrow_fixed_torn",
+        "video.age_changing_freeze_ms",
+        "video.age_changing_reconnects",
+    ),
     "bench.video.viewer_cpu": ("video.viewer_cpu",),
     "bench.video.h265": ("video.excess_h265_ms",),
     "bench.video.peers": ("video.peer_rtp_ms", "video.peer_webrtc_ms"),

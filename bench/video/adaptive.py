@@ -1,14 +1,10 @@
-"""HIGH_QUALITY with the adaptive bit rate over bad links, against LOW_BW with a fixed one.
+"""high-quality with the adaptive bit rate over bad links, against low-bw with a fixed one.
 
-LOW_BW is what an operator would choose by hand for such a link. The link is a relay of the benchmarks' own
+low-bw is what an operator would choose by hand for such a link. The link is a relay of the benchmarks' own
 (tests/support/udp_link.py): 20 ms each way, and either a bottleneck or random losses in both directions, of
 SRT's control packets, too. Both profiles are measured in every round, over the same losses.
 """
 
-import json
-import subprocess
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -17,9 +13,9 @@ from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from bench.video import product
 from bench.video.camera import Camera, camera
-from bench.video.window import Glance, Window, longest_gap_ms
+from bench.video.far_viewing import watch_far
 from console.client import PreviewProfile
-from tests.support.udp_link import Impairment, UdpLink
+from tests.support.udp_link import Impairment
 
 FPS: Final = 60
 ROUNDS: Final = FEWEST_ROUNDS
@@ -30,9 +26,6 @@ LATENCY_MS: Final = 125
 DELAY_S: Final = 0.02
 LIMIT_KBPS: Final = 1500
 LOSS: Final = 0.03
-_AFTERWARDS_S: Final = 1.0
-_START_S: Final = 1.5
-"""Until the viewer's program has started."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,15 +94,15 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
 def _rows(workdir: Path, source: Camera, bad: _Link) -> list[Row]:
     adaptive: list[Outcome] = []
     fixed: list[Outcome] = []
-    settings = {"adaptive": {"enabled": True}}
+    fixed_rate = {"adaptive": {"enabled": False}}
     with (
-        product.robot(workdir, source, LATENCY_MS, settings=settings) as ours,
-        product.robot(workdir, source, LATENCY_MS) as rival,
+        product.robot(workdir, source, LATENCY_MS, far=True) as ours,
+        product.robot(workdir, source, LATENCY_MS, settings=fixed_rate, far=True) as rival,
     ):
         for number in range(ROUNDS):
             adaptive.append(_watch_through(source, ours, PreviewProfile.HIGH_QUALITY, bad, number))
             fixed.append(_watch_through(source, rival, PreviewProfile.LOW_BW, bad, number))
-    against = "HIGH_QUALITY adaptive against LOW_BW fixed"
+    against = "high-quality adaptive against low-bw fixed"
     return [
         Row(
             name=bad.name,
@@ -143,27 +136,14 @@ def _rows(workdir: Path, source: Camera, bad: _Link) -> list[Row]:
 def _watch_through(
     source: Camera, robot: product.Robot, profile: PreviewProfile, bad: _Link, seed: int
 ) -> Outcome:
-    total_s = _START_S + SETTLE_S + WATCH_S + _AFTERWARDS_S
-    with robot.preview(profile), UdpLink(robot.address.port, bad.impairment, seed) as link:
-        command = [sys.executable, "-m", "bench.video.far_viewer", robot.client.target, str(link.port)]
-        with subprocess.Popen([*command, str(total_s)], stdout=subprocess.PIPE) as viewer:
-            time.sleep(_START_S + SETTLE_S)
-            from_s, before = time.monotonic(), link.bytes_to_callers
-            time.sleep(WATCH_S)
-            until_s, passed_kbit = time.monotonic(), (link.bytes_to_callers - before) * 8 / 1000
-            preview = robot.client.status().preview
-            report, _ = viewer.communicate(timeout=total_s + 30)
-    seen = [Glance(*one) for one in json.loads(report)]
-    window = Window.of(seen, from_s, until_s)
-    found = Outcome(
-        window.frames_per_s,
-        longest_gap_ms(seen, from_s, until_s),
-        passed_kbit / max(1, len(window.glances)),
+    seen = watch_far(
+        source, robot, bad.impairment, settle_s=SETTLE_S, watch_s=WATCH_S, profile=profile, seed=seed
     )
-    delivered = f"{window.delivered_percent(source.captured(from_s, until_s)):.0f} % of the camera's frames"
+    window = seen.window
+    found = Outcome(window.frames_per_s, seen.freeze_ms, seen.passed_kbit / max(1, len(window.glances)))
     log(
-        f"{bad.name}, {profile.value}: {found.frames_per_s:.1f} fps ({delivered}), freeze"
-        f" {found.freeze_ms:.0f} ms, {found.frame_kbit:.0f} kbit a frame; at the end"
-        f" {preview.target_bitrate_kbps} kbit/s {preview.bitrate_reason}"
+        f"{bad.name}, {profile.value}: {found.frames_per_s:.1f} fps ({seen.delivered_percent:.0f} % of the"
+        f" camera's frames), freeze {found.freeze_ms:.0f} ms, {found.frame_kbit:.0f} kbit a frame; at the end"
+        f" {seen.target_kbps} kbit/s {seen.bitrate_reason}"
     )
     return found

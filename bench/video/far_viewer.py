@@ -1,42 +1,52 @@
-"""A viewer as a program: writes what it saw as JSON, `[captured_s, decoded_s, corrupt]` for each frame."""
+"""A viewer as a program, as `robotctl view --headless` watches: connects again, requests key frames, reports.
+
+Writes what it saw as JSON: `glances`, `[captured_s, decoded_s, corrupt]` of each frame, and the final figures
+of the session.
+"""
 
 import argparse
 import json
 import time
-from contextlib import closing
-from dataclasses import replace
 
 from bench.video.viewing import capture_time
 from bench.video.window import Glance
-from console.client import GatewayClient
+from console.presentation.json_form import json_form
+from console.receiver.delivery import DeliveryChoice
 from console.receiver.frame import Frame, PixelFormat
-from console.viewer.session import VideoSession
+from console.viewer.robot_video import RobotVideo
+
+_CLOSE_TIMEOUT_S = 5.0
 
 
 def main() -> None:
-    """Watches with the console's session, which connects again when it must."""
+    """Watches for a while."""
     parser = argparse.ArgumentParser()
     parser.add_argument("target", help="the robot's gateway")
-    parser.add_argument("port", type=int, help="UDP port of the link to the stream")
     parser.add_argument("seconds", type=float)
+    parser.add_argument("--delivery", type=DeliveryChoice, default=DeliveryChoice.AUTO)
     given = parser.parse_args()
-    with GatewayClient(given.target) as client:
-        status = client.status().preview
-    assert status.endpoint
     seen: list[Glance] = []
+    robot = RobotVideo(given.target, pixels=PixelFormat.I420, delivery=given.delivery)
 
     def note(frame: Frame) -> None:
+        robot.meter.shown(frame)
         captured_s = capture_time(frame)
         if captured_s is not None:
             seen.append(Glance(captured_s, frame.arrival_s, frame.corrupt))
 
-    session = VideoSession(pixels=PixelFormat.I420)
-    session.add_frame_listener(note)
-    with closing(session):
-        session.start()
-        session.follow(replace(status, endpoint=replace(status.endpoint, port=given.port)))
+    robot.session.add_frame_listener(note)
+    robot.start()
+    try:
         time.sleep(given.seconds)
-    print(json.dumps([(one.captured_s, one.decoded_s, one.corrupt) for one in seen]))
+        delivery = robot.session.delivery()
+    finally:
+        robot.close(_CLOSE_TIMEOUT_S)
+    found = {
+        "glances": [(one.captured_s, one.decoded_s, one.corrupt) for one in seen],
+        "redials": robot.session.redials,
+        "delivery": json_form(delivery),
+    }
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

@@ -36,18 +36,21 @@ def rows(workdir: Path, wanted: set[str]) -> list[Row]:
         def reference_viewer() -> AbstractContextManager[Any]:
             return reference.viewer(port, LATENCY_MS)
 
+        def viewer() -> AbstractContextManager[Any]:
+            return robot.viewer(product.DIRECT_DELIVERY)
+
         for _ in range(ROUNDS):
             if "video.first_frame" in wanted:
                 sending = reference.sender(source, port, LATENCY_MS)
                 theirs_ms.append(statistics.median(_joins(sending, reference_viewer, "reference")))
-            ours_ms.append(statistics.median(_joins(robot.preview(), robot.viewer, "ours")))
-    what = f"viewer connects to a running stream, to its first frame (SRT {LATENCY_MS} ms)"
-    found = [Row(name="video.first_frame_ms", what=what, unit="ms", values=ours_ms, bar=200)]
+            ours_ms.append(statistics.median(_joins(robot.preview(), viewer, "ours")))
+    what = "viewer connects to a running stream, to its first frame, direct delivery"
+    found = [Row(name="video.first_frame_ms", what=what, unit="ms", values=ours_ms, bar=80)]
     if theirs_ms:
         found.append(
             Row(
                 name="video.first_frame",
-                what=f"{what}, against the usual pipeline",
+                what=f"{what}, against the usual pipeline (SRT {LATENCY_MS} ms)",
                 unit="ms",
                 values=ours_ms,
                 references=theirs_ms,

@@ -17,11 +17,15 @@ from console.receiver.delivery import DeliveryChoice
 from console.receiver.options import ReceiverOptions
 from tests.support.free import free_tcp_port, free_udp_port
 from tests.support.receiver import Receiver
+from tests.support.udp_link import Impairment, UdpLink
 
 if TYPE_CHECKING:
     import subprocess
 
 HOST: Final = "127.0.0.1"
+FAR_HOST: Final = "127.0.0.2"
+"""Address of the relay to a robot that is far away; its port is that of the stream."""
+DIRECT_DELIVERY: Final = ReceiverOptions(delivery=DeliveryChoice.DIRECT)
 SRT_DELIVERY: Final = ReceiverOptions(delivery=DeliveryChoice.SRT)
 """Packets at SRT's latency, as every other SRT player takes them: rows that compare latencies say so."""
 _UP_WITHIN_S: Final = 20.0
@@ -70,9 +74,13 @@ class Robot:
     service: Service
     address: StreamAddress
 
-    def viewer(self) -> Receiver:
-        """Connects the product's receiver with SRT's own delivery, as the reference has it."""
-        return Receiver(self.address, queue_size=4, options=SRT_DELIVERY)
+    def viewer(self, options: ReceiverOptions = SRT_DELIVERY) -> Receiver:
+        """Connects the product's receiver; by default with SRT's own delivery, as the reference has it."""
+        return Receiver(self.address, queue_size=4, options=options)
+
+    def link(self, impairment: Impairment, seed: int) -> UdpLink:
+        """Returns a link with such properties at `FAR_HOST`; the same seed loses the same packets."""
+        return UdpLink(self.address.port, impairment, seed, at=(FAR_HOST, self.address.port))
 
     @contextmanager
     def preview(self, profile: PreviewProfile = PreviewProfile.BALANCED) -> Iterator[None]:
@@ -99,6 +107,7 @@ def robot(
     settings: Mapping[str, Any] | None = None,
     environment: Mapping[str, str] | None = None,
     warm: bool = True,
+    far: bool = False,
 ) -> Iterator[Robot]:
     """Runs both programs until the block ends; their logs go to standard error.
 
@@ -111,6 +120,7 @@ def robot(
         environment: of the preview service, besides this process's.
         warm: whether the preview is enabled and disabled once first, so that what happens only at the first
             start after the service's own is not measured.
+        far: whether viewers that follow its status connect over a link at `FAR_HOST` (see `Robot.link`).
     """
     udp, tcp = free_udp_port(), free_tcp_port()
     socket = workdir / f"preview-{udp}.sock"
@@ -127,7 +137,8 @@ def robot(
         "log_level": "warning",
         "grpc": {"port": tcp},
         # Plain, as the reference is, also where the listener is not on loopback.
-        "preview": {"socket": str(socket), "encrypted": False},
+        "preview": {"socket": str(socket), "encrypted": False}
+        | ({"advertised_host": FAR_HOST} if far else {}),
         "sources": [],
     }
     service = Service(_command("robot-preview", workdir / f"preview-{udp}.yaml", preview), environment or {})

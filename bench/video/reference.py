@@ -49,7 +49,7 @@ def viewer(port: int, latency_ms: int) -> PlainViewer:
 
 
 def same_encoder() -> str:
-    """Returns the preview service's encoder for BALANCED: its preset, bit rate and distance of key frames."""
+    """Returns the preview service's encoder for balanced: its preset, bit rate and distance of key frames."""
     properties = CATALOGUE["x264"].properties
     values = {
         **properties.fixed,

@@ -15,11 +15,13 @@ class Glance:
         captured_s: when the camera took it.
         decoded_s: when the decoder delivered it.
         corrupt: whether the decoder concealed parts of it.
+        error_ms: how much the age that the viewer itself gives is off; None without one.
     """
 
     captured_s: float
     decoded_s: float
     corrupt: bool = False
+    error_ms: float | None = None
 
     @property
     def latency_ms(self) -> float:
@@ -67,6 +69,11 @@ class Window:
     def median_ms(self) -> float:
         """Capture to decoded, median."""
         return statistics.median(one.latency_ms for one in self.glances)
+
+    @property
+    def p95_ms(self) -> float:
+        """Capture to decoded, 95th percentile."""
+        return statistics.quantiles((one.latency_ms for one in self.glances), n=20)[18]
 
     @property
     def p99_ms(self) -> float:

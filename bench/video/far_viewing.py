@@ -1,0 +1,128 @@
+"""Watches a robot over a link with the product's own viewer, in a process of its own."""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from bench.video import product
+from bench.video.camera import Camera
+from bench.video.window import Glance, Window, longest_gap_ms
+from console.client import PreviewProfile
+from console.receiver.delivery import DeliveryChoice
+from tests.support.udp_link import Impairment, UdpLink
+
+START_S: Final = 1.5
+"""Until the viewer's program has started."""
+_AFTERWARDS_S: Final = 1.0
+_ENDS_WITHIN_S: Final = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class FarWatch:
+    """What a viewer saw over a link.
+
+    Args:
+        glances: every frame that it showed, from its start on.
+        from_s: begin of the window, on `time.monotonic()`.
+        until_s: its end.
+        captured: frames that the camera took in it.
+        passed_kbit: what passed the link in it, repeated packets included.
+        redials: how often the viewer connected again because the stream had ended.
+        delivery: its figures at the end, as in `robotctl view --json`.
+        target_kbps: what the encoder was set to at the end.
+        bitrate_reason: why that is not the profile's.
+    """
+
+    glances: Sequence[Glance]
+    from_s: float
+    until_s: float
+    captured: int
+    passed_kbit: float
+    redials: int
+    delivery: dict[str, Any]
+    target_kbps: int
+    bitrate_reason: str
+
+    @property
+    def window(self) -> Window:
+        """The window's whole frames."""
+        return Window.of(self.glances, self.from_s, self.until_s)
+
+    @property
+    def delivered_percent(self) -> float:
+        """Share of the camera's frames in the window that were shown whole."""
+        return self.window.delivered_percent(self.captured)
+
+    @property
+    def torn(self) -> int:
+        """Frames that were shown although parts of them were missing."""
+        return sum(one.corrupt for one in self.glances)
+
+    @property
+    def freeze_ms(self) -> float:
+        """Longest time without a new whole frame in the window."""
+        return longest_gap_ms(self.glances, self.from_s, self.until_s)
+
+    def after(self, seconds: float) -> Window:
+        """Returns the window from so long after the first frame on."""
+        first_s = min(one.decoded_s for one in self.glances)
+        return Window.of(self.glances, first_s + seconds, self.until_s)
+
+
+def watch_far(
+    source: Camera,
+    robot: product.Robot,
+    impairment: Impairment,
+    *,
+    settle_s: float,
+    watch_s: float,
+    profile: PreviewProfile = PreviewProfile.BALANCED,
+    delivery: DeliveryChoice = DeliveryChoice.AUTO,
+    seed: int = 1,
+    while_watching: Callable[[UdpLink], None] | None = None,
+) -> FarWatch:
+    """Watches a robot that was made with `far`, its preview disabled.
+
+    Args:
+        source: its camera.
+        robot: the product.
+        impairment: of the link.
+        settle_s: time before the window.
+        watch_s: length of the window.
+        profile: of the preview.
+        delivery: of the viewer.
+        seed: of the losses.
+        while_watching: changes the link in the window; must return before its end.
+    """
+    total_s = START_S + settle_s + watch_s + _AFTERWARDS_S
+    command = [sys.executable, "-m", "bench.video.far_viewer", robot.client.target, str(total_s)]
+    command += ["--delivery", delivery.value]
+    with (
+        robot.preview(profile),
+        robot.link(impairment, seed) as link,
+        subprocess.Popen(command, stdout=subprocess.PIPE) as viewer,
+    ):
+        time.sleep(START_S + settle_s)
+        from_s, before = time.monotonic(), link.bytes_to_callers
+        if while_watching:
+            while_watching(link)
+        time.sleep(max(0.0, from_s + watch_s - time.monotonic()))
+        until_s, passed = time.monotonic(), link.bytes_to_callers - before
+        preview = robot.client.status().preview
+        written, _ = viewer.communicate(timeout=total_s + _ENDS_WITHIN_S)
+    found = json.loads(written)
+    return FarWatch(
+        [Glance(*one) for one in found["glances"]],
+        from_s,
+        until_s,
+        source.captured(from_s, until_s),
+        passed * 8 / 1000,
+        found["redials"],
+        found["delivery"],
+        preview.target_bitrate_kbps,
+        preview.bitrate_reason,
+    )
