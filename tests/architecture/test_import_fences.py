@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("common", "gateway", "preview", "console", "simrobot")
+OURS = ("common", "gateway", "preview", "drive", "console", "simrobot")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
 @pytest.mark.parametrize(
     ("importer", "forbidden"),
     [
-        ("common/", ("gateway", "preview", "console", "simrobot")),
+        ("common/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("drive/", ("gateway", "preview", "console", "simrobot", "omniseer.gateway", "grpc", "asyncio")),
         ("gateway/", ("preview", "console", "simrobot")),
         ("preview/", ("gateway", "console", "simrobot", "omniseer.gateway")),
         ("console/", ("gateway", "preview", "simrobot", "omniseer.preview")),
@@ -75,6 +76,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
         ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
         ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
+        ("gateway/links/drive/", ("gateway.teleop", "gateway.links.preview")),
+        ("gateway/teleop/", (*HEAVY, *WIRE, "omniseer", "gateway.ros", "gateway.rpc", "gateway.config")),
+        *(
+            (f"gateway/teleop/{name}.py", ("asyncio", "time", "gateway.links"))
+            for name in ("lease", "pacing")
+        ),
         ("preview/lifecycle.py", (*HEAVY, *WIRE, "asyncio", "preview")),
         ("preview/values.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline", "preview.encoders")),
         ("preview/config.py", (*HEAVY, *WIRE, "asyncio", "preview.pipeline")),
@@ -82,6 +89,21 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/pipeline/", ("preview.rpc", "preview.supervisor", "preview.app")),
         ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
         ("preview/rpc/", ("common.gst",)),
+        *(
+            (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))
+            for name in (
+                "values",
+                "shaping",
+                "inhibits",
+                "phases",
+                "machine",
+                "outranking",
+                "episode",
+                "watch",
+            )
+        ),
+        ("drive/guard.py", (*HEAVY, "drive.base")),
+        ("drive/worker.py", (*HEAVY, "drive.base")),
         *(
             (f"console/{name}.py", (*HEAVY, *WIRE, "asyncio", "typer", "rich", "console.client"))
             for name in ("target", "credentials", "printable")
@@ -106,12 +128,13 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
 @pytest.mark.parametrize(
     ("library", "homes"),
     [
-        ("rclpy", ("gateway/ros/", "simrobot/")),
+        ("rclpy", ("common/ros_node.py", "gateway/ros/", "drive/base.py", "drive/doctor", "simrobot/")),
         ("gi", ("common/gst.py",)),
         ("PySide6", ("console/window/",)),
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/ca.py",)),
         ("yaml", ("common/config.py",)),
+        ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
         (
             "google.protobuf",
@@ -120,11 +143,13 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "gateway/rpc/",
                 "gateway/links/",
                 "preview/rpc/",
+                "drive/",
                 "console/client/",
             ),
         ),
         ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
+        ("omniseer.drive", ("gateway/links/", "drive/")),
     ],
 )
 def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:

@@ -17,7 +17,7 @@ AUDIT = AuditSettings()
     [
         f"It admits {BURST} records, then 1 a minute",
         f"the first of its kind in the last {WINDOW_S:.0f} s",
-        f"{MAX_KINDS} kinds per caller are told apart",
+        f"{MAX_KINDS} kinds per caller are distinguished",
         f"recorded at most {WINDOW_S:.0f} s later",
         f"`times` has the first {MAX_TIMES} and `time` the last",
         f"more than {MAX_TIMES + 1} calls of each in a minute",

@@ -8,11 +8,12 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
+from drive.config import DriveSettings
 from gateway.config import GatewaySettings
 from preview.config import PreviewSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/configuration.md").read_text(encoding="utf-8")
-PROFILE = re.compile(r"^profiles\.(low_bw|balanced|high_quality)\.")
+PROFILE = re.compile(r"^profiles\.(low-bw|balanced|high-quality)\.")
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -29,11 +30,16 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         if listed or not inner:
             yield f"{prefix}{name}"
         for part in inner:
-            yield from keys_of(part, f"{prefix}{name}{listed}.")
+            yield from keys_of(part, f"{prefix}{field.alias or name}{listed}.")
 
 
 @pytest.mark.parametrize(
-    ("settings", "heading"), [(GatewaySettings, "## Gateway"), (PreviewSettings, "## Preview service")]
+    ("settings", "heading"),
+    [
+        (GatewaySettings, "## Gateway"),
+        (PreviewSettings, "## Preview service"),
+        (DriveSettings, "## Drive program"),
+    ],
 )
 def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str) -> None:
     chapter = PAGE.split(heading + "\n")[1].split("\n## ")[0]

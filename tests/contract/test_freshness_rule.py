@@ -11,7 +11,7 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
-from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2
+from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2, teleop_pb2
 
 PACKAGE = "omniseer.gateway.v1."
 TRIPLES = [
@@ -49,12 +49,25 @@ NEEDS_NO_AGE = {
     "SetPreviewModeResponse.accepted": _ITSELF,
     "SetPreviewModeResponse.message": _ITSELF,
     "RequestKeyFrameResponse": _SERVICE,
+    "SetTeleopEnabledResponse.accepted": _ITSELF,
+    "SetTeleopEnabledResponse.message": _ITSELF,
+    "SendTeleopCommandResponse.accepted": _ITSELF,
+    "SendTeleopCommandResponse.message": _ITSELF,
+    "StopLatch": "a state with an age, which holds until it is reset",
+    "DriveOpened": _ITSELF,
+    "DriveLimits": "the robot's configuration",
+    "DriveState": "of the instant that comes with it; the ages in it are of what they are named after",
+    "StopRobotResponse.message": _ITSELF,
+    "ResetStopResponse": _ITSELF,
 }
 
 
 def answers() -> list[Descriptor]:
-    service = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
-    return [method.output_type for method in service.methods]
+    services = (
+        robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
+        teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+    )
+    return [method.output_type for service in services for method in service.methods]
 
 
 def has_freshness(message: Descriptor) -> bool:

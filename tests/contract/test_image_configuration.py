@@ -6,16 +6,18 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from drive.cli import app as drive_app
 from gateway.cli import app as gateway_app
 from preview.cli import app as preview_app
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("program", ["gateway", "preview"])
+@pytest.mark.parametrize("program", ["gateway", "preview", "drive"])
 def test_the_images_name_the_file_once(program: str) -> None:
-    dockerfile = (ROOT / f"docker/{program}.Dockerfile").read_text(encoding="utf-8")
-    served = re.search(r'"--config", "([^"]+)"', dockerfile)
+    file = "preview" if program == "preview" else "gateway"
+    dockerfile = (ROOT / f"docker/{file}.Dockerfile").read_text(encoding="utf-8")
+    served = re.search(rf'"robot-{program}", "serve", "--config", "([^"]+)"', dockerfile)
     named = re.search(rf"ROBOT_{program.upper()}_CONFIG=(\S+)", dockerfile)
     assert served
     assert named
@@ -25,7 +27,11 @@ def test_the_images_name_the_file_once(program: str) -> None:
 def test_the_variables_name_the_file(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text("log_level: debug", encoding="utf-8")
-    for app, variable in ((gateway_app, "ROBOT_GATEWAY_CONFIG"), (preview_app, "ROBOT_PREVIEW_CONFIG")):
+    for app, variable in (
+        (gateway_app, "ROBOT_GATEWAY_CONFIG"),
+        (preview_app, "ROBOT_PREVIEW_CONFIG"),
+        (drive_app, "ROBOT_DRIVE_CONFIG"),
+    ):
         shown = CliRunner().invoke(app, ["check", "--print"], env={variable: str(file)})
         assert shown.exit_code == 0, shown.output
         assert "log_level: debug\n" in shown.output

@@ -10,11 +10,14 @@ from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION
 
 from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES, STANDARD, Method, Open
-from omniseer.gateway.v1 import robot_gateway_pb2
+from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_UNSPECIFIED
 from omniseer.gateway.v1.access_pb2 import Role as WireRole
 
-SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
+SERVICES = (
+    robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
+    teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+)
 PAGE = (Path(__file__).parents[2] / "docs/security.md").read_text(encoding="utf-8")
 
 
@@ -24,7 +27,8 @@ def undeclared(service: str, names: list[str]) -> list[str]:
 
 
 def test_every_method_declares_a_role() -> None:
-    assert undeclared(SERVICE.full_name, [method.name for method in SERVICE.methods]) == []
+    for service in SERVICES:
+        assert undeclared(service.full_name, [method.name for method in service.methods]) == []
 
 
 @pytest.fixture
@@ -58,6 +62,8 @@ def test_the_page_says_the_same() -> None:
     table = PAGE.split("| method | role |")[1].split("\n\n")[0]
     said = dict(re.findall(r"^\| `([^`]+)` \| (\w+) \|$", table, re.MULTILINE))
     ours = {
-        method.name: Method(f"/{SERVICE.full_name}/{method.name}").needed.value for method in SERVICE.methods
+        method.name: Method(f"/{service.full_name}/{method.name}").needed.value
+        for service in SERVICES
+        for method in service.methods
     }
     assert said == ours | {service: needed.value for service, needed in STANDARD.items()}

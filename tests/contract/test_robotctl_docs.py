@@ -8,19 +8,23 @@ from google.protobuf.message import Message
 from common.findings import findings_json, good
 from console.cli.error_report import error_as_json
 from console.cli.info import info_json
-from console.cli.json_form import json_form
 from console.client import Unreachable
+from console.client.mapping.driving import drive_item
 from console.client.mapping.events import event
 from console.client.mapping.methods import (
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
     GET_SYSTEM_STATUS,
+    RESET_STOP,
+    STOP_ROBOT,
     SUBSCRIBE_EVENTS,
 )
+from console.presentation.json_form import json_form
 from omniseer.gateway.v1.event_pb2 import Event, EventGap
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
 from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse, SubscribeEventsResponse
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+from omniseer.gateway.v1.teleop_pb2 import DriveResponse, ResetStopResponse, StopRobotResponse
 from tests.support.filled import fill
 from tests.support.robotctl_docs import Type, documented, holds, leaves, spelt_out
 
@@ -34,6 +38,12 @@ def info() -> GetGatewayInfoResponse:
     answer = GetGatewayInfoResponse()
     fill(answer)
     answer.configuration_json = "{}"
+    return answer
+
+
+def drive_state() -> DriveResponse:
+    answer = DriveResponse()
+    fill(answer.state)
     return answer
 
 
@@ -66,6 +76,17 @@ def events_document() -> dict[str, Any]:
             "info --json", info_json(GET_GATEWAY_INFO.decode(info().SerializeToString())), id="info"
         ),
         pytest.param("events --json", events_document(), id="events"),
+        pytest.param(
+            "stop --json",
+            {"ok": True, **json_form(STOP_ROBOT.decode(filled(StopRobotResponse())))},
+            id="stop",
+        ),
+        pytest.param(
+            "reset-stop --json",
+            {"ok": True, **json_form(RESET_STOP.decode(filled(ResetStopResponse())))},
+            id="reset-stop",
+        ),
+        pytest.param("drive --json", json_form(drive_item(drive_state())), id="drive"),
         pytest.param("doctor --json", findings_json([good("tcp", "answers")]), id="doctor"),
     ],
 )

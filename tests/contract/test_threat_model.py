@@ -1,4 +1,4 @@
-"""Every promise of the threat model in docs/security.md names tests that exist."""
+"""Every promise of the threat model and of the safety case of driving names tests that exist."""
 
 import ast
 import re
@@ -7,8 +7,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MODEL = (ROOT / "docs/security.md").read_text(encoding="utf-8").partition("## Threat model")[2]
-PROMISES = re.findall(r"^\| ([^|]+) \| (`tests/[^|]+`) \|$", MODEL, re.MULTILINE)
+MODELS = [
+    (ROOT / page).read_text(encoding="utf-8").partition(heading)[2]
+    for page, heading in (("docs/security.md", "## Threat model"), ("docs/driving.md", "## Safety case"))
+]
+PROMISES = [
+    promise
+    for model in MODELS
+    for promise in re.findall(r"^\| ([^|]+) \| (`tests/[^|]+`) \|$", model, re.MULTILINE)
+]
 
 
 def exists(test: str) -> bool:
@@ -23,8 +30,8 @@ def exists(test: str) -> bool:
 
 
 def test_every_row_of_the_table_is_read() -> None:
-    table = MODEL.split("| promise | test |\n|---|---|\n")[1].split("\n\n")[0]
-    assert len(PROMISES) == len(table.splitlines())
+    tables = [model.split("| promise | test |\n|---|---|\n")[1].split("\n\n")[0] for model in MODELS]
+    assert len(PROMISES) == sum(len(table.splitlines()) for table in tables)
 
 
 @pytest.mark.parametrize(("promise", "tests"), PROMISES, ids=[promise for promise, _ in PROMISES])

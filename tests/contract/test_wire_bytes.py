@@ -23,6 +23,7 @@ from omniseer.gateway.v1 import (
     source_pb2,
     states_pb2,
     system_status_pb2,
+    teleop_pb2,
 )
 
 VARINT, LENGTH, FIXED32 = 0, 2, 5
@@ -328,6 +329,30 @@ CASES = [
     ),
     Case(robot_gateway_pb2.GetSystemStatusRequest, b"", {}),
     Case(robot_gateway_pb2.GetOverlaySnapshotRequest, b"", {}),
+    Case(robot_gateway_pb2.SetTeleopEnabledRequest, uint(1, 1), {"enabled": True}),
+    Case(
+        robot_gateway_pb2.SetTeleopEnabledResponse,
+        uint(1, 1) + text(2, "enabled") + sub(3, uint(1, 2)),
+        {
+            "accepted": True,
+            "message": "enabled",
+            "teleop": system_status_pb2.TeleopStatus(state=states_pb2.TELEOP_ENABLED),
+        },
+    ),
+    Case(
+        robot_gateway_pb2.SendTeleopCommandRequest,
+        flt(1, 0.25) + flt(2, -0.5) + flt(3, 0.75),
+        {"linear_x_mps": 0.25, "linear_y_mps": -0.5, "angular_z_rad_s": 0.75},
+    ),
+    Case(
+        robot_gateway_pb2.SendTeleopCommandResponse,
+        uint(1, 1) + text(2, "passed on") + sub(3, uint(1, 1)),
+        {
+            "accepted": True,
+            "message": "passed on",
+            "teleop": system_status_pb2.TeleopStatus(state=states_pb2.TELEOP_DISABLED),
+        },
+    ),
 ]
 
 # What was added to the locked contract: from 16 up in its messages, from 1 in messages of its own.
@@ -349,6 +374,135 @@ ADDITIONS = [
         },
     ),
     Case(system_status_pb2.VisionStatus, uint(16, 70), {"age_ms": 70}),
+    Case(
+        system_status_pb2.TeleopStatus,
+        uint(16, 7) + uint(17, 4) + uint(17, 6) + text(18, "anna") + sub(19, uint(1, 12)),
+        {
+            "phase": teleop_pb2.DRIVE_PHASE_STOPPED,
+            "inhibits": [teleop_pb2.DRIVE_INHIBIT_PICTURE_STALE, teleop_pb2.DRIVE_INHIBIT_BASE_ABSENT],
+            "holder": "anna",
+            "stop": teleop_pb2.StopLatch(stop_id=12),
+        },
+    ),
+    Case(
+        teleop_pb2.StopLatch,
+        uint(1, 12) + text(2, "ben") + text(3, "a child") + uint(4, 900),
+        {"stop_id": 12, "by": "ben", "reason": "a child", "age_ms": 900},
+    ),
+    Case(
+        teleop_pb2.DriveRequest,
+        sub(1, text(1, "tool")),
+        {"open": teleop_pb2.DriveOpen(client_name="tool")},
+    ),
+    Case(teleop_pb2.DriveRequest, sub(2, uint(1, 7)), {"command": teleop_pb2.DriveCommand(sequence=7)}),
+    Case(
+        teleop_pb2.DriveOpen,
+        text(1, "tool") + uint(2, 1) + text(3, "session") + uint(4, 2),
+        {"client_name": "tool", "take_over": True, "session_id": "session", "supervision": 2},
+    ),
+    Case(
+        teleop_pb2.DriveCommand,
+        uint(1, 7)
+        + uint(2, 1)
+        + flt(3, 0.25)
+        + flt(4, -0.5)
+        + flt(5, 0.75)
+        + uint(6, 1 << 40)
+        + uint(7, 1 << 41)
+        + uint(8, 1 << 42)
+        + text(9, "gamepad"),
+        {
+            "sequence": 7,
+            "held": True,
+            "vx_mps": 0.25,
+            "vy_mps": -0.5,
+            "wz_rad_s": 0.75,
+            "echo_monotonic_ns": 1 << 40,
+            "picture_monotonic_ns": 1 << 41,
+            "valid_until_monotonic_ns": 1 << 42,
+            "input_device": "gamepad",
+        },
+    ),
+    Case(
+        teleop_pb2.DriveResponse,
+        sub(1, text(1, "session")),
+        {"opened": teleop_pb2.DriveOpened(session_id="session")},
+    ),
+    Case(teleop_pb2.DriveResponse, sub(2, uint(1, 5)), {"state": teleop_pb2.DriveState(monotonic_ns=5)}),
+    Case(
+        teleop_pb2.DriveOpened,
+        text(1, "session") + text(2, "run") + sub(3, flt(1, 0.25)),
+        {"session_id": "session", "run_id": "run", "limits": teleop_pb2.DriveLimits(max_vx_mps=0.25)},
+    ),
+    Case(
+        teleop_pb2.DriveLimits,
+        flt(1, 0.25)
+        + flt(2, 0.5)
+        + flt(3, 0.75)
+        + flt(4, 1.25)
+        + flt(5, 1.5)
+        + uint(6, 600)
+        + flt(7, 0.125)
+        + uint(8, 1)
+        + flt(9, 1.75)
+        + flt(10, 2.25),
+        {
+            "max_vx_mps": 0.25,
+            "max_vy_mps": 0.5,
+            "max_wz_rad_s": 0.75,
+            "acceleration_mps2": 1.25,
+            "acceleration_rad_s2": 1.5,
+            "max_picture_age_ms": 600,
+            "picture_travel_m": 0.125,
+            "line_of_sight": True,
+            "line_of_sight_mps": 1.75,
+            "line_of_sight_rad_s": 2.25,
+        },
+    ),
+    Case(
+        teleop_pb2.DriveState,
+        uint(1, 1 << 40)
+        + uint(2, 7)
+        + uint(3, 6)
+        + uint(4, 1)
+        + uint(4, 9)
+        + flt(5, 0.25)
+        + flt(6, -0.5)
+        + flt(7, 0.75)
+        + uint(8, 20)
+        + uint(9, 30)
+        + uint(10, 140)
+        + flt(11, 1.25)
+        + sub(12, uint(1, 3))
+        + text(13, "no base"),
+        {
+            "monotonic_ns": 1 << 40,
+            "newest_sequence": 7,
+            "phase": teleop_pb2.DRIVE_PHASE_INHIBITED,
+            "inhibits": [teleop_pb2.DRIVE_INHIBIT_COMMAND_LATE, teleop_pb2.DRIVE_INHIBIT_ACCESS_ENDED],
+            "vx_mps": 0.25,
+            "vy_mps": -0.5,
+            "wz_rad_s": 0.75,
+            "command_age_ms": 20,
+            "loop_age_ms": 30,
+            "picture_age_ms": 140,
+            "speed_limit_mps": 1.25,
+            "stop": teleop_pb2.StopLatch(stop_id=3),
+            "problems": ["no base"],
+        },
+    ),
+    Case(teleop_pb2.StopRobotRequest, text(1, "a child"), {"reason": "a child"}),
+    Case(
+        teleop_pb2.StopRobotResponse,
+        text(1, "stopped") + sub(2, uint(1, 3)),
+        {"message": "stopped", "stop": teleop_pb2.StopLatch(stop_id=3)},
+    ),
+    Case(teleop_pb2.ResetStopRequest, uint(1, 3), {"stop_id": 3}),
+    Case(
+        teleop_pb2.ResetStopResponse,
+        text(1, "reset") + uint(2, 2),
+        {"message": "reset", "phase": teleop_pb2.DRIVE_PHASE_AVAILABLE},
+    ),
     Case(
         system_status_pb2.MissionStatus,
         uint(1, 1) + uint(2, 1) + uint(3, 5) + text(4, "docking"),
@@ -690,8 +844,10 @@ ADDITIONS = [
         text(1, "x264") + text(2, "mpp-h265") + text(3, "not there"),
         {"running": "x264", "wanted": "mpp-h265", "reason": "not there"},
     ),
-    Case(event_pb2.ClientJoined, text(1, "10.0.0.9"), {"address": "10.0.0.9"}),
-    Case(event_pb2.ClientLeft, text(1, "10.0.0.9"), {"address": "10.0.0.9"}),
+    Case(
+        event_pb2.ClientJoined, text(1, "10.0.0.9") + text(2, "anna"), {"address": "10.0.0.9", "who": "anna"}
+    ),
+    Case(event_pb2.ClientLeft, text(1, "10.0.0.9") + text(2, "anna"), {"address": "10.0.0.9", "who": "anna"}),
     Case(event_pb2.RobotModeChanged, text(1, "idle"), {"mode": "idle"}),
 ]
 
@@ -724,9 +880,13 @@ def messages_below(message: Descriptor, found: dict[str, Descriptor]) -> None:
 
 def test_every_field_of_every_message_has_its_byte_string() -> None:
     reachable: dict[str, Descriptor] = {}
-    for method in robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"].methods:
-        messages_below(method.input_type, reachable)
-        messages_below(method.output_type, reachable)
+    for service in (
+        robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
+        teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+    ):
+        for method in service.methods:
+            messages_below(method.input_type, reachable)
+            messages_below(method.output_type, reachable)
     written: dict[str, set[str]] = {}
     for case in [*CASES, *ADDITIONS]:
         written.setdefault(case.message.DESCRIPTOR.full_name, set()).update(case.fields)

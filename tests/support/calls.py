@@ -45,9 +45,10 @@ def call_of(
     *,
     streaming: bool = False,
     request_streaming: bool = False,
+    service: str = CONTRACT.full_name,
 ) -> CallContext:
     rpc: Any = RpcDouble(peer, token)
-    path = f"/{CONTRACT.full_name}/{method}"
+    path = f"/{service}/{method}"
     described = Method(path, request_streaming=request_streaming, response_streaming=streaming)
     return CallContext(described, rpc)
 

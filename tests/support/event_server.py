@@ -40,7 +40,11 @@ class EventServer:
         """So many things happen at once."""
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
-            self._log.add(Event(Severity.INFO, "mission", words, ModeChanged(words)), 1.0)
+            self.note(Event(Severity.INFO, "mission", words, ModeChanged(words)))
+
+    def note(self, event: Event) -> None:
+        """This event happens."""
+        self._log.add(event, 1.0)
         self._appended.notify_all()
         self.happened[self._log.run_id] = self._log.sequence
 

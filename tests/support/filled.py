@@ -38,6 +38,8 @@ def fill(message: Message) -> None:
     for field in fields_of(message):
         if field.message_type:
             fill(getattr(message, field.name).add() if field.is_repeated else getattr(message, field.name))
+        elif field.is_repeated:
+            getattr(message, field.name).append(_value(field, number=7, text="first"))
         else:
             setattr(message, field.name, _value(field, number=7, text="first"))
 
@@ -76,7 +78,10 @@ def _fill_distinctly(message: Message, members: Collection[str], numbers: Iterat
         path = f"{above}{field.name}"
         if is_alternative(field) and field.full_name not in members:
             continue
-        if not field.message_type:
+        if not field.message_type and field.is_repeated:
+            items = [_value(field, number=next(numbers), text=f"{path}[{index}]") for index in range(_ITEMS)]
+            getattr(message, field.name).extend(items)
+        elif not field.message_type:
             setattr(message, field.name, _value(field, number=next(numbers), text=path))
         elif field.is_repeated:
             for index in range(_ITEMS):
@@ -111,7 +116,10 @@ def changes(message: Message, above: str = "") -> Iterator[str]:
     """
     for field, _ in message.ListFields():
         path = f"{above}{field.name}"
-        if not field.message_type:
+        if not field.message_type and field.is_repeated:
+            for index in range(len(getattr(message, field.name))):
+                yield from _item_changes(message, field, index, f"{path}[{index}]")
+        elif not field.message_type:
             yield from _value_changes(message, field, path)
         elif field.is_repeated:
             for index, item in enumerate(getattr(message, field.name)):
@@ -129,6 +137,16 @@ def _value_changes(message: Message, field: FieldDescriptor, path: str) -> Itera
             setattr(message, field.name, value)
             yield f"{path} = {value!r}"
     setattr(message, field.name, kept)
+
+
+def _item_changes(message: Message, field: FieldDescriptor, index: int, path: str) -> Iterator[str]:
+    items = getattr(message, field.name)
+    kept = items[index]
+    for value in _other_values(field):
+        if value != kept:
+            items[index] = value
+            yield f"{path} = {value!r}"
+    items[index] = kept
 
 
 def _other_values(field: FieldDescriptor) -> Sequence[Any]:

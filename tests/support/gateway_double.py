@@ -137,6 +137,12 @@ class GatewayDouble(robot_gateway_pb2_grpc.RobotGatewayServicer):
     def ReportPicture(self, _request: Any, context: Any) -> Any:  # noqa: N802
         _not_offered(context)
 
+    def SetTeleopEnabled(self, _request: Any, context: Any) -> Any:  # noqa: N802
+        _not_offered(context)
+
+    def SendTeleopCommand(self, _request: Any, context: Any) -> Any:  # noqa: N802
+        _not_offered(context)
+
     def preview_service_dies(self) -> None:
         """From now on nobody makes video; what is wanted stays wanted."""
         preview = self.status.preview

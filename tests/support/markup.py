@@ -18,7 +18,9 @@ def mark_up(message: Message) -> None:
             mark_up(below.add())
         elif field.message_type:
             mark_up(below)
-        elif field.type == field.TYPE_STRING and not field.is_repeated:
+        elif field.type == field.TYPE_STRING and field.is_repeated:
+            below.append(MARKUP)
+        elif field.type == field.TYPE_STRING:
             setattr(message, field.name, MARKUP)
 
 

@@ -65,7 +65,7 @@ def plan_of(description: str, passphrase: str = "", start_s: float = 5.0) -> Pla
     faster = ProfileSettings(**asdict(FASTER))
     settings = PreviewSettings(
         source=GstSource(description=description),
-        profiles=ProfilesSettings(balanced=small, high_quality=faster),
+        profiles=ProfilesSettings.model_validate({"balanced": small, "high-quality": faster}),
         srt=SrtSettings(bind="127.0.0.1", port=free_udp_port(), latency_ms=20),
         timeouts=TimeoutSettings(start_s=start_s),
     )

@@ -22,7 +22,7 @@ def environment(**extra: str) -> dict[str, str]:
     """This one without settings and known robots that would change how robotctl behaves."""
     dropped = {"ROBOTCTL_TARGET", "ROBOTCTL_ROBOT", "NO_COLOR", "FORCE_COLOR", "COLUMNS", "LINES", "TERM"}
     kept = {name: value for name, value in os.environ.items() if name not in dropped}
-    return kept | {"XDG_CONFIG_HOME": "/nonexistent"} | extra
+    return kept | {"XDG_CONFIG_HOME": "/nonexistent", "ROBOTCTL_DISCOVERY": "127.0.0.1"} | extra
 
 
 def robotctl(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":

@@ -32,9 +32,9 @@ class Type:
 
     def allows(self, value: object) -> bool:
         """Whether the value is of this type."""
-        if listed := re.findall(r'"([^"]+)"', self.words):
-            return value in listed
         names = self.words.split(" or ")
+        if listed := re.findall(r'"([^"]+)"', self.words):
+            return value in listed or (value is None and names[-1] == "null")
         if isinstance(value, bool):
             return "boolean" in names
         return isinstance(value, tuple(kind for name in names for kind in _TYPES[name]))

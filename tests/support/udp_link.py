@@ -78,16 +78,23 @@ class UdpLink:
         to_port: of the listener, at 127.0.0.1.
         impairment: of the link; kept, so that it may be changed.
         seed: of the random losses.
+        at: address and port of the link; by default any port at 127.0.0.1.
     """
 
-    def __init__(self, to_port: int, impairment: Impairment | None = None, seed: int = 1) -> None:
+    def __init__(
+        self,
+        to_port: int,
+        impairment: Impairment | None = None,
+        seed: int = 1,
+        at: tuple[str, int] = ("127.0.0.1", 0),
+    ) -> None:
         self.impairment = impairment or Impairment()
         self.bytes_to_callers = 0
         """Of all packets that have arrived at callers so far."""
         self._to = ("127.0.0.1", to_port)
         self._towards_listener = _Line(Direction(self.impairment, seed))
         self._towards_callers = _Line(Direction(self.impairment, seed + 1))
-        self._front = _socket()
+        self._front = _socket(at)
         self.port: int = self._front.getsockname()[1]
         self._backs: dict[tuple[str, int], socket.socket] = {}
         """By caller, so that the listener sees each as a peer of its own."""
@@ -177,7 +184,7 @@ class _Line:
         return found
 
 
-def _socket() -> socket.socket:
+def _socket(at: tuple[str, int] = ("127.0.0.1", 0)) -> socket.socket:
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    made.bind(("127.0.0.1", 0))
+    made.bind(at)
     return made

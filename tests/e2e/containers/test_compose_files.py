@@ -10,7 +10,7 @@ from tests.support.engine import ROOT
 
 pytestmark = pytest.mark.docker
 
-OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded")
+OVERLAYS = ("", "rockchip", "v4l2", "vaapi", "demo", "guarded", "realtime")
 
 
 def config(*overlays: str, profile: str = "") -> dict[str, Any]:
@@ -39,11 +39,24 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert "no-new-privileges:true" in service["security_opt"], name
         assert not service.get("privileged"), name
         assert "cap_add" not in service, name
-    for name in ("gateway", "preview"):
+    for name in ("gateway", "preview", "drive"):
         assert services[name]["restart"] == "unless-stopped"
         assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
         assert int(services[name]["mem_limit"]) <= 512 << 20
         assert services[name]["pids_limit"] <= 256
+
+
+def test_real_time_priority_takes_no_privilege() -> None:
+    drive = config("realtime", profile="drive")["services"]["drive"]
+    assert drive["ulimits"]["rtprio"] == 20
+    assert drive["oom_score_adj"] < 0
+
+
+def test_driving_is_off_unless_its_profile_is_asked_for() -> None:
+    assert not {"drive", "drive-config"} & config()["services"].keys()
+    drive = config(profile="drive")["services"]["drive"]
+    assert drive["cpu_shares"] > 1024
+    assert (drive["network_mode"], drive["ipc"]) == ("host", "host")
 
 
 @pytest.mark.parametrize("overlay", [each for each in OVERLAYS if each != "demo"])

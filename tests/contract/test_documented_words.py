@@ -1,0 +1,95 @@
+"""Commands and options that the documents name are those of the programs."""
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from console.cli.app import command_line
+from console.cli.lazy import LazyCommand
+from gateway.cli import app as gateway_app
+from preview.cli import app as preview_app
+from simrobot.cli import app as simrobot_app
+from tests.support.documented_commands import PAGES as COMMAND_PAGES
+from tests.support.documented_commands import ROOT, blocks
+
+PAGES = sorted(path.relative_to(ROOT) for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+HISTORY = Path("CHANGELOG.md")
+SPAN = re.compile(r"`([^`\n]+)`")
+PROGRAM = re.compile(r"(?<![\w/.-])(robotctl|robot-gateway|robot-preview|simrobot) ([^|;&<>()\n]*)")
+WORD = re.compile(r"[a-z][a-z-]+")
+
+
+@cache
+def program(name: str) -> Any:
+    if name == "robotctl":
+        return command_line()
+    app = {"robot-gateway": gateway_app, "robot-preview": preview_app, "simrobot": simrobot_app}[name]
+    return typer.main.get_command(app)
+
+
+def options(command: Any) -> set[str]:
+    context = typer.Context(command)
+    return {each for parameter in command.get_params(context) for each in parameter.opts}
+
+
+def problem(name: str, words: list[str]) -> str:
+    """What of a command line does not exist; empty where all does."""
+    command = program(name)
+    known = options(command) | {"--help", "--install-completion", "--show-completion"}
+    for word in words:
+        if isinstance(command, TyperGroup) and WORD.fullmatch(word):
+            if word not in command.commands:
+                return f"{name} has no command {word}"
+            command = command.commands[word]
+            command = command.load() if isinstance(command, LazyCommand) else command
+            known |= options(command)
+        elif word.startswith("--") and word.partition("=")[0] not in known:
+            return f"{name} has no option {word}"
+    return ""
+
+
+def documented(page: Path) -> list[tuple[str, list[str]]]:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    spans = SPAN.findall(text)
+    pasted: list[str] = []
+    if str(page) in COMMAND_PAGES:
+        commands = [block for block in blocks(str(page)) if "synopsis" not in block.reason]
+        pasted = [line for block in commands for line in block.text.splitlines()]
+    found = []
+    for source in (*spans, *(line.partition(" #")[0] for line in pasted)):
+        for name, rest in PROGRAM.findall(source.replace("\\|", "|")):
+            found.append((name, rest.split()))
+    return found
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != HISTORY], ids=str)
+def test_what_a_page_names_exists(page: Path) -> None:
+    problems = [found for name, words in documented(page) if (found := problem(name, words))]
+    assert problems == []
+
+
+def test_the_synopsis_names_every_command_and_option() -> None:
+    (synopsis,) = (block.text for block in blocks("docs/robotctl.md") if "synopsis" in block.reason)
+    lines = re.sub(r"\n {40,}(?=\[)", " ", synopsis).replace("[--json] ", "[--json]\n").splitlines()
+    named: set[tuple[str, ...]] = set()
+    for line in lines[1:]:
+        words = [word for word in line.split("[")[0].split() if WORD.fullmatch(word)]
+        words = words or line.split()[:1]
+        for last in re.findall(r"[a-z]+\|[a-z]+", line.split("[")[0])[:1]:
+            named |= {(words[0], each) for each in last.split("|")}
+        named.add(tuple(words))
+        given = re.findall(r"--[a-z-]+", line)
+        assert problem("robotctl", [*words, *given]) == "", line
+    assert {words[0] for words in named} == set(command_line().commands)
+
+
+def test_what_does_not_exist_is_noticed() -> None:
+    assert problem("robotctl", ["statsu"])
+    assert problem("robotctl", ["preview", "on", "--bandwidth", "low"])
+    assert problem("robot-gateway", ["credentials", "ad"])
+    assert not problem("robotctl", ["--robot", "lab2", "preview", "on", "--profile", "low-bw"])

@@ -1,0 +1,122 @@
+"""A robot for the cockpit: a gateway double that streams, and before it a real preview of real footage."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from omniseer.gateway.v1 import preview_pb2
+from omniseer.gateway.v1 import states_pb2 as states
+from tests.support.gateway_double import StreamingGatewayDouble, serving
+from tests.support.running_preview import RunningPreview
+
+PICTURE = (1280, 720)
+_SOURCE = "videotestsrc is-live=true pattern=smpte ! video/x-raw,width=1280,height=720,framerate=15/1"
+
+
+@dataclass
+class CockpitRobot:
+    """What the window talks to.
+
+    Args:
+        gateway: its answers may be changed.
+        target: its address.
+    """
+
+    gateway: StreamingGatewayDouble
+    target: str
+
+
+@contextmanager
+def resting_robot() -> Iterator[CockpitRobot]:
+    """A robot that drives a curve; its preview is off."""
+    double = StreamingGatewayDouble()
+    _fill(double)
+    with serving(double) as port:
+        yield CockpitRobot(double, f"127.0.0.1:{port}")
+
+
+@contextmanager
+def seeing_robot(directory: Path) -> Iterator[CockpitRobot]:
+    """The same robot with 16:9 video and two boxes."""
+    double = StreamingGatewayDouble()
+    _fill(double)
+    profile = {"width_px": PICTURE[0], "height_px": PICTURE[1], "fps": 15, "bitrate_kbps": 2000}
+    settings = {"source": {"kind": "gst", "description": _SOURCE}, "profiles": {"balanced": profile}}
+    with RunningPreview(directory, settings) as preview, serving(double) as port:
+        preview.enable()
+        preview.running()
+        shown = double.status.preview
+        shown.state, shown.profile = states.PREVIEW_RUNNING, preview_pb2.PREVIEW_PROFILE_BALANCED
+        shown.endpoint.host, shown.endpoint.port, shown.endpoint.latency_ms = "127.0.0.1", preview.port, 20
+        shown.endpoint.transport = preview_pb2.STREAM_TRANSPORT_SRT
+        shown.endpoint.container = preview_pb2.STREAM_CONTAINER_MPEG_TS
+        yield CockpitRobot(double, f"127.0.0.1:{port}")
+
+
+def _fill(double: StreamingGatewayDouble) -> None:
+    status = double.status
+    platform, preview = status.platform, status.preview
+    battery, compute, network = platform.power.lipo_battery, platform.compute, platform.network
+    battery.voltage, battery.voltage_available = 12.4, True
+    compute.available, compute.cpu_percent, compute.ram_used_percent = True, 41, 37
+    compute.cpu_temperature_available, compute.cpu_temperature_c = True, 58
+    network.available, network.connected, network.interface_name = True, True, "wlan0"
+    network.wifi_signal_available, network.wifi_signal_dbm = True, -58
+    status.mission.available, status.mission.mode = True, "manual"
+    preview.encoder.name = preview.encoder.wanted = "x264"
+    preview.video.width_px, preview.video.height_px, preview.video.fps = *PICTURE, 15
+    measured = preview.measured
+    measured.available, measured.fps, measured.bitrate_kbps, measured.viewer_count = True, 14.9, 2704, 1
+    measured.worst_rtt_ms, measured.worst_loss_percent, measured.worst_picture_age_ms = 8.2, 0.4, 118
+    found = double.overlay.detections
+    found.available, found.source_width_px, found.source_height_px = True, *PICTURE
+    found.detection_count = 2
+    for name, x in (("person", 640), ("parcel beside the lift", 1250)):
+        found.detections.add(
+            class_name=name,
+            score=0.9,
+            bbox_center_x_px=x,
+            bbox_center_y_px=400,
+            bbox_width_px=60,
+            bbox_height_px=200,
+        )
+
+
+def with_teleop(double: StreamingGatewayDouble) -> None:
+    """Makes it a robot that accepts velocity commands."""
+    teleop = double.status.teleop
+    teleop.state, teleop.enabled = states.TELEOP_ENABLED, True
+    teleop.max_linear_mps, teleop.max_angular_rad_s = 0.8, 1.5
+
+
+def with_trouble(double: StreamingGatewayDouble) -> None:
+    """Makes it a robot with a low battery, stale odometry, two active faults and a cleared one."""
+    status = double.status
+    status.platform.power.lipo_battery.percentage = 12
+    status.health.state, status.health.summary = states.ROBOT_HEALTH_DEGRADED, "odometry stopped coming"
+    status.health.odom_stale, status.health.odom_age_ms = True, 4000
+    for name, severity, message, remedy in (
+        ("odometry.stale", 3, "odometry stopped coming on /odom", "Check that the drive's node still runs"),
+        ("battery.low", 2, "the robot's battery is low: 20 % or less", "Bring the robot to its charger"),
+    ):
+        component = name.split(".")[0]
+        status.faults.add(
+            id=name,
+            severity=severity,
+            component=component,
+            message=message,
+            remedy=remedy,
+            active=True,
+            age_ms=4000,
+            times_raised=1,
+        )
+    status.faults.add(
+        id="disk.full",
+        severity=2,
+        component="disk",
+        message="the disk is nearly full: 95 % or more",
+        active=False,
+        cleared_age_ms=65_000,
+        times_raised=1,
+    )

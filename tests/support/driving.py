@@ -1,0 +1,316 @@
+"""A simulated robot with a base, the drive program, a driver, and a witness behind the mux."""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import psutil
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+from common.ros_node import message_class, ros_node
+from omniseer.drive.v1 import drive_pb2 as pb
+from tests.support.drive_peer import Instants
+from tests.support.ros import SimulatedRobot, simulated_robot
+from tests.support.waiting import wait_until
+
+_ROOT: Final = Path(__file__).parents[2]
+BEHIND_THE_MUX: Final = "/mecanum_drive_controller/reference"
+_END_S: Final = 10.0
+_ATTEMPTS: Final = 5
+
+
+@dataclass
+class Witness:
+    """What reaches the base: (instant in ns of CLOCK_MONOTONIC, speed), in order."""
+
+    seen: list[tuple[int, float]] = field(default_factory=list)
+
+    def take(self, message: Any) -> None:
+        """Records a message, when it arrives."""
+        twist = message.twist
+        speed = abs(twist.linear.x) + abs(twist.linear.y) + abs(twist.angular.z)
+        self.seen.append((time.monotonic_ns(), speed))
+
+    def moves(self) -> bool:
+        """Whether the newest is motion."""
+        return bool(self.seen) and self.seen[-1][1] > 0
+
+    def motion_since(self, since_ns: int) -> list[int]:
+        """When motion has arrived since then."""
+        return [ns for ns, speed in self.seen if ns >= since_ns and speed > 0]
+
+    def zero_after_ms(self, since_ns: int) -> float:
+        """How long after an instant zero has arrived that no motion has followed."""
+        last = max(self.motion_since(since_ns), default=since_ns)
+        return next((ns - since_ns) / 1e6 for ns, speed in self.seen if ns >= last and not speed)
+
+
+@contextmanager
+def witness() -> Iterator[Witness]:
+    """Yields a subscriber behind the mux, on a thread of its own."""
+    seen = Witness()
+    with ros_node("witness") as node:
+        node.create_subscription(
+            message_class("geometry_msgs/msg/TwistStamped"), BEHIND_THE_MUX, seen.take, 100
+        )
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+
+        def spin() -> None:
+            with suppress(ExternalShutdownException):
+                executor.spin()
+
+        thread = threading.Thread(target=spin)
+        thread.start()
+        try:
+            yield seen
+        finally:
+            executor.shutdown()
+            thread.join(_END_S)
+
+
+class Observer:
+    """Reads the state of the drive program.
+
+    Args:
+        path: of its socket.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._link: socket.socket | None = None
+
+    def close(self) -> None:
+        """Disconnects."""
+        if self._link:
+            self._link.close()
+            self._link = None
+
+    def state(self) -> pb.ActualState | None:
+        """Returns the newest state; None while the program can't be reached."""
+        try:
+            if self._link is None:
+                self._link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                self._link.settimeout(3)
+                self._link.connect(str(self._path))
+                self._link.send(pb.ToDrive(hello=pb.Hello()).SerializeToString())
+            newest = self._next()
+            while self._pending():
+                newest = self._next() or newest
+        except OSError:
+            self.close()
+            return None
+        return newest
+
+    def now(self) -> pb.ActualState:
+        """Returns the newest state, waiting for the program if need be."""
+        return wait_until(self.state, "a state", 30)
+
+    def phase_is(self, *phases: str) -> pb.ActualState:
+        """Waits for one of these phases; returns the state."""
+        numbers = [pb.Phase.Value(f"PHASE_{phase}") for phase in phases]
+        newest = self.now()
+
+        def reached() -> bool:
+            nonlocal newest
+            newest = self.now()
+            return newest.phase in numbers
+
+        try:
+            wait_until(reached, f"phase {phases}", 20)
+        except AssertionError as error:
+            raise AssertionError(f"{error}; it is {newest}") from None
+        return newest
+
+    def _next(self) -> pb.ActualState | None:
+        assert self._link
+        packet = self._link.recv(65536)
+        if not packet:
+            raise ConnectionResetError
+        message = pb.FromDrive.FromString(packet)
+        return message.actual if message.HasField("actual") else None
+
+    def _pending(self) -> bool:
+        assert self._link
+        ready, _, _ = select.select([self._link], [], [], 0)
+        return bool(ready)
+
+
+class Peer:
+    """The gateway's end, in a process (tests.support.drive_peer).
+
+    Args:
+        path: of the drive program's socket.
+        instants: file that it shares.
+    """
+
+    def __init__(self, path: Path, instants: Path) -> None:
+        self.instants, self.path = Instants(instants), instants
+        command = [sys.executable, "-m", "tests.support.drive_peer", str(path), str(instants)]
+        self.process = subprocess.Popen(
+            command, cwd=_ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout
+        assert self.process.stdout.readline() == "ready\n"
+
+    def tell(self, **line: Any) -> None:
+        """Has it do something."""
+        assert self.process.stdin
+        self.process.stdin.write(json.dumps(line) + "\n")
+        self.process.stdin.flush()
+
+    def close(self) -> None:
+        """Ends it, frozen or not."""
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe
+            with suppress(BrokenPipeError):
+                pipe.close()
+        self.instants.close()
+
+
+@dataclass
+class Driving:
+    """Everything that runs.
+
+    Args:
+        robot: simulated, with a base.
+        directory: for sockets, state and logs.
+        settings: of the drive program, beyond those that the tests need.
+    """
+
+    robot: SimulatedRobot
+    witness: Witness
+    directory: Path
+    settings: dict[str, Any] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
+    guard: "subprocess.Popen[bytes] | None" = None
+    peer: Peer | None = None
+    peers: int = 0
+
+    def __post_init__(self) -> None:
+        self.socket = self.directory / "drive.sock"
+        self.observer = Observer(self.socket)
+
+    def start(self) -> None:
+        """Starts the drive program; it serves when this returns."""
+        config = self.directory / "drive.yaml"
+        values = {"socket": str(self.socket), "state_dir": str(self.directory / "state")} | self.settings
+        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+        command = [sys.executable, "-m", "drive.cli", "serve", "--config", str(config)]
+        with (self.directory / "drive.log").open("ab") as log:
+            self.guard = subprocess.Popen(command, cwd=_ROOT, stderr=log, env=os.environ | self.environment)
+        wait_until(self.observer.state, "the drive program serves", 30)
+
+    def connect(self) -> Peer:
+        """Connects a new gateway's end."""
+        if self.peer:
+            self.peer.close()
+        self.peers += 1
+        self.peer = Peer(self.socket, self.directory / f"instants-{self.peers}")
+        return self.peer
+
+    def state(self) -> pb.ActualState:
+        """Returns the newest state."""
+        return self.observer.now()
+
+    def phase_is(self, *phases: str) -> pb.ActualState:
+        """Waits for one of these phases; returns the state."""
+        return self.observer.phase_is(*phases)
+
+    def ready(self) -> Peer:
+        """Connects a new gateway's end and resets what is latched; nobody drives when this returns."""
+        if self.guard is None or self.guard.poll() is not None:
+            self.start()
+        wait_until(self.observer.state, "a worker that serves", 30)
+        peer = self.connect()
+        wait_until(self._available, "nobody drives, and no stop is latched", 30)
+        return peer
+
+    def drive(self, vx: float = 0.1) -> Peer:
+        """Drives; the base moves when this returns."""
+        peer = self.ready()
+        peer.tell(lease="anna", vx=vx)
+        for _ in range(_ATTEMPTS):
+            peer.tell(held=False)
+            wait_until(self._armed, "a driver who may begin", 30)
+            peer.tell(held=True)
+            if self._reaches(vx):
+                return peer
+        raise AssertionError(f"it does not drive; it is {self.state()}")
+
+    def _reaches(self, vx: float) -> bool:
+        """Waits for full speed; False if the driver was late meanwhile, as on a machine that is too busy."""
+        began_ns = time.monotonic_ns()
+        wait_until(lambda: self.state().monotonic_ns > began_ns, "a newer state")
+        return wait_until(
+            lambda: (
+                "inhibited"
+                if self.state().phase == pb.PHASE_INHIBITED
+                else "fast"
+                if self.witness.seen and self.witness.seen[-1][1] > vx - 0.001
+                else ""
+            ),
+            "full speed",
+        ) == "fast"  # fmt: skip
+
+    def _available(self) -> bool:
+        state = self.state()
+        if self.peer and state.HasField("stop"):
+            self.peer.tell(reset=state.stop.stop_id)
+        return state.phase == pb.PHASE_AVAILABLE
+
+    def _armed(self) -> bool:
+        state = self.state()
+        return state.phase == pb.PHASE_ARMED and state.newest_sequence > 0 and not state.inhibits
+
+    @property
+    def worker(self) -> psutil.Process:
+        """The worker's process."""
+        assert self.guard
+        return psutil.Process(self.guard.pid).children()[0]
+
+    def settled(self) -> None:
+        """Waits until nothing has reached the base as motion for half a second."""
+        wait_until(
+            lambda: not self.witness.motion_since(time.monotonic_ns() - 500_000_000), "the robot is at rest"
+        )
+
+    def close(self) -> None:
+        """Ends everything that was started here."""
+        self.observer.close()
+        if self.peer:
+            self.peer.close()
+        if self.guard:
+            with suppress(psutil.NoSuchProcess, IndexError):
+                self.worker.resume()
+            self.guard.send_signal(signal.SIGCONT)
+            self.guard.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                self.guard.wait(_END_S)
+            self.guard.kill()
+            self.guard.wait()
+
+
+@contextmanager
+def driving(directory: Path, *behaviour: str, **settings: Any) -> Iterator[Driving]:
+    """A robot at rest, in the ROS domain of the environment; the drive program serves."""
+    with ExitStack() as stack:
+        robot = stack.enter_context(simulated_robot(directory, "--base", "commander=nobody", *behaviour))
+        seen = stack.enter_context(witness())
+        made = Driving(robot, seen, directory, settings)
+        stack.callback(made.close)
+        made.start()
+        yield made
