@@ -33,12 +33,17 @@ class Sample(Generic[ValueT_co]):
 ABSENT: Final[Sample[Any]] = Sample(None, NEVER)
 
 
-def sample(received: Received[ValueT_co] | None, stale_after_ms: int, now_s: float) -> Sample[ValueT_co]:
-    """Returns the value at `now_s`; stale if strictly older than `stale_after_ms`.
+def age_ms(at_s: float, now_s: float) -> int:
+    """Returns the age in ms of what happened at `at_s`, 0 at least.
 
-    A value that another thread received after `now_s` was read has the age 0.
+    Another thread may have stamped it after `now_s` was read.
     """
+    return max(0, int((now_s - at_s) * 1000))
+
+
+def sample(received: Received[ValueT_co] | None, stale_after_ms: int, now_s: float) -> Sample[ValueT_co]:
+    """Returns the value at `now_s`; stale if strictly older than `stale_after_ms`."""
     if received is None:
         return ABSENT
-    age_ms = max(0, int((now_s - received.at_s) * 1000))
-    return Sample(received.value, Freshness(available=True, stale=age_ms > stale_after_ms, age_ms=age_ms))
+    age = age_ms(received.at_s, now_s)
+    return Sample(received.value, Freshness(available=True, stale=age > stale_after_ms, age_ms=age))

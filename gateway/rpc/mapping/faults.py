@@ -2,6 +2,7 @@
 
 from gateway.rpc.mapping.enums import SEVERITIES
 from gateway.status.fault import Fault
+from gateway.status.freshness import age_ms
 from omniseer.gateway.v1 import fault_pb2 as pb
 
 
@@ -14,11 +15,7 @@ def fill_fault(message: pb.Fault, fault: Fault, now_s: float) -> None:
     message.message = condition.message
     message.remedy = condition.remedy
     message.active = fault.active
-    message.age_ms = _age_ms(fault.onset_s, now_s)
+    message.age_ms = age_ms(fault.onset_s, now_s)
     if fault.cleared_s is not None:
-        message.cleared_age_ms = _age_ms(fault.cleared_s, now_s)
+        message.cleared_age_ms = age_ms(fault.cleared_s, now_s)
     message.times_raised = fault.times_raised
-
-
-def _age_ms(at_s: float, now_s: float) -> int:
-    return max(0, int((now_s - at_s) * 1000))

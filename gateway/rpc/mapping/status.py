@@ -13,7 +13,7 @@ from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.teleop import teleop_status
 from gateway.status.command import Command
 from gateway.status.event_log import OperatorEvent
-from gateway.status.freshness import Sample
+from gateway.status.freshness import Sample, age_ms
 from gateway.status.snapshot import Snapshot
 from gateway.status.source_view import SourceView
 from gateway.status.sources import (
@@ -153,16 +153,16 @@ def _detection(item: Detection) -> overlay_pb2.OverlayDetection:
 
 
 def _fill_source(message: source_pb2.SourceStatus, source: SourceView) -> None:
-    available, stale, age_ms = source.freshness
+    available, stale, age = source.freshness
     message.name = source.spec.name
     message.state = SOURCE_STATES[source.state]
     message.available = available
     message.stale = stale
-    message.age_ms = age_ms
+    message.age_ms = age
     message.required = source.required
     message.detail = source.detail
 
 
 def _event(event: OperatorEvent, now_s: float) -> overlay_pb2.OperatorEvent:
-    age_ms = max(0, int((now_s - event.at_s) * 1000))
-    return overlay_pb2.OperatorEvent(sequence=event.sequence, age_ms=age_ms, message=event.message)
+    age = age_ms(event.at_s, now_s)
+    return overlay_pb2.OperatorEvent(sequence=event.sequence, age_ms=age, message=event.message)

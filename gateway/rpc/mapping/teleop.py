@@ -4,6 +4,7 @@ from typing import Final
 
 from gateway.links.drive.state import DriveCommand
 from gateway.rpc.mapping.enums import DRIVE_INHIBITS, DRIVE_PHASES, TELEOP_STATES
+from gateway.status.freshness import age_ms
 from gateway.status.teleop import DriveLimits, StopLatch, TeleopView
 from gateway.status.values import Velocity
 from gateway.teleop.lane import DriveFacts
@@ -29,10 +30,10 @@ def teleop_status(view: TeleopView, now_s: float) -> system_status_pb2.TeleopSta
         holder=view.holder,
     )
     if view.command:
-        velocity, age_ms = view.command.value, int((now_s - view.command.at_s) * 1000)
+        velocity, age = view.command.value, age_ms(view.command.at_s, now_s)
         status.last_command_available = True
-        status.last_command_age_ms = age_ms
-        status.last_command_stale = age_ms > COMMAND_STALE_AFTER_MS
+        status.last_command_age_ms = age
+        status.last_command_stale = age > COMMAND_STALE_AFTER_MS
         status.last_command_vx_mps = velocity.vx_mps
         status.last_command_vy_mps = velocity.vy_mps
         status.last_command_wz_rad_s = velocity.wz_rad_s
