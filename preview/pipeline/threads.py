@@ -34,10 +34,16 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
     done.set_running_or_notify_cancel()  # From here on, giving up does not disturb the thread.
 
     def run() -> None:
+        nonlocal work
         try:
-            done.set_result(work())
+            result = work()
         except BaseException as error:  # noqa: BLE001  # raised again by the awaiting coroutine
             done.set_exception(error)
+            return
+        # The loop may go on before this thread ends, and what the call references (a listener, which keeps
+        # its port) must not outlive the result.
+        del work
+        done.set_result(result)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
     return await asyncio.wait_for(asyncio.wrap_future(done), deadline_s)
