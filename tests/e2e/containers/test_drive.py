@@ -12,7 +12,8 @@ from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, 
 from tests.support.driving import Observer, Peer
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.docker, pytest.mark.ros, pytest.mark.timeout(900)]
+# Timed: while a driver has the robot, 60 ms without a heartbeat stop it, and other tests take as much.
+pytestmark = [pytest.mark.docker, pytest.mark.ros, pytest.mark.timed, pytest.mark.timeout(900)]
 
 USER, GROUP = 10003, 10000
 
