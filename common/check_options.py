@@ -1,8 +1,11 @@
-"""Options of the command `check`, the same for all programs."""
+"""The command `check`: its options, and what it does in a program whose settings are all that it checks."""
 
+from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import typer
+
+from common.config import Settings, as_yaml, json_schema, load
 
 PrintOption: TypeAlias = Annotated[
     bool, typer.Option("--print", help="Print the configuration in effect, with all defaults.")
@@ -10,3 +13,27 @@ PrintOption: TypeAlias = Annotated[
 SchemaOption: TypeAlias = Annotated[
     bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
 ]
+
+
+def check_settings(
+    settings_type: type[Settings], path: Path | None, *, in_effect: bool, schema: bool
+) -> None:
+    """Checks a configuration and prints that it is good, or what was asked for.
+
+    Args:
+        settings_type: what it is read into.
+        path: the file.
+        in_effect: whether to print the configuration in effect.
+        schema: whether to print the schema, and check nothing.
+
+    Raises:
+        UserError: the configuration is wrong.
+    """
+    if schema:
+        print(json_schema(settings_type))
+        return
+    settings = load(settings_type, path)
+    if in_effect:
+        print(as_yaml(settings), end="")
+    else:
+        print(f"{path or 'the environment'}: ok")

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption
+from common.check_options import PrintOption, SchemaOption, check_settings
 from common.findings import exit_code, print_findings
 from drive.config import DriveSettings
 from drive.log_thread import log_in_thread
@@ -48,14 +48,7 @@ def worker(config_file: _Config = None) -> None:
 @app.command()
 def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
     """Checks the configuration and exits."""
-    if schema:
-        print(config.json_schema(DriveSettings))
-        return
-    settings = config.load(DriveSettings, config_file)
-    if in_effect:
-        print(config.as_yaml(settings), end="")
-    else:
-        print(f"{config_file or 'the environment'}: ok")
+    check_settings(DriveSettings, config_file, in_effect=in_effect, schema=schema)
 
 
 @app.command()

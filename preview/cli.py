@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption
+from common.check_options import PrintOption, SchemaOption, check_settings
 from preview.config import PreviewSettings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Serves the robot's live video.")
@@ -41,14 +41,7 @@ def serve(config_file: _Config = None) -> None:
 @app.command()
 def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
     """Checks the configuration and exits."""
-    if schema:
-        print(config.json_schema(PreviewSettings))
-        return
-    settings = config.load(PreviewSettings, config_file)
-    if in_effect:
-        print(config.as_yaml(settings), end="")
-    else:
-        print(f"{config_file or 'the environment'}: ok")
+    check_settings(PreviewSettings, config_file, in_effect=in_effect, schema=schema)
 
 
 @app.command()
