@@ -53,7 +53,7 @@ class Settings(BaseSettings):
 SettingsT = TypeVar("SettingsT", bound=Settings)
 
 
-class ConflictError(Exception):
+class SettingsConflictError(Exception):
     """Values that are valid each, but not together.
 
     Args:
@@ -77,7 +77,7 @@ def load(
     Args:
         settings_type: what it is read into.
         path: the file.
-        checks: of the whole; they raise `ConflictError`.
+        checks: of the whole; they raise `SettingsConflictError`.
 
     Raises:
         UserError: the file can't be read, is not YAML, or has an unknown key, a key twice or a wrong value.
@@ -103,7 +103,7 @@ def load(
     try:
         for check in checks:
             check(settings)
-    except ConflictError as error:
+    except SettingsConflictError as error:
         where = f"{path or 'from the environment'}{line_of(error.location)}"
         raise _error(f"{where}: {error.what}", error.remedy) from error
     return settings

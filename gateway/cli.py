@@ -9,7 +9,7 @@ from rich.console import Console
 
 from common import logs
 from common.check_options import PrintOption, SchemaOption
-from common.config import ConflictError, as_yaml, json_schema
+from common.config import SettingsConflictError, as_yaml, json_schema
 from common.errors import UserError
 from common.findings import exit_code, print_findings
 from common.program import bound_arenas, run, run_command_line
@@ -70,7 +70,7 @@ def _check_readers(settings: GatewaySettings) -> None:
         try:
             reader_for(source)
         except UserError as error:
-            raise ConflictError(("sources", position, "type"), error.what, error.remedy) from error
+            raise SettingsConflictError(("sources", position, "type"), error.what, error.remedy) from error
 
 
 @app.command()

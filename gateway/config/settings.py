@@ -7,7 +7,7 @@ from typing import Final, Literal
 from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
-from common.config import ConflictError, Section, Settings, load
+from common.config import Section, Settings, SettingsConflictError, load
 from gateway.config.faults import FaultSettings
 from gateway.config.security import SecuritySettings
 from gateway.config.serving import (
@@ -114,7 +114,7 @@ def _check_exposure(settings: GatewaySettings) -> None:
         what = "anyone on that network could read and control everything"
         if security.credentials is not None:
             what = "anyone on that network could read tokens and responses (security.tls.enabled is false)"
-        raise ConflictError(
+        raise SettingsConflictError(
             ("grpc", "host"),
             f"grpc.host is {settings.grpc.host}: {what}",
             "Authenticate callers ('robot-gateway credentials init' explains how), use 127.0.0.1 "
@@ -123,7 +123,7 @@ def _check_exposure(settings: GatewaySettings) -> None:
     metrics = settings.metrics
     open_metrics = metrics.port is not None and not is_loopback(metrics.host)
     if open_metrics and not metrics.insecure:
-        raise ConflictError(
+        raise SettingsConflictError(
             ("metrics", "host"),
             f"metrics.host is {metrics.host}: anyone on that network could read the metrics",
             "Use 127.0.0.1, or accept it with 'metrics: {insecure: true}'",
@@ -134,7 +134,7 @@ def _check_discovery(settings: GatewaySettings) -> None:
     discovery, host = settings.discovery, settings.grpc.host
     alone = bool(discovery.addresses) and all(map(is_loopback, discovery.addresses))
     if discovery.advertise and is_loopback(host) and not alone:
-        raise ConflictError(
+        raise SettingsConflictError(
             ("discovery", "advertise"),
             f"discovery.advertise announces a gateway that no other machine reaches: grpc.host is {host}",
             "Set grpc.host to 0.0.0.0 (with security.credentials), or leave discovery.advertise out",
@@ -147,7 +147,7 @@ def _check_driving(settings: GatewaySettings) -> None:
         and settings.security.credentials is None
         and not settings.teleop.allow_insecure
     ):
-        raise ConflictError(
+        raise SettingsConflictError(
             ("teleop", "socket"),
             "teleop.socket is set without authentication: anyone who reaches the gateway could drive",
             "Authenticate callers ('robot-gateway credentials init' explains how), or accept it with "
@@ -159,7 +159,7 @@ def _check_sources(settings: GatewaySettings) -> None:
     names = [source.name for source in settings.sources]
     for position, source in enumerate(settings.sources):
         if source.name in names[:position]:
-            raise ConflictError(
+            raise SettingsConflictError(
                 ("sources", position),
                 f"sources lists '{source.name}' {names.count(source.name)} times",
                 "Keep one topic for each kind, and one for each label of mux_input",
