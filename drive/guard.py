@@ -24,6 +24,7 @@ from drive.machine import OnLoss
 from drive.stop_file import StopFile, Stops
 from drive.values import MS, ZERO, Latch, Velocity
 from drive.watch import Watch
+from drive.wire import RESTING_PHASES
 from omniseer.drive.v1 import drive_pb2 as pb
 
 _log = logging.getLogger(__name__)
@@ -50,7 +51,6 @@ _FIRST_PAUSE_S: Final = 0.1
 _LONGEST_PAUSE_S: Final = 5.0
 _REFUSALS: Final = frozenset({ExitCode.FAILED, ExitCode.USAGE})
 """Of a worker that says why it does not start: another attempt would say the same."""
-_UNLEASED: Final = frozenset({pb.PHASE_DISABLED, pb.PHASE_AVAILABLE})
 
 
 class ZeroPort(Protocol):
@@ -195,7 +195,7 @@ class Guard:
             self._served = True
             self._backoff.reset()
             self._zeros_until_ns = 0
-        watch.beat(time.monotonic_ns(), leased=actual.phase not in _UNLEASED)
+        watch.beat(time.monotonic_ns(), leased=actual.phase not in RESTING_PHASES)
         stop = actual.stop
         latch = Latch(stop.stop_id, stop.by, stop.reason) if actual.HasField("stop") else None
         self._stops = Stops(max(self._stops.last_id, stop.stop_id), latch)

@@ -29,6 +29,10 @@ class Phase(Enum):
     """Zeros, then the robot's lock, until the stop is reset."""
 
 
+RESTING: Final = frozenset({Phase.DISABLED, Phase.AVAILABLE})
+"""There is neither a driver nor a stop: nothing is published."""
+
+
 class Trigger(Enum):
     """What may change the phase."""
 

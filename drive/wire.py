@@ -7,7 +7,7 @@ from google.protobuf.message import DecodeError
 
 from drive.episode import Episode
 from drive.machine import Enable, EndLease, Event, GrantLease, Reset, Rules, State, Stop
-from drive.phases import Phase
+from drive.phases import RESTING, Phase
 from drive.shaping import supervised_limit_mps
 from drive.values import ZERO, Command, Inhibit, Latch, Lease, LeaseEnd, Supervision, Velocity
 from omniseer.drive.v1 import drive_pb2 as pb
@@ -20,6 +20,7 @@ _MAX_TEXT: Final = 512
 """Characters kept of what callers write: every report must fit into one packet."""
 
 PHASES: Final = {phase: pb.Phase.Value(f"PHASE_{phase.name}") for phase in Phase}
+RESTING_PHASES: Final = frozenset(PHASES[phase] for phase in RESTING)
 INHIBITS: Final = {inhibit: pb.Inhibit.Value(f"INHIBIT_{inhibit.name}") for inhibit in Inhibit}
 _LEASE_ENDS: Final = {pb.LeaseEnd.Value(f"LEASE_END_{end.name}"): end for end in LeaseEnd}
 
@@ -130,20 +131,20 @@ def actual_state(
         vx_mps=output.vx_mps,
         vy_mps=output.vy_mps,
         wz_rad_s=output.wz_rad_s,
-        speed_limit_mps=speed_limit_mps(state, rules, now_ns),
+        speed_limit_mps=_speed_limit_mps(state, rules, now_ns),
         counters=counters,
         problems=problems,
     )
     if command:
         message.newest_sequence, message.command_ns = command.sequence, state.command_ns
     if state.latch:
-        message.stop.CopyFrom(latch_message(state.latch, state.since_ns))
+        message.stop.CopyFrom(_latch_message(state.latch, state.since_ns))
     if episode:
         message.episode.CopyFrom(_episode_message(episode))
     return message
 
 
-def speed_limit_mps(state: State, rules: Rules, now_ns: int) -> float:
+def _speed_limit_mps(state: State, rules: Rules, now_ns: int) -> float:
     """Returns the largest speed that the driver's way of seeing permits now."""
     if state.lease is None:
         return 0.0
@@ -151,7 +152,7 @@ def speed_limit_mps(state: State, rules: Rules, now_ns: int) -> float:
     return supervised_limit_mps(state.lease.supervision, (now_ns - picture_ns) / 1e9, rules.limits)
 
 
-def latch_message(latch: Latch, since_ns: int) -> pb.Latch:
+def _latch_message(latch: Latch, since_ns: int) -> pb.Latch:
     """Returns the message of a stop."""
     return pb.Latch(stop_id=latch.stop_id, by=latch.by, reason=latch.reason, since_ns=since_ns)
 

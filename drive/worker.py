@@ -15,7 +15,7 @@ from drive import wire
 from drive.endpoint import Endpoint, Peer, Received
 from drive.episode import Episode, followed
 from drive.machine import EndLease, Event, Observe, Rules, State, Stop, Tick, step
-from drive.phases import Phase
+from drive.phases import RESTING, Phase
 from drive.values import MS, ZERO, LeaseEnd, Surroundings, Velocity
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -42,7 +42,6 @@ _CONFIRMED: Final = frozenset({"desired", "stop", "reset"})
 _GUARD_NS: Final = 700 * MS
 """For a guard that has to be scheduled among everything else."""
 _COLLECT_EVERY_NS: Final = 60_000 * MS
-_RESTING: Final = frozenset({Phase.DISABLED, Phase.AVAILABLE})
 
 
 class BasePort(Protocol):
@@ -142,7 +141,7 @@ class Worker:
     @property
     def _due_ns(self) -> int:
         """When the next cycle is due: at once after the end of a rest."""
-        return self._cycled_ns + (_REST_CYCLE_NS if self._state.phase in _RESTING else _CYCLE_NS)
+        return self._cycled_ns + (_REST_CYCLE_NS if self._state.phase in RESTING else _CYCLE_NS)
 
     def _take(self, received: Received, now_ns: int) -> None:
         if received is Peer.LEFT:
@@ -171,10 +170,10 @@ class Worker:
         self._beat(now_ns)
         self._publish(now_ns)
         self._publish_lock(now_ns)
-        every_ns = _REST_REPORT_EVERY_NS if self._state.phase in _RESTING else _REPORT_EVERY_NS
+        every_ns = _REST_REPORT_EVERY_NS if self._state.phase in RESTING else _REPORT_EVERY_NS
         if now_ns - self._reported_ns >= every_ns:
             self._report(now_ns)
-        if self._state.phase in _RESTING and now_ns - self._collected_ns >= _COLLECT_EVERY_NS:
+        if self._state.phase in RESTING and now_ns - self._collected_ns >= _COLLECT_EVERY_NS:
             self._collected_ns = now_ns
             gc.collect()
 
@@ -240,7 +239,7 @@ class Worker:
     def _judge_guard(self, now_ns: int) -> None:
         """Gives a guard up that has read no heartbeat for too long; without a driver it may be frozen."""
         frozen = now_ns - self._guard_read_ns > _GUARD_NS
-        if frozen and self._state.phase not in _RESTING:
+        if frozen and self._state.phase not in RESTING:
             self._lose_guard("the guard is frozen")
 
     def _lose_guard(self, reason: str) -> None:

@@ -9,9 +9,8 @@ from common.findings import Finding, good, note, wrong
 from drive.client import observed_state
 from drive.config import DriveSettings
 from drive.doctor.judgement import graph_findings, program_findings, pulse_findings
+from drive.wire import RESTING_PHASES
 from omniseer.drive.v1 import drive_pb2 as pb
-
-_AT_REST = frozenset({pb.PHASE_DISABLED, pb.PHASE_AVAILABLE})
 
 
 def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:
@@ -48,7 +47,7 @@ def _graph(settings: DriveSettings, state: pb.ActualState | None, *, with_pulse:
         yield from graph_findings(look(node, settings))
         if not with_pulse:
             return
-        if state and state.phase not in _AT_REST:
+        if state and state.phase not in RESTING_PHASES:
             yield note(
                 "pulse",
                 "the pulse was left out: a driver has the robot, or it was stopped",

@@ -60,9 +60,9 @@ class _PhaseEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Phase.ValueType
     PHASE_UNSPECIFIED: _Phase.ValueType  # 0
     """Never sent."""
     PHASE_DISABLED: _Phase.ValueType  # 1
-    """Nobody can drive."""
+    """No one can drive."""
     PHASE_AVAILABLE: _Phase.ValueType  # 2
-    """Nobody drives."""
+    """No one drives."""
     PHASE_ARMED: _Phase.ValueType  # 3
     """A driver has the lease and does not hold."""
     PHASE_DRIVING: _Phase.ValueType  # 4
@@ -80,9 +80,9 @@ class Phase(_Phase, metaclass=_PhaseEnumTypeWrapper):
 PHASE_UNSPECIFIED: Phase.ValueType  # 0
 """Never sent."""
 PHASE_DISABLED: Phase.ValueType  # 1
-"""Nobody can drive."""
+"""No one can drive."""
 PHASE_AVAILABLE: Phase.ValueType  # 2
-"""Nobody drives."""
+"""No one drives."""
 PHASE_ARMED: Phase.ValueType  # 3
 """A driver has the lease and does not hold."""
 PHASE_DRIVING: Phase.ValueType  # 4
