@@ -6,17 +6,12 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from common.errors import UserError
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from common.ros_node import ros_node
 from simrobot.behaviour import Topic
 from simrobot.messages import PUBLICATIONS
 from simrobot.robot import Robot
-
-try:
-    from rclpy.context import Context
-    from rclpy.node import Node
-    from rclpy.qos import DurabilityPolicy, QoSProfile
-except ImportError as error:
-    raise UserError(f"ROS 2 can't be used from Python ({error})", "Type: scripts/setup") from error
 
 _DEPTH = 10
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -29,22 +24,8 @@ def publishing(robot: Robot, topics: frozenset[Topic]) -> Iterator[Mapping[Topic
     Raises:
         UserError: the middleware can't start.
     """
-    context = Context()
-    try:
-        context.init(args=[], initialize_logging=False)
-    except RuntimeError as error:
-        raise UserError(
-            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION"
-        ) from error
-    try:
-        node = Node("simulated_robot", context=context, use_global_arguments=False, enable_rosout=False)
-        try:
-            yield {topic: _publisher(node, robot, topic) for topic in topics}
-        finally:
-            node.destroy_node()
-    finally:
-        context.shutdown()
-        context.destroy()
+    with ros_node("simulated_robot", parameters=True) as node:
+        yield {topic: _publisher(node, robot, topic) for topic in topics}
 
 
 def _publisher(node: Any, robot: Robot, topic: Topic) -> Callable[[], None]:
