@@ -11,7 +11,6 @@ from typing import Annotated, Any, Final
 import typer
 
 from common.errors import UserError
-from common.version import project_version
 from console.cli import drive_keys
 from console.cli.drive_keys import Action, Hands
 from console.cli.keyboard import Keyboard, has_keyboard
@@ -76,7 +75,6 @@ async def _drive(
         take_over=take_over,
         supervision=Supervision.LINE_OF_SIGHT,
         input_device="keyboard",
-        client_name=f"robotctl {project_version()}",
     )
     async with session.connect_async() as client:
         if (await client.status()).teleop.state is TeleopState.UNKNOWN:

@@ -69,5 +69,4 @@ def typed_options(words: Sequence[str]) -> TypedOptions:
         elif not word.startswith("-"):
             others.append(word)
     command, *arguments = others or [""]
-    command, *arguments = others or [""]
     return TypedOptions(values["--target"], values["--robot"], command, tuple(arguments))

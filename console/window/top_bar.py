@@ -51,9 +51,7 @@ class TopBar(QWidget):
         self.battery_gauge = BatteryGauge()
         self.health = Cell("Health", ("DEGRADED", "2 errors, 2 warnings"), Marker())
         self.battery = Cell("Battery", ("100 %", "LOW, 12.6 V"), self.battery_gauge)
-        self.link = Cell(
-            "Link", ("not trusted", "SLOW \u00b7 100 ms \u00b7 loss 10.0 % \u00b7 Wi-Fi -58 dBm"), Marker()
-        )
+        self.link = Cell("Link", _WIDEST_LINK, Marker())
         self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture age"), Marker())
         self.mode = Cell("Mode", ("autonomous", "mode"), None)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)

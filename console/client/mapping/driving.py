@@ -8,7 +8,7 @@ from console.client.mapping import enums
 from console.client.mapping.reader import read
 from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 
-MAX_CLIENT_NAME: Final = 64
+_MAX_CLIENT_NAME: Final = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,14 +30,14 @@ def open_request(client_name: str, supervision: results.Supervision, *, take_ove
     """Returns the first request of a session's first lane."""
     number = enums.number(supervision, teleop_pb2.Supervision.DESCRIPTOR)
     opening = teleop_pb2.DriveOpen(
-        client_name=client_name[:MAX_CLIENT_NAME], take_over=take_over, supervision=number
+        client_name=client_name[:_MAX_CLIENT_NAME], take_over=take_over, supervision=number
     )
     return teleop_pb2.DriveRequest(open=opening).SerializeToString()
 
 
 def join_request(client_name: str, session_id: str) -> bytes:
     """Returns the first request of another lane."""
-    opening = teleop_pb2.DriveOpen(client_name=client_name[:MAX_CLIENT_NAME], session_id=session_id)
+    opening = teleop_pb2.DriveOpen(client_name=client_name[:_MAX_CLIENT_NAME], session_id=session_id)
     return teleop_pb2.DriveRequest(open=opening).SerializeToString()
 
 
