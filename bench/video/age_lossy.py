@@ -12,7 +12,7 @@ from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from bench.video import product
 from bench.video.camera import Camera, camera
-from bench.video.far_viewing import FarWatch, watch_far
+from bench.video.far_viewing import FarWatch, torn_row, watch_far
 from console.receiver.delivery import DeliveryChoice
 from tests.support.udp_link import Impairment
 
@@ -97,14 +97,7 @@ def _rows(source: Camera, robot: product.Robot, link: _Link, *, against: bool) -
             bar=link.delivered_percent,
             better="higher",
         ),
-        Row(
-            name=f"{link.name}_torn",
-            what=f"{link.what}: torn frames that were shown",
-            unit="",
-            values=[each.torn for each in direct],
-            bar=0,
-            judged="worst",
-        ),
+        torn_row(f"{link.name}_torn", link.what, direct),
     ]
     if theirs:
         rows.append(

@@ -8,7 +8,7 @@ from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
 from bench.video import product
 from bench.video.camera import Camera, camera
-from bench.video.far_viewing import FarWatch, watch_far
+from bench.video.far_viewing import FarWatch, torn_row, watch_far
 from console.client import PreviewProfile
 from tests.support.udp_link import Impairment, UdpLink
 
@@ -93,13 +93,6 @@ def _log(what: str, found: FarWatch) -> None:
     )
 
 
-def _torn_row(name: str, what: str, found: list[FarWatch]) -> Row:
-    torn = [each.torn for each in found]
-    return Row(
-        name=name, what=f"{what}: torn frames that were shown", unit="", values=torn, bar=0, judged="worst"
-    )
-
-
 def _adaptive_rows(found: list[FarWatch]) -> list[Row]:
     what = f"HIGH_QUALITY through {LIMIT_KBPS} kbit/s, adaptive"
     return [
@@ -118,7 +111,7 @@ def _adaptive_rows(found: list[FarWatch]) -> list[Row]:
             bar=800,
             judged="worst",
         ),
-        _torn_row("video.age_narrow_torn", what, found),
+        torn_row("video.age_narrow_torn", what, found),
     ]
 
 
@@ -133,7 +126,7 @@ def _fixed_rows(found: list[FarWatch]) -> list[Row]:
             bar=1000,
             judged="worst",
         ),
-        _torn_row("video.age_narrow_fixed_torn", what, found),
+        torn_row("video.age_narrow_fixed_torn", what, found),
     ]
 
 

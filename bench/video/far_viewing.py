@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bench.rows import Row
 from bench.video import product
 from bench.video.camera import Camera
 from bench.video.window import Glance, Window, longest_gap_ms
@@ -125,4 +126,12 @@ def watch_far(
         found["delivery"],
         preview.target_bitrate_kbps,
         preview.bitrate_reason,
+    )
+
+
+def torn_row(name: str, what: str, found: Sequence[FarWatch]) -> Row:
+    """Returns the row of torn frames, of which none may be shown."""
+    torn = [each.torn for each in found]
+    return Row(
+        name=name, what=f"{what}: torn frames that were shown", unit="", values=torn, bar=0, judged="worst"
     )

@@ -164,7 +164,7 @@ class Peer:
         assert self.process.stdout
         assert self.process.stdout.readline() == "ready\n"
 
-    def tell(self, **line: Any) -> None:
+    def send(self, **line: Any) -> None:
         """Has it do something."""
         assert self.process.stdin
         self.process.stdin.write(json.dumps(line) + "\n")
@@ -242,11 +242,11 @@ class Driving:
     def drive(self, vx: float = 0.1) -> Peer:
         """Drives; the base moves when this returns."""
         peer = self.ready()
-        peer.tell(lease="anna", vx=vx)
+        peer.send(lease="anna", vx=vx)
         for _ in range(_ATTEMPTS):
-            peer.tell(held=False)
+            peer.send(held=False)
             wait_until(self._armed, "a driver who may begin", 30)
-            peer.tell(held=True)
+            peer.send(held=True)
             if self._reaches(vx):
                 return peer
         raise AssertionError(f"it does not drive; it is {self.state()}")
@@ -269,7 +269,7 @@ class Driving:
     def _available(self) -> bool:
         state = self.state()
         if self.peer and state.HasField("stop"):
-            self.peer.tell(reset=state.stop.stop_id)
+            self.peer.send(reset=state.stop.stop_id)
         return state.phase == pb.PHASE_AVAILABLE
 
     def _armed(self) -> bool:

@@ -61,10 +61,10 @@ def test_it_drives_is_hardened_and_survives_its_guard(driven: Deployment, tmp_pa
     path = Path(f"/proc/{worker}/root/run/robot-drive/drive.sock")
     with closing(Observer(path)) as observer, closing(Peer(path, tmp_path / "instants")) as peer:
         observer.phase_is("AVAILABLE")
-        peer.tell(lease="anna", held=False)
+        peer.send(lease="anna", held=False)
         wait_until(lambda: observer.now().newest_sequence > 0, "commands arrive")
         observer.phase_is("ARMED")
-        peer.tell(held=True)
+        peer.send(held=True)
         observer.phase_is("DRIVING")
         wait_until(lambda: observer.now().episode.distance_m > 0.05, "it goes through the mux")
         assert not observer.now().inhibits

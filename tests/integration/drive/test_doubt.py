@@ -41,14 +41,14 @@ def test_blackouts_of_300_ms_do_not_move_the_robot_again_by_themselves(robot: Dr
     def blackout() -> float:
         peer = robot.drive()
         since_ns = time.monotonic_ns()
-        peer.tell(silent=True)
+        peer.send(silent=True)
         robot.phase_is("INHIBITED")
         time.sleep(0.05)
-        peer.tell(silent=False)  # The driver still holds.
+        peer.send(silent=False)  # The driver still holds.
         episode = robot.state().episode.episode_id
         time.sleep(0.3)
         assert robot.state().episode.episode_id == episode
-        peer.tell(held=False)
+        peer.send(held=False)
         robot.phase_is("ARMED", "INHIBITED")
         robot.settled()
         return oldest_command_ms(robot, since_ns)
@@ -79,7 +79,7 @@ def test_frozen_and_thawed_again_and_again_nothing_old_moves(robot: Driving, who
         time.sleep(0.1)
         if episode:
             assert robot.state().episode.episode_id == episode.episode.episode_id
-        peer.tell(held=False)
+        peer.send(held=False)
         robot.settled()
         return oldest_command_ms(robot, since_ns)
 
@@ -117,12 +117,12 @@ def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
     try:
         peer = robot.ready()
         wait_until(lambda: robot.witness.seen[-1][1] == pytest.approx(0.2), "autonomy drives")
-        peer.tell(lease="anna", held=False)
+        peer.send(lease="anna", held=False)
         wait_until(lambda: not robot.witness.moves(), "it is masked")
-        peer.tell(end="CLOSED")
+        peer.send(end="CLOSED")
         wait_until(lambda: robot.witness.seen[-1][1] == pytest.approx(0.2), "autonomy drives again")
         began_ns = time.monotonic_ns()
-        peer.tell(stop="ben")
+        peer.send(stop="ben")
         robot.phase_is("STOPPED")
         robot.settled()
         assert robot.witness.zero_after_ms(began_ns) < 1000
@@ -131,12 +131,12 @@ def test_autonomy_has_the_robot_before_and_after(robot: Driving) -> None:
         robot.robot.change(commander="nobody", speed_mps=0.0)
 
 
-def _tell(**line: Any) -> Callable[[Driving], None]:
-    def tell(robot: Driving) -> None:
+def _send(**line: Any) -> Callable[[Driving], None]:
+    def send(robot: Driving) -> None:
         assert robot.peer
-        robot.peer.tell(**line)
+        robot.peer.send(**line)
 
-    return tell
+    return send
 
 
 def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
@@ -152,12 +152,12 @@ def _signal(who: str, number: signal.Signals) -> Callable[[Driving], None]:
 
 
 ENDINGS = {
-    "released": _tell(held=False),
-    "stopped": _tell(stop="ben"),
-    "disabled": _tell(enabled=False),
-    "closed": _tell(end="CLOSED"),
-    "access ended": _tell(end="ACCESS_ENDED"),
-    "taken over": _tell(lease="ben"),
+    "released": _send(held=False),
+    "stopped": _send(stop="ben"),
+    "disabled": _send(enabled=False),
+    "closed": _send(end="CLOSED"),
+    "access ended": _send(end="ACCESS_ENDED"),
+    "taken over": _send(lease="ben"),
     "gateway killed": _signal("gateway", signal.SIGKILL),
     "gateway frozen": _signal("gateway", signal.SIGSTOP),
     "worker killed": _signal("worker", signal.SIGKILL),

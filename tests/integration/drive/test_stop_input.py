@@ -26,7 +26,7 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
     boolean = message_class("std_msgs/msg/Bool")
     with driving(tmp_path, stop_topics=["/stop_button"]) as robot:
         peer = robot.ready()
-        peer.tell(lease="anna", held=False)
+        peer.send(lease="anna", held=False)
         robot.phase_is("INHIBITED")
         wait_until(lambda: list(robot.state().inhibits) == [pb.INHIBIT_ROBOT_STOP], "the one reason")
         with ros_node("button") as button:
@@ -35,11 +35,11 @@ def test_it_is_pressed_until_a_live_publisher_says_otherwise(
                 wait_until(lambda: publisher.get_subscription_count() >= 2, "its subscribers")
             publisher.publish(boolean(data=False))
             robot.phase_is("ARMED")
-            peer.tell(held=True)
+            peer.send(held=True)
             robot.phase_is("DRIVING")
             publisher.publish(boolean(data=True))
             assert pb.INHIBIT_ROBOT_STOP in robot.phase_is("INHIBITED").inhibits
-            peer.tell(held=False)
+            peer.send(held=False)
             publisher.publish(boolean(data=False))
             robot.phase_is("ARMED")
         robot.phase_is("INHIBITED")

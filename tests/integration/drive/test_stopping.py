@@ -31,7 +31,7 @@ def test_released(robot: Driving) -> None:
     def release() -> int:
         assert robot.peer
         began_ns = time.monotonic_ns()
-        robot.peer.tell(held=False)
+        robot.peer.send(held=False)
         return began_ns
 
     keeps(60, "released, ms", lambda: zero_after(robot, release))
@@ -60,7 +60,7 @@ def test_the_gateway_is_frozen(robot: Driving) -> None:
 def test_the_gateway_is_silent(robot: Driving) -> None:
     def fall_silent() -> int:
         assert robot.peer
-        robot.peer.tell(silent=True)
+        robot.peer.send(silent=True)
         robot.phase_is("INHIBITED")
         return robot.peer.instants.command_ns
 
@@ -83,7 +83,7 @@ def test_a_stop(robot: Driving) -> None:
     def stop() -> int:
         assert robot.peer
         began_ns = time.monotonic_ns()
-        robot.peer.tell(stop="ben")
+        robot.peer.send(stop="ben")
         return began_ns
 
     keeps(50, "stop, ms", lambda: max(zero_after(robot, stop) for _ in range(10)))
@@ -92,7 +92,7 @@ def test_a_stop(robot: Driving) -> None:
 def test_the_picture_grows_old(robot: Driving) -> None:
     def freeze_picture() -> int:
         assert robot.peer
-        robot.peer.tell(picture_frozen=True)
+        robot.peer.send(picture_frozen=True)
         robot.phase_is("INHIBITED")
         return robot.peer.instants.picture_ns
 
@@ -102,7 +102,7 @@ def test_the_picture_grows_old(robot: Driving) -> None:
 def test_only_the_downlink_is_dead(robot: Driving) -> None:
     def freeze_echo() -> int:
         assert robot.peer
-        robot.peer.tell(echo_frozen=True)
+        robot.peer.send(echo_frozen=True)
         robot.phase_is("INHIBITED")
         return robot.peer.instants.echo_ns
 

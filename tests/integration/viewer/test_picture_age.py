@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,17 +52,17 @@ def filmed(directory: Path, source: Camera) -> Iterator[VideoGround]:
 
 
 @contextmanager
-def showing(ground: VideoGround, port: int | None = None) -> Iterator[RobotVideo]:
-    """A viewer that shows each frame as it comes; over another port, if there is one."""
+def showing(ground: VideoGround, **endpoint: Any) -> Iterator[RobotVideo]:
+    """A viewer that shows each frame as it comes; of another endpoint, as far as it is given."""
     robot = RobotVideo(ground.target, pixels=PixelFormat.I420)
-    if port:
-        follow = robot.session.follow
+    follow = robot.session.follow
 
-        def over_the_link(preview: PreviewStatus) -> None:
-            assert preview.endpoint
-            follow(replace(preview, endpoint=replace(preview.endpoint, port=port)))
+    def changed(preview: PreviewStatus) -> None:
+        assert preview.endpoint
+        follow(replace(preview, endpoint=replace(preview.endpoint, **endpoint)))
 
-        robot.session.follow = over_the_link  # type: ignore[method-assign]
+    if endpoint:
+        robot.session.follow = changed  # type: ignore[method-assign]
     robot.session.add_frame_listener(robot.meter.shown)
     robot.start()
     try:
@@ -118,7 +119,7 @@ def test_a_torn_picture_is_repaired_by_a_key_frame_of_the_robot(
     monkeypatch.setattr("console.receiver.reception._FIRST_S", 0.0)
     with filmed(tmp_path, stamping) as ground, UdpLink(ground.preview.port) as link:
         link.impairment.delay_s = 0.02
-        with showing(ground, link.port) as robot, GatewayClient(ground.target) as client:
+        with showing(ground, port=link.port) as robot, GatewayClient(ground.target) as client:
             seen: list[Frame] = []
             robot.session.add_frame_listener(seen.append)
             wait_until(lambda: len(seen) > FRAMES, "frames", PATIENCE_S)
@@ -150,7 +151,7 @@ def test_a_picture_is_torn_for_a_round_trip_and_a_key_frame(
     with (
         filmed(tmp_path, stamping) as ground,
         UdpLink(ground.preview.port, way) as link,
-        showing(ground, link.port) as robot,
+        showing(ground, port=link.port) as robot,
     ):
         seen: list[Frame] = []
         lost_s: list[float] = []
@@ -185,23 +186,11 @@ def test_an_older_robot_is_viewed_without_ages(tmp_path: Path) -> None:
     """A gateway that names no offset: frames have no capture time, and nothing is reported."""
     with video_ground(tmp_path) as ground:
         ground.switch_on()
-        robot = RobotVideo(ground.target, pixels=PixelFormat.I420)
-        follow = robot.session.follow
-
-        def as_an_older_one(preview: PreviewStatus) -> None:
-            assert preview.endpoint
-            follow(replace(preview, endpoint=replace(preview.endpoint, capture_offset_ns=None)))
-
-        robot.session.follow = as_an_older_one  # type: ignore[method-assign]
-        robot.session.add_frame_listener(robot.meter.shown)
-        robot.start()
-        try:
+        with showing(ground, capture_offset_ns=None) as robot:
             wait_until(lambda: robot.session.frames > 30, "frames", PATIENCE_S)
             assert robot.meter.reading().age_ms is None
             assert robot.meter.reading().rtt_ms is not None
             assert robot.meter.report() is None
-        finally:
-            robot.close(10)
 
 
 def test_headless_tells_the_age(tmp_path: Path) -> None:
