@@ -57,7 +57,8 @@ DISK_PERCENT: Final = Limits(95, 98, "FULL")
 WIFI_DBM: Final = Limits(-75, -85, "WEAK")
 LOSS_PERCENT: Final = Limits(2, 10, "LOSSY")
 ROUND_TRIP_MS: Final = Limits(150, 400, "SLOW")
-PICTURE_AGE_MS: Final = Limits(400, 1000, "LATE")
+PICTURE_AGE_MS: Final = Limits(150, 400, "LATE")
+"""An older picture hurts driving."""
 
 
 def worst(judgements: Iterable[Judgement]) -> Judgement:

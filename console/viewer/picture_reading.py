@@ -9,11 +9,9 @@ from console.client import PreviewStatus
 from console.client.results import Freshness
 from console.presentation.formatting import joined
 from console.presentation.severity_style import SeverityStyle
+from console.presentation.value_style import PICTURE_AGE_MS
 from console.receiver.delivery import Delivery
 
-OLD_MS: Final = 150.0
-"""An older picture hurts driving."""
-_VERY_OLD_MS: Final = 400.0
 OVERDUE_S: Final = 0.1
 """A picture that is shown for longer lacks a successor: frames come every 67 ms at the slowest profile."""
 _MS_PER_S: Final = 1000
@@ -72,9 +70,7 @@ class PictureReading:
         """Severity of the age."""
         if self.age_ms is None:
             return SeverityStyle.QUIET
-        if self.age_ms <= OLD_MS:
-            return SeverityStyle.GOOD
-        return SeverityStyle.WARNING if self.age_ms <= _VERY_OLD_MS else SeverityStyle.BAD
+        return PICTURE_AGE_MS.judge(self.age_ms).style
 
     @property
     def age_text(self) -> str:
@@ -109,7 +105,7 @@ def reading(
     if shown is None:
         return PictureReading(rtt_ms=rtt_ms, loss_percent=loss_percent)
     age_ms, cause = age_now_ms(shown, now_s), None
-    if age_ms > OLD_MS:
+    if age_ms >= PICTURE_AGE_MS.warning:
         overdue = now_s - shown.at_s > OVERDUE_S
         cause = _missing_at(preview) if overdue else _slowest(shown, preview)
     return PictureReading(

@@ -6,8 +6,9 @@ from typing import Final
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen, QPixmap
 
+from console.presentation.value_style import PICTURE_AGE_MS
 from console.viewer.picture_meter import PictureMeter
-from console.viewer.picture_reading import OLD_MS, PictureReading
+from console.viewer.picture_reading import PictureReading
 from console.window.theme import COLOURS
 
 _PAPER: Final = QColor(16, 18, 20, 225)
@@ -86,8 +87,8 @@ def _drawn(now: PictureReading, history: Sequence[float | None], font: QFont, ra
 
 def _draw_curve(painter: QPainter, box: QRectF, history: Sequence[float | None], colour: QColor) -> None:
     """Draws ages from 0 to at least twice the limit, which is a line; an unknown one is a gap."""
-    top = max(2 * OLD_MS, *(age_ms for age_ms in history if age_ms is not None), 0.0)
-    limit = box.bottom() - OLD_MS / top * box.height()
+    top = max(2 * PICTURE_AGE_MS.warning, *(age_ms for age_ms in history if age_ms is not None), 0.0)
+    limit = box.bottom() - PICTURE_AGE_MS.warning / top * box.height()
     painter.setPen(QPen(_QUIET, 1, Qt.PenStyle.DotLine))
     painter.drawLine(QPointF(box.left(), limit), QPointF(box.right(), limit))
     painter.setPen(QPen(colour, 1.5))

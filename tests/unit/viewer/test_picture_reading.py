@@ -66,7 +66,7 @@ def test_the_age_grows_while_no_newer_picture_comes() -> None:
 
 @pytest.mark.parametrize(
     ("age_ms", "style"),
-    [(150.0, SeverityStyle.GOOD), (151.0, SeverityStyle.WARNING), (401.0, SeverityStyle.BAD)],
+    [(149.0, SeverityStyle.GOOD), (150.0, SeverityStyle.WARNING), (400.0, SeverityStyle.BAD)],
 )
 def test_the_age_is_coloured_where_it_hurts_driving(age_ms: float, style: SeverityStyle) -> None:
     assert reading(shown(age_ms), DIRECT, None, NOW_S).style is style
