@@ -12,7 +12,7 @@ from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
 from console.client import CaughtUp, Event, EventGap, EventPosition, FaultSeverity, Outage
-from console.client.results import EventKind, GapReason
+from console.client.results import GapReason
 from console.presentation.formatting import plural, wall_clock
 from console.presentation.json_form import json_form
 from console.presentation.severity_style import FAULT_STYLES
@@ -54,12 +54,8 @@ def events(
             elif isinstance(item, Outage) and not follow:
                 # Without --follow the past events are all that was asked for.
                 raise item.error
-            elif clients or session.as_json or not _is_about_a_client(item):
+            elif clients or session.as_json or not (isinstance(item, Event) and item.is_presence):
                 _show(session, item)
-
-
-def _is_about_a_client(item: Event | EventGap | Outage) -> bool:
-    return isinstance(item, Event) and item.kind in (EventKind.CLIENT_JOINED, EventKind.CLIENT_LEFT)
 
 
 def _show(session: Session, item: Event | EventGap | Outage) -> None:

@@ -29,19 +29,23 @@ _LISTED: Final = {
 
 @dataclass(frozen=True, slots=True)
 class EventFilter:
-    """Severity and words that an event must have.
+    """Severity and words that an event must have, and whether it may be about clients.
 
     Args:
         at_least: the severity.
         words: separated by spaces; each of them must occur, in any case of letters.
+        presence: whether to list who joins and leaves.
     """
 
     at_least: AtLeast = AtLeast.ALL
     words: str = ""
+    presence: bool = False
 
     def lists(self, line: EventLine) -> bool:
         """Whether a line is listed."""
         if self.at_least is not AtLeast.ALL and line.style not in _LISTED[self.at_least]:
+            return False
+        if line.presence and not self.presence:
             return False
         text = line.text.casefold()
         return all(word in text for word in self.words.casefold().split())

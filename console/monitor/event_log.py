@@ -25,12 +25,14 @@ class EventLine:
         text: what happened.
         style: its severity.
         own: whether the monitor reports it, not the robot.
+        presence: whether it says who joins or leaves.
     """
 
     at_s: float
     text: str
     style: SeverityStyle = SeverityStyle.QUIET
     own: bool = False
+    presence: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,8 @@ def line_of(item: Event | EventGap | CaughtUp | Outage, now_s: float) -> EventLi
     match item:
         case Event():
             style = _STYLES.get(item.severity, SeverityStyle.QUIET)
-            return EventLine(item.wall_clock_unix_ms / _MS_PER_S, _text(item), style)
+            at_s = item.wall_clock_unix_ms / _MS_PER_S
+            return EventLine(at_s, _text(item), style, presence=item.is_presence)
         case EventGap():
             text = "The gateway was restarted: its events begin anew"
             if item.reason is not GapReason.NEW_RUN:

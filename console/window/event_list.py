@@ -1,6 +1,7 @@
 """List of events, newest first."""
 
 from datetime import datetime
+from typing import Final
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QListWidget, QListWidgetItem
@@ -8,6 +9,9 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem
 from console.monitor.event_filter import EventFilter
 from console.monitor.event_log import CAPACITY, EventLine, EventLog
 from console.presentation.severity_style import SeverityStyle
+
+_TIME_OF_DAY: Final = "%H:%M:%S"
+_DATE_AND_ZONE: Final = "%Y-%m-%d %H:%M:%S %Z"
 
 
 class EventList(QListWidget):
@@ -51,7 +55,8 @@ class EventList(QListWidget):
 
 
 def _item(event: EventLine) -> QListWidgetItem:
-    item = QListWidgetItem(f"{_clock(event.at_s)}  {event.text}")
+    item = QListWidgetItem(f"{_clock(event.at_s, _TIME_OF_DAY)}  {event.text}")
+    item.setToolTip(_clock(event.at_s, _DATE_AND_ZONE))
     font = item.font()
     font.setItalic(event.own)
     font.setBold(event.style in (SeverityStyle.WARNING, SeverityStyle.BAD))
@@ -59,9 +64,9 @@ def _item(event: EventLine) -> QListWidgetItem:
     return item
 
 
-def _clock(at_s: float) -> str:
-    """Returns the time of day; dashes for a time beyond the calendar, which a robot may well send."""
+def _clock(at_s: float, form: str) -> str:
+    """Returns this computer's time; dashes for a time beyond the calendar, which a robot may well send."""
     try:
-        return datetime.fromtimestamp(at_s).astimezone().strftime("%H:%M:%S")
+        return datetime.fromtimestamp(at_s).astimezone().strftime(form)
     except (ValueError, OverflowError, OSError):
         return "--:--:--"

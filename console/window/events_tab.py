@@ -1,7 +1,7 @@
 """Tab of the events: severity, search, export, and the list."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from console.monitor.event_filter import AtLeast, EventFilter
 from console.window.event_list import EventList
@@ -25,11 +25,16 @@ class EventsTab(QWidget):
         self.search.setClearButtonEnabled(True)
         self.export = QPushButton("&Export")
         self.export.setToolTip("Saves the listed events as JSON lines (Ctrl+E)")
+        self.presence = QCheckBox("&Who joins and leaves")
+        self.presence.setAccessibleName("List who joins and leaves")
         self.severity.currentIndexChanged.connect(self._filter)
         self.search.textChanged.connect(self._filter)
+        self.presence.toggled.connect(self._filter)
         self.export.clicked.connect(self.export_asked)
         row = fill(QHBoxLayout(), (self.severity, 1), self.export, spacing=4)
-        fill(QVBoxLayout(self), row, self.search, (self.list, 1), spacing=4, margins=(4, 4, 4, 4))
+        parts = (row, self.search, self.presence, (self.list, 1))
+        fill(QVBoxLayout(self), *parts, spacing=4, margins=(4, 4, 4, 4))
 
     def _filter(self) -> None:
-        self.list.set_filter(EventFilter(self.severity.currentData(), self.search.text()))
+        presence = self.presence.isChecked()
+        self.list.set_filter(EventFilter(self.severity.currentData(), self.search.text(), presence))

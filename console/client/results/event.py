@@ -98,6 +98,11 @@ class Event:
     mode: str | None = None
     """The robot's mode, as the robot names it."""
 
+    @property
+    def is_presence(self) -> bool:
+        """Whether a client has joined or left."""
+        return self.kind in (EventKind.CLIENT_JOINED, EventKind.CLIENT_LEFT)
+
 
 class GapReason(Enum):
     """Why events are missing."""

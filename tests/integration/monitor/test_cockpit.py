@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import pytest
@@ -350,9 +351,16 @@ def test_events_are_searched_filtered_and_exported(
             EventLine(1.0, "preview running, BALANCED"),
             EventLine(2.0, "warning: disk: nearly full", SeverityStyle.WARNING),
             EventLine(3.0, "error: lidar: stopped", SeverityStyle.BAD),
+            EventLine(4.0, "anna joined", presence=True),
         ]
     )
     events.list.show_log(log)
+    assert len(events.list.lines) == 3
+    events.presence.setChecked(True)
+    assert events.list.lines[0].endswith("anna joined")
+    zone = datetime.fromtimestamp(4.0).astimezone().strftime("%Z")
+    assert events.list.item(0).toolTip().endswith(f":04 {zone}")
+    events.presence.setChecked(False)
     cockpit.press(Qt.Key.Key_F, CTRL)
     until(events.search.hasFocus, "the search has the focus")
     events.search.setText("LIDAR")

@@ -11,13 +11,16 @@ from console.presentation.severity_style import SeverityStyle
 INFO = EventLine(0.0, "preview running, BALANCED")
 WARNING = EventLine(1.0, "warning: disk: nearly full", SeverityStyle.WARNING)
 ERROR = EventLine(2.0, "error: lidar: stopped Turning", SeverityStyle.BAD, own=True)
-ALL = (INFO, WARNING, ERROR)
+JOINED = EventLine(3.0, "anna joined", presence=True)
+ALL = (INFO, WARNING, ERROR, JOINED)
 
 
 @pytest.mark.parametrize(
     ("chosen", "listed"),
     [
-        (EventFilter(), ALL),
+        (EventFilter(), (INFO, WARNING, ERROR)),
+        (EventFilter(presence=True), ALL),
+        (EventFilter(AtLeast.WARNINGS, presence=True), (WARNING, ERROR)),
         (EventFilter(AtLeast.WARNINGS), (WARNING, ERROR)),
         (EventFilter(AtLeast.ERRORS), (ERROR,)),
         (EventFilter(words="  turning LIDAR "), (ERROR,)),
@@ -29,7 +32,7 @@ def test_severity_and_all_words_in_any_case(chosen: EventFilter, listed: tuple[E
 
 
 def test_the_export_is_one_json_document_a_line() -> None:
-    first, _, third = (json.loads(line) for line in as_json_lines(ALL).splitlines())
+    first, _, third, _ = (json.loads(line) for line in as_json_lines(ALL).splitlines())
     assert first["severity"] == "info"
     assert first["text"] == INFO.text
     assert (third["severity"], third["by"]) == ("error", "monitor")

@@ -27,6 +27,14 @@ def test_a_fault_says_how_bad_it_is_and_who_has_it() -> None:
     assert line_of(raised, 0) == EventLine(5000.5, "error: lidar: stopped turning", SeverityStyle.BAD)
 
 
+def test_who_joins_and_leaves_is_marked() -> None:
+    joined = happened(EventKind.CLIENT_JOINED, FaultSeverity.INFO, "gateway", "anna joined")
+    line, other = (line_of(event, 0) for event in (joined, replace(joined, kind=EventKind.MODE)))
+    assert line
+    assert other
+    assert (line.presence, other.presence) == (True, False)
+
+
 def test_a_component_is_not_named_twice() -> None:
     running = happened(EventKind.PREVIEW, FaultSeverity.INFO, "preview", "preview running, balanced")
     assert line_of(running, 0) == EventLine(5000.5, "preview running, balanced", SeverityStyle.QUIET)
