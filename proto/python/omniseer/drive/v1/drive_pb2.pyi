@@ -553,7 +553,7 @@ class Picture(_message.Message):
     running: _builtins.bool
     """Whether pictures leave the robot."""
     newest_capture_ns: _builtins.int
-    """When the newest of them was captured."""
+    """Upper bound of when the newest of them was captured: no driver has seen a later one."""
     def __init__(
         self,
         *,
