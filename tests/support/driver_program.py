@@ -38,7 +38,10 @@ async def drive(target: str) -> None:
         said = False
         while True:
             session.check()
-            session.hold(SPEED_MPS)
+            if session.state and session.state.phase is DrivePhase.INHIBITED:
+                session.release()  # Without a release no hold begins anew.
+            else:
+                session.hold(SPEED_MPS)
             if not said and session.state and session.state.phase is DrivePhase.DRIVING:
                 said = session.open_lanes == 2
                 if said:
