@@ -32,7 +32,12 @@ class Settings(BaseSettings):
     """
 
     model_config: ClassVar[SettingsConfigDict] = SettingsConfigDict(
-        extra="forbid", frozen=True, env_nested_delimiter="__", nested_model_default_partial_update=True
+        extra="forbid",
+        frozen=True,
+        env_nested_delimiter="__",
+        # Compose files can't leave a variable out, only leave it empty.
+        env_ignore_empty=True,
+        nested_model_default_partial_update=True,
     )
     spellings: ClassVar[Mapping[str, str]] = {}
     """Keys of a file that Python spells in another way, as environment variables do."""

@@ -67,7 +67,7 @@ def work(settings: DriveSettings) -> None:
     with (
         worker_heartbeats() as heartbeats,
         base(settings) as robot_base,
-        Endpoint(settings.socket, welcome(new_instance_id(), rules)) as endpoint,
+        Endpoint(settings.socket, welcome(new_instance_id(), rules, settings.base_timeout_ms)) as endpoint,
     ):
         worker = Worker(robot_base, endpoint, heartbeats, rules, state, worker_kills=worker_kills())
 

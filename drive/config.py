@@ -90,6 +90,9 @@ class DriveSettings(Settings):
     """std_msgs/Bool of the robot's own stop buttons: true forbids motion."""
     mux_output: MuxOutput | None = MuxOutput()
     """Compared with what is commanded here. None: not known."""
+    base_timeout_ms: int | None = Field(default=None, ge=20, le=60_000)
+    """Silence after which the base stops by itself, for the doctor: what stops the robot if this computer
+    freezes. None: not known."""
     odometry: Topic | None = "/odometry/filtered"
     """A nav_msgs/Odometry that shows when the robot stands still. None: assumed a second after a release."""
     limits: LimitSettings = LimitSettings()

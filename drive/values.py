@@ -132,8 +132,8 @@ class Surroundings:
 
     Attributes:
         preview_running: whether pictures leave the robot.
-        newest_capture_ns: when the newest picture that left the robot was captured; no driver has seen a
-            later one.
+        newest_capture_ns: upper bound of when the newest picture that left the robot was captured; no driver
+            has seen a later one.
         robot_stopped: the robot's own stop is active.
         base_present: something takes the velocity commands.
         outranked: the base follows another source although motion is commanded here.

@@ -79,8 +79,14 @@ _EVENTS: Final[Mapping[str, Callable[[pb.ToDrive], Event]]] = {
 }
 
 
-def welcome(instance_id: str, rules: Rules) -> pb.FromDrive:
-    """Returns the answer to hello."""
+def welcome(instance_id: str, rules: Rules, base_timeout_ms: int | None = None) -> pb.FromDrive:
+    """Returns the answer to hello.
+
+    Args:
+        instance_id: names the process.
+        rules: of the machine.
+        base_timeout_ms: silence after which the base stops by itself; None if it is not known.
+    """
     limits = rules.limits
     return pb.FromDrive(
         welcome=pb.Welcome(
@@ -96,6 +102,7 @@ def welcome(instance_id: str, rules: Rules) -> pb.FromDrive:
                 line_of_sight_mps=limits.line_of_sight_mps,
                 line_of_sight_rad_s=limits.line_of_sight_rad_s,
             ),
+            base_timeout_ms=base_timeout_ms,
         )
     )
 

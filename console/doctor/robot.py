@@ -159,6 +159,18 @@ def driving_findings(status: SystemStatus) -> Iterator[Finding]:
     elif not teleop.inhibits:
         who = f"{teleop.holder} drives" if teleop.holder else "no one drives"
         yield good("driving", f"the robot can be driven; {who}")
+    yield _base_timeout(teleop.base_timeout_ms)
+
+
+def _base_timeout(timeout_ms: int | None) -> Finding:
+    if timeout_ms is not None:
+        return good("driving.base", f"the base stops by itself after {timeout_ms} ms without commands")
+    return note(
+        "driving.base",
+        "what stops the base if the robot's computer freezes is not known",
+        "Only the base's own timeout does, and no one has said that it has one",
+        "Measure it on the robot: robot-drive doctor --pulse; then set base_timeout_ms of robot-drive",
+    )
 
 
 def access_finding(status: SystemStatus) -> Finding | None:

@@ -1,21 +1,20 @@
 """What is saved with a picture: the robot's status of the same moment. Pure."""
 
-import re
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
+from common.plain_name import plain_name
 from console.monitor.monitor_state import MonitorState
 from console.presentation.json_form import json_form
 from console.presentation.picture_age import PictureAge
 
-_NOT_IN_A_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
+_LONGEST_NAME: Final = 63
 
 
 def file_stem(robot: str, at: datetime) -> str:
     """Returns the name of a file without its ending; nothing of a robot's name can lead elsewhere."""
-    name = _NOT_IN_A_NAME.sub("-", robot).strip("-")[:63] or "robot"
-    return f"{name}-{at:%Y%m%d-%H%M%S}-{at.microsecond // 1000:03}"
+    return f"{plain_name(robot, _LONGEST_NAME, also='_')}-{at:%Y%m%d-%H%M%S}-{at.microsecond // 1000:03}"
 
 
 def picture_record(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Final
 
-from console.client.results import FaultSeverity, Freshness, HealthState, PreviewState
+from console.client.results import DrivePhase, FaultSeverity, Freshness, HealthState, PreviewState
 
 
 class SeverityStyle(Enum):
@@ -39,4 +39,14 @@ PREVIEW_STYLES: Final[Mapping[PreviewState, SeverityStyle]] = {
     PreviewState.FAULTED: SeverityStyle.BAD,
     PreviewState.DISABLED: SeverityStyle.QUIET,
     PreviewState.UNKNOWN: SeverityStyle.QUIET,
+}
+DRIVE_STYLES: Final[Mapping[DrivePhase, SeverityStyle]] = {
+    DrivePhase.DISABLED: SeverityStyle.QUIET,
+    DrivePhase.AVAILABLE: SeverityStyle.GOOD,
+    DrivePhase.ARMED: SeverityStyle.GOOD,
+    DrivePhase.DRIVING: SeverityStyle.GOOD,
+    DrivePhase.STOPPING: SeverityStyle.GOOD,
+    DrivePhase.INHIBITED: SeverityStyle.WARNING,
+    DrivePhase.STOPPED: SeverityStyle.BAD,
+    DrivePhase.UNKNOWN: SeverityStyle.QUIET,
 }

@@ -5,7 +5,7 @@ health, faults and preview have places of their own in the window.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from console.client import results
@@ -17,6 +17,7 @@ from console.client.results import (
     SourceState,
     TeleopState,
 )
+from console.presentation.driving import driving_mark, driving_text
 from console.presentation.formatting import (
     UNKNOWN,
     age,
@@ -252,11 +253,10 @@ def _teleop(view: View) -> Iterator[Row]:
     if teleop.state is TeleopState.UNKNOWN:
         return
     linear, angular = quantity(teleop.max_linear_mps, "m/s"), quantity(teleop.max_angular_rad_s, "rad/s")
-    limits = f"at most {linear}, {angular}"
-    style = SeverityStyle.GOOD if teleop.enabled else SeverityStyle.QUIET
-    text = joined(_unbroken(limits) if view.compact else limits, teleop.last_error)
-    command_age = "" if view.compact else view.age(teleop.last_command.age_ms)
-    yield Row(view.label("teleop"), teleop.state.value.upper(), style, text, command_age)
+    limits = f"at most {linear}, {angular}" if teleop.enabled else ""
+    text = joined(driving_text(teleop), _unbroken(limits) if view.compact else limits, teleop.last_error)
+    row = view.state(view.label("teleop"), *driving_mark(teleop), text)
+    yield row if view.compact else replace(row, age=view.age(teleop.last_command.age_ms))
 
 
 def _motion(odometry: results.Odometry, compact: bool) -> str:

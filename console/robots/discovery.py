@@ -6,7 +6,6 @@ made safe for a terminal, and reduced to an address and hints; a login authentic
 
 import asyncio
 import ipaddress
-import re
 import threading
 import time
 from collections.abc import Iterable, Mapping
@@ -20,6 +19,7 @@ from zeroconf.asyncio import AsyncServiceInfo
 
 from common.advertisement import SERVICE_TYPE, advertisement_from
 from common.errors import ExitCode, UserError
+from common.plain_name import plain_name
 from console.printable import printable
 
 ADDRESSES_VARIABLE: Final = "ROBOTCTL_DISCOVERY"
@@ -29,7 +29,6 @@ MOST_CHANGES: Final = 4096
 """Announcements and withdrawals after which a flood is assumed and the search ends."""
 _LONGEST_NAME: Final = 63
 _ASK_WITHIN_MS: Final = 1500.0
-_NOT_A_NAME: Final = re.compile(r"[^A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -51,7 +50,7 @@ class DiscoveredRobot:
     @property
     def nickname(self) -> str:
         """A name that `robotctl robots add` accepts."""
-        return _NOT_A_NAME.sub("-", self.name).strip("-_").lower() or "robot"
+        return plain_name(self.name, _LONGEST_NAME, also="_").lower()
 
 
 class Discovery:

@@ -30,7 +30,7 @@ class GraphFacts:
     """What the configured topics look like.
 
     Attributes:
-        timeouts: of the base's nodes, in seconds, by "node: parameter".
+        timeouts: of the base's nodes, in seconds, by "node: parameter"; and as configured.
         foreign_motion: velocities other than zero that reached the base while no driver had the robot.
     """
 

@@ -47,7 +47,7 @@ def look(node: Any, settings: DriveSettings) -> GraphFacts:
         lock=_topic(node, settings.lock_topic, "std_msgs/msg/Bool") if settings.lock_topic else None,
         stops=[_topic(node, topic, "std_msgs/msg/Bool") for topic in settings.stop_topics],
         odometry=_topic(node, settings.odometry, "nav_msgs/msg/Odometry") if settings.odometry else None,
-        timeouts=_timeouts(node, reaching.subscribers) if reaching else {},
+        timeouts=(_timeouts(node, reaching.subscribers) if reaching else {}) | _configured(settings),
         foreign_motion=motions,
     )
 
@@ -111,6 +111,11 @@ def _topic(node: Any, name: str, type_name: str) -> TopicFacts:
 
 def _foreign(found: list[Any]) -> list[Any]:
     return [each for each in found if each.node_name not in OBSERVERS]
+
+
+def _configured(settings: DriveSettings) -> dict[str, float]:
+    timeout_ms = settings.base_timeout_ms
+    return {"configured: base_timeout_ms": timeout_ms / 1000} if timeout_ms is not None else {}
 
 
 def _timeouts(node: Any, names: tuple[str, ...]) -> dict[str, float]:

@@ -170,7 +170,7 @@ def _timeout(facts: GraphFacts) -> Finding:
             "base.timeout",
             "no node of the base says after which silence it stops",
             why,
-            "Measure it, with room around the robot: robot-drive doctor --pulse",
+            "Measure it, with room around the robot: robot-drive doctor --pulse; then set base_timeout_ms",
         )
     longest, timeout_s = max(facts.timeouts.items(), key=lambda item: item[1] or float("inf"))
     return timeout_finding("base.timeout", timeout_s or None, longest)

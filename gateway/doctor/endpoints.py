@@ -1,8 +1,9 @@
-"""Checks of the gateway's two endpoints: its own, and that of the preview service."""
+"""Checks of the gateway's own endpoint, and of those of the programs that it connects to."""
 
 import grp
 import os
 import socket
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -10,6 +11,45 @@ from common.bind import bracketed
 from common.findings import Finding, good, note, wrong
 
 _TIMEOUT_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A program that the gateway connects to.
+
+    Attributes:
+        check: names the finding.
+        name: for people.
+        kind: of its Unix socket.
+        key: of the configuration, with its socket.
+        command: starts it.
+        without_it: what does not work then.
+    """
+
+    check: str
+    name: str
+    kind: socket.SocketKind
+    key: str
+    command: str
+    without_it: str
+
+
+PREVIEW: Final = Service(
+    check="preview",
+    name="the preview service",
+    kind=socket.SOCK_STREAM,
+    key="preview.socket",
+    command="robot-preview serve",
+    without_it="Without it there is a status, but no video",
+)
+DRIVE: Final = Service(
+    check="drive",
+    name="the drive program",
+    kind=socket.SOCK_SEQPACKET,
+    key="teleop.socket",
+    command="robot-drive serve",
+    without_it="Without it no one can drive",
+)
 
 
 def operator_endpoint(host: str, port: int) -> Finding:
@@ -34,25 +74,25 @@ def operator_endpoint(host: str, port: int) -> Finding:
         )
 
 
-def preview_endpoint(path: Path) -> Finding:
-    """Checks whether the preview service accepts connections on its socket."""
+def service_endpoint(service: Service, path: Path) -> Finding:
+    """Checks whether a service accepts connections on its socket."""
     try:
-        with socket.socket(socket.AF_UNIX) as probe:
+        with socket.socket(socket.AF_UNIX, service.kind) as probe:
             probe.settimeout(_TIMEOUT_S)
             probe.connect(str(path))
     except FileNotFoundError:
-        what, remedy = f"{path} does not exist", "Start the preview service: robot-preview serve"
+        what, remedy = f"{path} does not exist", f"Start {service.name}: {service.command}"
         if not path.parent.is_dir():
-            remedy = f"Create the directory {path.parent}, or share it with the preview's container"
+            remedy = f"Create the directory {path.parent}, or share it with the container of {service.name}"
     except ConnectionRefusedError:
-        what, remedy = f"{path} is left over from a service that ended", "Start the preview service again"
+        what, remedy = f"{path} is left over from a program that ended", f"Start {service.name} again"
     except PermissionError:
         what, remedy = f"this user may not use {path}", _permission_remedy(path)
     except OSError as error:
-        what, remedy = f"{path} can't be used: {error}", "Set preview.socket to the service's own socket"
+        what, remedy = f"{path} can't be used: {error}", f"Set {service.key} to the socket of {service.name}"
     else:
-        return good("preview", f"the preview service listens on {path}")
-    return wrong("preview", what, "Without it there is a status, but no video", remedy)
+        return good(service.check, f"{service.name} listens on {path}")
+    return wrong(service.check, what, service.without_it, remedy)
 
 
 def _permission_remedy(path: Path) -> str:

@@ -13,7 +13,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import TlsFiles, load_access
 from gateway.config import SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
+from gateway.doctor.endpoints import DRIVE, PREVIEW, operator_endpoint, service_endpoint
 from gateway.doctor.video import video_finding
 
 
@@ -34,10 +34,12 @@ def examine(config: Path | None) -> Iterator[Finding]:
     if access_files := settings.security.access_files():
         yield _access(*access_files)
     yield operator_endpoint(settings.grpc.host, settings.grpc.port)
-    preview = preview_endpoint(settings.preview.socket)
+    preview = service_endpoint(PREVIEW, settings.preview.socket)
     yield preview
     if preview.verdict is Verdict.GOOD:
         yield video_finding(settings)
+    if settings.teleop.socket:
+        yield service_endpoint(DRIVE, settings.teleop.socket)
     yield from device_findings()
     yield from _ros(settings.sources)
 

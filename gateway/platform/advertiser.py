@@ -6,7 +6,6 @@ packets to parse, as many as it likes, and none of that may reach the gateway.
 
 import json
 import os
-import re
 import resource
 import signal
 import socket
@@ -17,6 +16,7 @@ from zeroconf import ServiceInfo, Zeroconf
 
 from common.advertisement import SERVICE_TYPE, Advertisement
 from common.child import end_with_parent
+from common.plain_name import plain_name
 from gateway.platform.hosts import advertised_addresses
 
 _LOOK_EVERY_S: Final = 30.0
@@ -40,20 +40,16 @@ def service(
         addresses: of the gateway.
         host: another name than this machine's, whose records may have another owner (Avahi, for example).
     """
-    host = host or f"{_label(socket.gethostname().partition('.')[0])}-robot-gateway"
+    own = plain_name(socket.gethostname().partition(".")[0], _LONGEST_LABEL)
+    host = host or f"{own}-robot-gateway"
     return ServiceInfo(
         SERVICE_TYPE,
-        f"{_label(advertisement.name)}.{SERVICE_TYPE}",
+        f"{plain_name(advertisement.name, _LONGEST_LABEL)}.{SERVICE_TYPE}",
         port=port,
         properties=advertisement.properties(),
         server=f"{host}.local.",
         parsed_addresses=list(addresses),
     )
-
-
-def _label(name: str) -> str:
-    """Returns a name as one DNS label of letters, digits and hyphens."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", name)[:_LONGEST_LABEL].strip("-") or "robot"
 
 
 def run(advertisement: Advertisement, port: int, host: str, only: tuple[str, ...]) -> None:

@@ -2,8 +2,16 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Final
 
 from gateway.status.values import Received
+
+_MEASURED_COUNTS_S: Final = 2.5
+"""Without a measurement for so long, of two a second, no picture is known to leave."""
+_HICCUP_MS: Final = 150.0
+"""Cameras pause for several frames, to adjust to the light for example, and are back in time afterwards."""
+_MS_PER_S: Final = 1000
+_NS_PER_MS: Final = 1_000_000
 
 
 class PreviewState(Enum):
@@ -115,3 +123,24 @@ class PreviewView:
     measured: Received[Measurement] | None
     counters: Counters
     passphrase: str = field(default="", repr=False)
+
+    def newest_capture_ns(self, now_ns: int) -> int | None:
+        """Returns an upper bound of when the newest picture that has left by now was captured.
+
+        Pictures have left since the last measurement, which was taken at any moment between two frames: they
+        leave at the age that was measured, or at one that is younger by an interval and a hiccup.
+
+        Args:
+            now_ns: CLOCK_MONOTONIC, as the bound.
+
+        Returns:
+            None while no pictures leave, or none are known to.
+        """
+        measured = self.measured
+        if self.state is not PreviewState.RUNNING or measured is None:
+            return None
+        if now_ns / 1e9 - measured.at_s > _MEASURED_COUNTS_S:
+            return None
+        fps, age_ms = measured.value.fps, measured.value.last_frame_age_ms
+        slack_ms = _HICCUP_MS + (_MS_PER_S / fps if fps > 0 else 0.0)
+        return now_ns - int(max(0.0, age_ms - slack_ms) * _NS_PER_MS)

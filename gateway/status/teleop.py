@@ -113,6 +113,7 @@ class DriveActual:
         session_id: of the lease; empty without one.
         velocity: published.
         problems: of the base, for people.
+        base_timeout_ms: silence after which the base stops by itself; None if it is not known.
     """
 
     instance_id: str
@@ -128,6 +129,7 @@ class DriveActual:
     counters: DriveCounters = field(default_factory=DriveCounters)
     episode: DriveEpisode | None = None
     problems: tuple[str, ...] = ()
+    base_timeout_ms: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

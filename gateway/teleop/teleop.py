@@ -24,7 +24,7 @@ from common.errors import ConflictError, DriveUnreachableError, PreconditionErro
 from common.reasons import Reason
 from gateway.links.drive.commands import DriveCommands
 from gateway.links.drive.state import DriveCommand, DriveLink, DriveSpec
-from gateway.status.preview import PreviewState, PreviewView
+from gateway.status.preview import PreviewView
 from gateway.status.teleop import (
     DriveInhibit,
     DriveLimits,
@@ -54,7 +54,6 @@ _log = logging.getLogger(__name__)
 _CHECK_EVERY_S: Final = 0.05
 _PICTURE_EVERY: Final = 8
 """Checks between two reports of the pictures, of which the drive program needs two a second."""
-_MEASURED_COUNTS_S: Final = 2.5
 _SESSION_ID_BYTES: Final = 12
 _NS_PER_MS: Final = 1_000_000
 
@@ -228,7 +227,7 @@ class Teleop:
             if silent := self._lease.silent(time.monotonic()):
                 self._end(silent, silent.ended or LeaseEnd.LOST)
             if checks % _PICTURE_EVERY == 0:
-                self._commands.picture(self._newest_capture_ns())
+                self._commands.picture(self._preview().newest_capture_ns(time.monotonic_ns()))
 
     async def follow(self) -> NoReturn:
         """Grants the lease to each process of the drive program."""
@@ -317,17 +316,6 @@ class Teleop:
         driving.later = None
         if driving.session.ended is None:
             self._pass_on(driving, driving.pacing.due(time.monotonic()))
-
-    def _newest_capture_ns(self) -> int | None:
-        """Returns an upper bound of when the newest picture that has left was captured; None without one."""
-        preview = self._preview()
-        measured = preview.measured
-        if preview.state is not PreviewState.RUNNING or measured is None:
-            return None
-        if time.monotonic() - measured.at_s > _MEASURED_COUNTS_S:
-            return None
-        # Pictures have left since they were measured; the age at which they leave is that of the measurement.
-        return time.monotonic_ns() - measured.value.last_frame_age_ms * _NS_PER_MS
 
 
 def _inhibits(drive: DriveView) -> tuple[DriveInhibit, ...]:

@@ -1,1 +1,1 @@
-"""The demo: three programs on this machine, watched by a person or checked step by step."""
+"""The demo: four programs on this machine, watched by a person or checked step by step."""

@@ -67,7 +67,7 @@ def _began_s() -> float:
 def _command_line() -> tuple[Wishes, bool]:
     parser = argparse.ArgumentParser(
         prog="scripts/demo",
-        description="A simulated robot, the gateway and the preview service on this machine, until Ctrl-C.",
+        description="Simulated robot, gateway, preview and robot-drive on this machine, until Ctrl-C.",
     )
     parser.add_argument("--check", action="store_true", help="run the main job once, say what was seen, end")
     parser.add_argument(

@@ -6,7 +6,17 @@ from contextlib import contextmanager
 from typing import Final
 
 from common.errors import UserError
-from console.client import GatewayClient, PreviewProfile, PreviewState, PreviewStatus, SystemStatus
+from console.client import (
+    DriveOptions,
+    DrivePhase,
+    GatewayClient,
+    PreviewProfile,
+    PreviewState,
+    PreviewStatus,
+    Supervision,
+    SystemStatus,
+)
+from console.client.blocking import BlockingDriveSession
 from console.client.results import Freshness
 from console.receiver.address import StreamAddress
 from demo_program.ground import Ground
@@ -17,7 +27,11 @@ from tests.support.free import udp_port_is_free
 from tests.support.receiver import Receiver
 
 FRAMES: Final = 60
-_SPEEDS_MPS: Final = (0.8, 0.3)
+_SPEEDS_MPS: Final = (0.2, 0.1)
+_DRIVEN_MPS: Final = -0.1
+"""Backward: by itself the robot only drives forward."""
+_HOLDS: Final = 5
+_FOLLOWS_WITHIN_S: Final = 4.0
 _TOLERANCE_MPS: Final = 0.01
 _SEEN_WITHIN_S: Final = 10.0
 _PREVIEW_WITHIN_S: Final = 20.0
@@ -42,6 +56,8 @@ def check(ground: Ground, programs: Programs, began_s: float) -> None:
             say(_values_follow(ground, programs, robot))
         with _step("silence", programs) as say:
             say(_silence_is_seen(ground, programs, robot))
+        with _step("drive", programs) as say:
+            say(_drives_and_stops(programs, robot))
         with _step("preview on", programs) as say:
             preview = _preview_on(robot)
             say(_preview_in_words(preview))
@@ -128,6 +144,56 @@ def _silence_is_seen(ground: Ground, programs: Programs, robot: GatewayClient) -
 def _if_odometry_stale(robot: GatewayClient) -> SystemStatus | None:
     status = status_or_none(robot)
     return status if status and status.odometry.stale and not status.health.ready else None
+
+
+def _drives_and_stops(programs: Programs, robot: GatewayClient) -> str:
+    options = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="scripts/demo")
+    with robot.drive(options) as session:
+        # A machine that is too busy ends a hold; another one may begin.
+        if not any(_follows(programs, robot, session) for _ in range(_HOLDS)):
+            raise UserError(f"the robot does not follow its driver: {session.reasons()}")
+        began_s = time.monotonic()
+        stopped = robot.stop_robot("end of the drive")
+        confirmed_s = time.monotonic() - began_s
+        programs.wait_until(
+            lambda: _if_stopped(robot), _SEEN_WITHIN_S, "the robot stands still, and its status says why"
+        )
+    robot.reset_stop(stopped.stop.stop_id)
+    return (
+        f"back at {-_DRIVEN_MPS} m/s while the driver held, by the base's odometry; "
+        f"StopRobot confirmed after {confirmed_s * 1000:.0f} ms, and reset"
+    )
+
+
+def _follows(programs: Programs, robot: GatewayClient, session: BlockingDriveSession) -> bool:
+    """Holds until the base follows; False if it does not in time."""
+    if stop := robot.status().teleop.stop:
+        robot.reset_stop(stop.stop_id)
+    session.ready(_SEEN_WITHIN_S)
+    until_s = time.monotonic() + _FOLLOWS_WITHIN_S
+
+    def look() -> bool | None:
+        session.hold(_DRIVEN_MPS)
+        if _is_driven(robot):
+            return True
+        return False if time.monotonic() > until_s else None
+
+    try:
+        return programs.wait_until(look, 2 * _FOLLOWS_WITHIN_S, "the robot follows its driver")
+    finally:
+        session.release()
+
+
+def _is_driven(robot: GatewayClient) -> bool:
+    status = status_or_none(robot)
+    seen = status.odometry.vx_mps if status else None
+    return seen is not None and abs(seen - _DRIVEN_MPS) <= _TOLERANCE_MPS
+
+
+def _if_stopped(robot: GatewayClient) -> SystemStatus | None:
+    status = status_or_none(robot)
+    stopped = status and status.teleop.phase is DrivePhase.STOPPED and status.odometry.linear_speed_mps == 0.0
+    return status if stopped else None
 
 
 def _preview_on(robot: GatewayClient) -> PreviewStatus:

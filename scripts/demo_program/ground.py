@@ -1,4 +1,4 @@
-"""What the three programs stand on: a private directory with their configuration, sockets and logs; ports."""
+"""What the programs stand on: a private directory with their configuration, sockets and logs; ports."""
 
 import json
 import os
@@ -13,13 +13,22 @@ from typing import Any, Final
 
 from common.errors import UserError
 from demo_program.sources import Source
+from simrobot.base import TIMEOUT_S
 from tests.support.free import free_domain, free_port, port_is_free
 
 DEFAULT_GRPC_PORT: Final = 50051
 DEFAULT_SRT_PORT: Final = 7100
 _TAIL_LINES: Final = 15
 # Settings of another robot in the caller's environment must not reach the demo's.
-_FOREIGN: Final = ("GATEWAY__", "PREVIEW__", "PYTHONPATH", "RMW_IMPLEMENTATION", "DEMO_BEGAN")
+_FOREIGN: Final = (
+    "GATEWAY__",
+    "PREVIEW__",
+    "DRIVE__",
+    "SIMROBOT_",
+    "PYTHONPATH",
+    "RMW_IMPLEMENTATION",
+    "DEMO_BEGAN",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +67,11 @@ class Ground:
     def preview_socket(self) -> Path:
         """Where gateway and preview service meet."""
         return self.directory / "preview.sock"
+
+    @property
+    def drive_socket(self) -> Path:
+        """Where gateway and drive program meet."""
+        return self.directory / "drive.sock"
 
     def environment(self) -> dict[str, str]:
         """For the programs: their own ROS domain, nothing leaves this machine."""
@@ -127,6 +141,13 @@ def _write_configurations(ground: Ground, source: Source) -> None:
         "name": "demo-robot",
         "grpc": {"host": "127.0.0.1", "port": ground.grpc_port},
         "preview": {"socket": str(ground.preview_socket)},
+        # Only this machine reaches it.
+        "teleop": {"socket": str(ground.drive_socket), "allow_insecure": True, "line_of_sight": True},
+    }
+    drive = {
+        "socket": str(ground.drive_socket),
+        "state_dir": str(ground.directory / "drive"),
+        "base_timeout_ms": round(TIMEOUT_S * 1000),
     }
     preview = {
         "socket": str(ground.preview_socket),
@@ -136,6 +157,7 @@ def _write_configurations(ground: Ground, source: Source) -> None:
     }
     _write(ground.directory / "gateway.yaml", gateway)
     _write(ground.directory / "preview.yaml", preview)
+    _write(ground.directory / "drive.yaml", drive)
 
 
 def _write(path: Path, values: dict[str, Any]) -> None:
@@ -148,5 +170,7 @@ def _clear(ground: Ground) -> None:
         shutil.rmtree(ground.directory)
         return
     for path in ground.directory.iterdir():
-        if path not in ground.logs.values() and not path.is_dir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path not in ground.logs.values():
             path.unlink()

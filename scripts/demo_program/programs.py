@@ -1,4 +1,4 @@
-"""The three programs: started, watched, and stopped in reverse order whatever happens."""
+"""The four programs: started, watched, and stopped in reverse order whatever happens."""
 
 import os
 import signal
@@ -16,6 +16,8 @@ from demo_program.ground import Ground
 from demo_program.interruption import SIGNALS, Interruption
 
 _BIN: Final = Path(sys.executable).parent
+SPEED_MPS: Final = 0.15
+"""Of the robot by itself: wheels of its base that are clamped would bend its circle."""
 _STOP_WITHIN_S: Final = 8.0
 _POLL_S: Final = 0.05
 
@@ -36,7 +38,7 @@ class ProgramTroubleError(UserError):
 
 
 class Programs:
-    """Simulated robot, preview service and gateway; running inside the `with` block, gone after it.
+    """Simulated robot, preview, drive program, gateway; running inside the `with` block, gone after it.
 
     Args:
         ground: where they run.
@@ -52,8 +54,10 @@ class Programs:
     def __enter__(self) -> Self:
         directory = self._ground.directory
         try:
-            self._start("simrobot", "run", "--control", str(self._ground.control_socket))
+            robot = ("run", "--base", f"speed_mps={SPEED_MPS}", "--control", str(self._ground.control_socket))
+            self._start("simrobot", *robot)
             self._start("robot-preview", "serve", "--config", str(directory / "preview.yaml"))
+            self._start("robot-drive", "serve", "--config", str(directory / "drive.yaml"))
             self._start("robot-gateway", "serve", "--config", str(directory / "gateway.yaml"))
         except BaseException:
             self._stop_after_trouble()

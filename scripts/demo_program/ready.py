@@ -13,10 +13,10 @@ START_WITHIN_S: Final = 30.0
 
 
 def wait_until_up(ground: Ground, programs: Programs, robot: GatewayClient) -> None:
-    """Returns when all three answer, and the gateway has met the preview service."""
+    """Returns when all answer, and the gateway has met the preview service and the drive program."""
     programs.wait_until(lambda: _robot_answers(ground), START_WITHIN_S, "the simulated robot answers")
     programs.wait_until(lambda: _preview_listens(ground), START_WITHIN_S, "the preview service listens")
-    programs.wait_until(lambda: _met(robot), START_WITHIN_S, "the gateway answers and has met the preview")
+    programs.wait_until(lambda: _met(robot), START_WITHIN_S, "the gateway answers and has met the others")
 
 
 def status_or_none(robot: GatewayClient) -> SystemStatus | None:
@@ -46,4 +46,5 @@ def _preview_listens(ground: Ground) -> bool | None:
 
 def _met(robot: GatewayClient) -> bool | None:
     status = status_or_none(robot)
-    return True if status and status.preview.service_reachable else None
+    met = status and status.preview.service_reachable and status.teleop.enabled
+    return True if met else None

@@ -26,7 +26,7 @@ def show(ground: Ground, programs: Programs, _began_s: float) -> None:
     """Shows the status until KeyboardInterrupt. Raises UserError when a program ends by itself."""
     console = Console(highlight=False, markup=False, emoji=False)
     with GatewayClient(ground.target) as robot:
-        console.print("starting the simulated robot, the preview service and the gateway ...")
+        console.print("starting the simulated robot, preview, drive program and gateway ...")
         wait_until_up(ground, programs, robot)
         console.print(Text(hints(ground)), soft_wrap=True)
         if console.is_terminal:
@@ -51,6 +51,8 @@ In a second terminal, for example:
   .venv/bin/robotctl{target} preview on --profile balanced
   .venv/bin/robotctl{target} watch
   .venv/bin/robotctl{target} overlay
+  .venv/bin/robotctl{target} drive      (w a s d while the key is down; space stops, r resets that, x ends)
+  .venv/bin/robotctl{target} stop       (stops it, no matter who drives; reset-stop ends that)
   .venv/bin/simrobot {silence}    (resume brings it back)
 While the preview runs, its picture:
   ffplay -fflags nobuffer -flags low_delay '{uri}?latency={_SRT_LATENCY_MS * 1000}'

@@ -376,12 +376,13 @@ ADDITIONS = [
     Case(system_status_pb2.VisionStatus, uint(16, 70), {"age_ms": 70}),
     Case(
         system_status_pb2.TeleopStatus,
-        uint(16, 7) + uint(17, 4) + uint(17, 6) + text(18, "anna") + sub(19, uint(1, 12)),
+        uint(16, 7) + uint(17, 4) + uint(17, 6) + text(18, "anna") + sub(19, uint(1, 12)) + uint(20, 500),
         {
             "phase": teleop_pb2.DRIVE_PHASE_STOPPED,
             "inhibits": [teleop_pb2.DRIVE_INHIBIT_PICTURE_STALE, teleop_pb2.DRIVE_INHIBIT_BASE_ABSENT],
             "holder": "anna",
             "stop": teleop_pb2.StopLatch(stop_id=12),
+            "base_timeout_ms": 500,
         },
     ),
     Case(

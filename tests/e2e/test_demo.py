@@ -18,10 +18,23 @@ from tests.support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "scripts/demo"
-PROGRAMS = ("simrobot", "robot-preview", "robot-gateway")
+PROGRAMS = ("simrobot", "robot-preview", "robot-drive", "robot-gateway")
 UP_WITHIN_S = 60.0
 GONE_WITHIN_S = 30.0
-STEPS = ["setup", "start", "status", "values", "silence", "preview on", "video", "preview off", "stop"]
+NAMES = ("worker", *PROGRAMS)
+"""What is started: robot-drive's worker is a process of its own."""
+STEPS = [
+    "setup",
+    "start",
+    "status",
+    "values",
+    "silence",
+    "drive",
+    "preview on",
+    "video",
+    "preview off",
+    "stop",
+]
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timeout(300)]
 
@@ -75,7 +88,7 @@ class Place:
                 words = (entry / "cmdline").read_text().split("\0")
                 if any(str(self.directory) in word for word in words):
                     names = {Path(word).name for word in words}
-                    found[next((name for name in PROGRAMS if name in names), words[0])] = int(entry.name)
+                    found[next((name for name in NAMES if name in names), words[0])] = int(entry.name)
         return found
 
     def wait_until_up(self, demo: "subprocess.Popen[str]") -> dict[str, int]:
@@ -87,7 +100,7 @@ class Place:
 
         wait_until(up, "the system is up and healthy", UP_WITHIN_S)
         programs = self.programs()
-        assert set(programs) == set(PROGRAMS)
+        assert set(programs) == set(NAMES)
         return programs
 
     def wait_until_gone(self) -> None:
@@ -225,7 +238,13 @@ def test_a_signal_ends_everything(place: Place, number: signal.Signals) -> None:
     with interactive(place) as demo:
         place.wait_until_up(demo)
         hints = place.out.read_text()
-        for hint in ("robotctl --target 127.0.0.1:", "preview on", "ffplay", "gst-launch-1.0 srtsrc"):
+        for hint in (
+            "robotctl --target 127.0.0.1:",
+            "drive",
+            "preview on",
+            "ffplay",
+            "gst-launch-1.0 srtsrc",
+        ):
             assert hint in hints
         demo.send_signal(number)
         assert demo.wait(GONE_WITHIN_S) == 0, place.said()

@@ -52,6 +52,7 @@ def stopped_view(now_s: float) -> TeleopView:
         stop=StopLatch(221, "who stopped", "a reason to stop", since_ns),
         counters=DriveCounters(commands=5, stops=1),
         episode=DriveEpisode(1, "a driver", since_ns - 10**9, since_ns, 0.5, 0.25, "stopped"),
+        base_timeout_ms=1009,
     )
     return TeleopView(
         drive=DriveView(enabled=True, applied=True, error="", actual=state),

@@ -4,11 +4,30 @@ Run with the gateway's address; prints "driving" when the robot moves.
 """
 
 import asyncio
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
 
 from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervision
 
-_SPEED_MPS = 0.1
+_ROOT: Final = Path(__file__).parents[2]
+SPEED_MPS: Final = 0.1
+
+
+@contextmanager
+def driver(target: str) -> Iterator["subprocess.Popen[str]"]:
+    """A driver in a process of its own; the robot moves when the block begins."""
+    command = [sys.executable, "-m", "tests.support.driver_program", target]
+    with subprocess.Popen(command, cwd=_ROOT, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "driving\n"
+            yield process
+        finally:
+            process.kill()
 
 
 async def drive(target: str) -> None:
@@ -19,7 +38,10 @@ async def drive(target: str) -> None:
         said = False
         while True:
             session.check()
-            session.hold(_SPEED_MPS)
+            if session.state and session.state.phase is DrivePhase.INHIBITED:
+                session.release()  # Without a release no hold begins anew.
+            else:
+                session.hold(SPEED_MPS)
             if not said and session.state and session.state.phase is DrivePhase.DRIVING:
                 said = session.open_lanes == 2
                 if said:

@@ -89,6 +89,8 @@ class Teleop:
     holder: str
     """Who drives. Empty when no one does."""
     stop: StopLatch | None
+    base_timeout_ms: int | None
+    """Silence after which the base stops by itself, as configured on the robot. None if it is not known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -72,7 +72,7 @@ class DriveCommands:
         return self._send(pb.ToDrive(reset=pb.Reset(stop_id=stop_id)))
 
     def picture(self, newest_capture_ns: int | None) -> bool:
-        """Reports when the newest picture that left the robot was captured; None if none leave."""
+        """Reports an upper bound of when the newest picture was captured that left; None if none leave."""
         picture = pb.Picture(running=newest_capture_ns is not None, newest_capture_ns=newest_capture_ns or 0)
         return self._send(pb.ToDrive(picture=picture))
 

@@ -218,6 +218,7 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         counters=_same_fields(DriveCounters, message.counters),
         episode=_same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
         problems=tuple(message.problems),
+        base_timeout_ms=welcome.base_timeout_ms if welcome.HasField("base_timeout_ms") else None,
     )
 
 

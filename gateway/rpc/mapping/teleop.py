@@ -28,6 +28,7 @@ def teleop_status(view: TeleopView, now_s: float) -> system_status_pb2.TeleopSta
         phase=DRIVE_PHASES[drive.phase],
         inhibits=[DRIVE_INHIBITS[each] for each in view.inhibits],
         holder=view.holder,
+        base_timeout_ms=actual.base_timeout_ms if actual else None,
     )
     if view.command:
         velocity, age = view.command.value, age_ms(view.command.at_s, now_s)

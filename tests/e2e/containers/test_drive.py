@@ -1,32 +1,74 @@
-"""The drive program in its container: hardened, on its own graph, and ended with zeros."""
+"""Driving through the containers: client library, gateway, drive program, base; and what ends it."""
 
 import os
 import signal
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from console.client.blocking import GatewayClient
+from console.client.errors import GatewayError, Refused
+from console.client.results import DrivePhase
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, mounts, writable
-from tests.support.driving import Observer, Peer
+from tests.support.driver_program import SPEED_MPS, driver
+from tests.support.driving import Observer
+from tests.support.robotctl import robotctl_process
 from tests.support.waiting import wait_until
 
 # Timed: while a driver has the robot, 60 ms without a heartbeat stop it, and other tests take as much.
 pytestmark = [pytest.mark.docker, pytest.mark.ros, pytest.mark.timed, pytest.mark.timeout(900)]
 
 USER, GROUP = 10003, 10000
+UP_WITHIN_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def deployment(
+    tmp_path_factory: pytest.TempPathFactory,
+    images: str,  # noqa: ARG001  # for its effect
+) -> Iterator[Deployment]:
+    """A robot with a base that nothing else drives."""
+    directory = tmp_path_factory.mktemp("drive")
+    with deployed(directory, demo_overlay(), COMPOSE_PROFILES="drive", ROBOT_BASE="true") as deployment:
+        deployment.wait_healthy("drive")
+        control = ("simrobot", "control", "--control", "/tmp/robot.sock")
+        deployment.run("exec", "robot", *control, "set", "commander=nobody")
+        yield deployment
 
 
 @pytest.fixture
-def driven(tmp_path: Path, images: str) -> Iterator[Deployment]:  # noqa: ARG001  # for its effect
-    with deployed(tmp_path, demo_overlay(), COMPOSE_PROFILES="drive", ROBOT_BASE="true") as deployment:
-        deployment.wait_healthy("drive")
-        robot = deployment.run(
-            "exec", "robot", "simrobot", "control", "--control", "/tmp/robot.sock", "set", "commander=nobody"
-        )
-        assert robot.returncode == 0
-        yield deployment
+def driven(deployment: Deployment) -> Deployment:
+    """The same, and the robot is not stopped. The engine's own health checks come too rarely to wait for."""
+    with deployment.client() as robot:
+        wait_until(lambda: is_available(robot), "the robot can be driven", UP_WITHIN_S)
+    return deployment
+
+
+def is_available(robot: GatewayClient) -> bool:
+    """Whether the robot can be driven; resets what is stopped."""
+    teleop = teleop_of(robot)
+    if teleop and teleop.stop:
+        try:
+            robot.reset_stop(teleop.stop.stop_id)
+        except Refused:
+            return False
+    return bool(teleop and teleop.phase is DrivePhase.AVAILABLE)
+
+
+def teleop_of(robot: GatewayClient) -> Any:
+    """Driving, as the status has it; None while the gateway does not answer."""
+    try:
+        return robot.status().teleop
+    except GatewayError:
+        return None
+
+
+def speed_mps(robot: GatewayClient) -> float:
+    """Of the base, by its odometry."""
+    return robot.status().odometry.linear_speed_mps or 0.0
 
 
 def processes(deployment: Deployment) -> dict[str, int]:
@@ -43,7 +85,52 @@ def processes(deployment: Deployment) -> dict[str, int]:
     return found
 
 
-def test_it_drives_is_hardened_and_survives_its_guard(driven: Deployment, tmp_path: Path) -> None:
+def observer_of(driven: Deployment) -> Observer:
+    """Reads the drive program's own socket, by the way into the container's files."""
+    worker = processes(driven)["worker"]
+    return Observer(Path(f"/proc/{worker}/root/run/robot-drive/drive.sock"))
+
+
+def test_it_drives_and_anyone_stops_it(driven: Deployment) -> None:
+    with driver(driven.target), driven.client() as robot:
+        wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "the base moves, by its odometry")
+        assert teleop_of(robot).phase is DrivePhase.DRIVING
+        stopped = robotctl_process("--target", driven.target, "stop", "--reason", "a test")
+        assert stopped.returncode == 0, stopped.stderr
+        wait_until(lambda: speed_mps(robot) == 0.0, "the base stands still")
+        teleop = teleop_of(robot)
+        assert (teleop.phase, teleop.stop.reason) == (DrivePhase.STOPPED, "a test")
+
+
+def test_a_gateway_that_is_killed_leaves_a_stopped_robot(driven: Deployment) -> None:
+    with closing(observer_of(driven)) as observer:
+        with driver(driven.target):
+            driven.signal_all("gateway", signal.SIGKILL)
+            stopped = observer.phase_is("STOPPED")
+        assert (stopped.vx_mps, stopped.vy_mps, stopped.wz_rad_s) == (0, 0, 0)
+        assert "the driver was lost while driving" in stopped.stop.reason
+    with driven.client() as robot:
+        found = wait_until(
+            lambda: (it := teleop_of(robot)) and it.stop, "the next gateway reports it", UP_WITHIN_S
+        )
+        assert found.stop_id == stopped.stop.stop_id
+
+
+def test_a_stop_outlives_a_restart_of_the_drive_container(driven: Deployment) -> None:
+    with driven.client() as robot:
+        before = robot.stop_robot("before the restart").stop
+        driven.run("restart", "drive")
+        wait_until(
+            lambda: teleop_of(robot).phase is DrivePhase.STOPPED, "connected again, and stopped", UP_WITHIN_S
+        )
+        after = teleop_of(robot).stop
+        assert (after.stop_id, after.by, after.reason) == (before.stop_id, before.by, before.reason)
+        wait_until(lambda: is_available(robot), "reset", UP_WITHIN_S)
+        with driver(driven.target):
+            wait_until(lambda: speed_mps(robot) > SPEED_MPS / 2, "it drives again", UP_WITHIN_S)
+
+
+def test_it_is_hardened_and_survives_its_guard(driven: Deployment) -> None:
     worker = processes(driven)["worker"]
     status = dict(
         line.split(":\t", 1)
@@ -57,18 +144,14 @@ def test_it_drives_is_hardened_and_survives_its_guard(driven: Deployment, tmp_pa
     assert writable(worker) == {"/tmp", "/run/robot-drive", "/var/lib/robot-drive", "/dev/shm"}
     assert "ro" in mounts(worker)["/"]
 
-    # The driver's end from outside, by the way into the container's files.
-    path = Path(f"/proc/{worker}/root/run/robot-drive/drive.sock")
-    with closing(Observer(path)) as observer, closing(Peer(path, tmp_path / "instants")) as peer:
-        observer.phase_is("AVAILABLE")
-        peer.send(lease="anna", held=False)
-        wait_until(lambda: observer.now().newest_sequence > 0, "commands arrive")
-        observer.phase_is("ARMED")
-        peer.send(held=True)
-        observer.phase_is("DRIVING")
-        wait_until(lambda: observer.now().episode.distance_m > 0.05, "it goes through the mux")
-        assert not observer.now().inhibits
+    restarts = driven.restarts("drive")
+    with driver(driven.target):
         os.kill(processes(driven)["guard"], signal.SIGKILL)
-        wait_until(lambda: driven.restarts("drive") > 0, "the engine starts it again")
+        wait_until(lambda: driven.restarts("drive") > restarts, "the engine starts it again", UP_WITHIN_S)
     assert "the guard has gone" in driven.logs("drive"), "the worker had time for its zeros"
-    driven.wait_healthy("drive")
+    # The engine asks the same only every 30 s.
+    health = ("exec", "drive", "python", "-m", "drive.health")
+    wait_until(lambda: driven.run(*health, check=False).returncode == 0, "it is healthy again", UP_WITHIN_S)
+    with driven.client() as robot:
+        wait_until(lambda: teleop_of(robot).stop, "the next start finds a stop", UP_WITHIN_S)
+        assert teleop_of(robot).stop.by == "robot-drive"

@@ -95,6 +95,8 @@ def test_no_caller_makes_a_report_larger_than_a_packet() -> None:
 
 def test_the_welcome_has_the_limits_in_effect() -> None:
     rules = Rules(deadlines=Deadlines(picture_ns=300_000_000))
-    limits = welcome("1", rules).welcome.limits
+    limits = welcome("1", rules, 500).welcome.limits
+    assert welcome("1", rules, 500).welcome.base_timeout_ms == 500
+    assert not welcome("1", rules).welcome.HasField("base_timeout_ms")
     assert limits.max_picture_age_ms == 300
     assert limits.max_vx_mps == pytest.approx(rules.limits.vx_mps)

@@ -13,7 +13,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
 from gateway.config import GatewaySettings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
+from gateway.doctor.endpoints import DRIVE, PREVIEW, Service, operator_endpoint, service_endpoint
 from gateway.doctor.examination import examine
 from gateway.links.preview.exposure import video_exposure
 from gateway.status.preview import Listener
@@ -72,19 +72,30 @@ def test_the_operators_endpoint() -> None:
     assert operator_endpoint("127.0.0.1", 0).verdict is Verdict.NOTE
 
 
-def test_the_previews_endpoint(tmp_path: Path) -> None:
-    path = tmp_path / "preview.sock"
-    assert "robot-preview serve" in preview_endpoint(path).remedy
-    assert f"directory {tmp_path / 'gone'}" in preview_endpoint(tmp_path / "gone/preview.sock").remedy
-    with socket.socket(socket.AF_UNIX) as server:
+@pytest.mark.parametrize("service", [PREVIEW, DRIVE], ids=lambda service: service.check)
+def test_the_endpoint_of_a_service(tmp_path: Path, service: Service) -> None:
+    path = tmp_path / "service.sock"
+    assert service.command in service_endpoint(service, path).remedy
+    assert f"directory {tmp_path / 'gone'}" in service_endpoint(service, tmp_path / "gone/a.sock").remedy
+    with socket.socket(socket.AF_UNIX, service.kind) as server:
         server.bind(str(path))
         server.listen()
-        assert preview_endpoint(path).verdict is Verdict.GOOD
-    left_over = preview_endpoint(path)
+        assert service_endpoint(service, path).verdict is Verdict.GOOD
+    left_over = service_endpoint(service, path)
     assert (left_over.verdict, "left over" in left_over.what) == (Verdict.WRONG, True)
     path.unlink()
     path.write_text("no socket", encoding="utf-8")
-    assert preview_endpoint(path).verdict is Verdict.WRONG
+    assert service_endpoint(service, path).verdict is Verdict.WRONG
+
+
+def test_the_drive_program_is_looked_for_where_it_is_configured(tmp_path: Path) -> None:
+    config = tmp_path / "gateway.yaml"
+    teleop = f"teleop: {{socket: {tmp_path}/drive.sock, allow_insecure: true}}\n"
+    for content, checked in (("sources: []\n", False), (f"sources: []\n{teleop}", True)):
+        config.write_text(content, encoding="utf-8")
+        found = {finding.check: finding for finding in examine(config)}
+        assert ("drive" in found) is checked
+    assert found["drive"].verdict is Verdict.WRONG
 
 
 def access_of(tmp_path: Path) -> Finding:

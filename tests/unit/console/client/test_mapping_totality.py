@@ -266,6 +266,7 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "DetectionOverlayStatus.available": ("age_ms", "source_width_px", "source_height_px", "count"),
     "WatchSystemStatusResponse.detections": ("detections",),
     "TeleopStatus.stop": ("stop",),
+    "TeleopStatus.base_timeout_ms": ("base_timeout_ms",),
     "DriveState.stop": ("stop",),
     "DriveState.picture_age_ms": ("picture_age_ms",),
 }

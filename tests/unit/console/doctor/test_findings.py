@@ -236,3 +236,10 @@ def test_what_keeps_a_robot_from_being_driven_is_found(double: GatewayDouble) ->
     teleop.Clear()
     teleop.state = states.TELEOP_DISABLED
     assert "disabled" in examined(double)["driving"].what
+    assert examined(double)["driving.base"].verdict is Verdict.NOTE
+    teleop.base_timeout_ms = 500
+    assert "500 ms" in examined(double)["driving.base"].what
+    teleop.inhibits.append(teleop_pb2.DRIVE_INHIBIT_DRIVE_LOST)
+    assert "robot-drive" in examined(double)["driving"].remedy
+    teleop.inhibits[:] = [teleop_pb2.DRIVE_INHIBIT_OUTRANKED]
+    assert "what else drives" in examined(double)["driving"].remedy

@@ -280,8 +280,11 @@ class Welcome(_message.Message):
 
     INSTANCE_ID_FIELD_NUMBER: _builtins.int
     LIMITS_FIELD_NUMBER: _builtins.int
+    BASE_TIMEOUT_MS_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process."""
+    base_timeout_ms: _builtins.int
+    """Silence after which the base stops by itself, in ms, as configured. Unset: not known."""
     @_builtins.property
     def limits(self) -> Global___Limits:
         """The configured limits."""
@@ -291,12 +294,15 @@ class Welcome(_message.Message):
         *,
         instance_id: _builtins.str = ...,
         limits: Global___Limits | None = ...,
+        base_timeout_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["limits", b"limits"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms", "base_timeout_ms", b"base_timeout_ms", "limits", b"limits"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["instance_id", b"instance_id", "limits", b"limits"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms", "base_timeout_ms", b"base_timeout_ms", "instance_id", b"instance_id", "limits", b"limits"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__base_timeout_ms: _TypeAlias = _typing.Literal["base_timeout_ms"]  # noqa: Y015
+    _WhichOneofArgType__base_timeout_ms: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__base_timeout_ms) -> _WhichOneofReturnType__base_timeout_ms | None: ...
 
 Global___Welcome: _TypeAlias = Welcome  # noqa: Y015
 
@@ -553,7 +559,7 @@ class Picture(_message.Message):
     running: _builtins.bool
     """Whether pictures leave the robot."""
     newest_capture_ns: _builtins.int
-    """When the newest of them was captured."""
+    """Upper bound of when the newest of them was captured: no driver has seen a later one."""
     def __init__(
         self,
         *,

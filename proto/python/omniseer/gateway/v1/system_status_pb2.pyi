@@ -258,6 +258,7 @@ class TeleopStatus(_message.Message):
     INHIBITS_FIELD_NUMBER: _builtins.int
     HOLDER_FIELD_NUMBER: _builtins.int
     STOP_FIELD_NUMBER: _builtins.int
+    BASE_TIMEOUT_MS_FIELD_NUMBER: _builtins.int
     state: _states_pb2.TeleopState.ValueType
     """Whether the robot takes commands."""
     enabled: _builtins.bool
@@ -286,6 +287,10 @@ class TeleopStatus(_message.Message):
     """Who has the lease, for people: the name on the credential, or the address where callers are not authenticated.
     Empty when no one drives.
     """
+    base_timeout_ms: _builtins.int
+    """Silence after which the base stops by itself, in ms, as configured on the robot: what stops it if its computer
+    freezes. Unset: not known.
+    """
     @_builtins.property
     def inhibits(self) -> _containers.RepeatedScalarFieldContainer[_teleop_pb2.DriveInhibit.ValueType]:
         """Why the robot does not move for its driver. Empty when nothing is in the way, and without a driver."""
@@ -312,12 +317,15 @@ class TeleopStatus(_message.Message):
         inhibits: _abc.Iterable[_teleop_pb2.DriveInhibit.ValueType] | None = ...,
         holder: _builtins.str = ...,
         stop: _teleop_pb2.StopLatch | None = ...,
+        base_timeout_ms: _builtins.int | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["stop", b"stop"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms", "base_timeout_ms", b"base_timeout_ms", "stop", b"stop"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled", "holder", b"holder", "inhibits", b"inhibits", "last_command_age_ms", b"last_command_age_ms", "last_command_available", b"last_command_available", "last_command_stale", b"last_command_stale", "last_command_vx_mps", b"last_command_vx_mps", "last_command_vy_mps", b"last_command_vy_mps", "last_command_wz_rad_s", b"last_command_wz_rad_s", "last_error", b"last_error", "max_angular_rad_s", b"max_angular_rad_s", "max_linear_mps", b"max_linear_mps", "phase", b"phase", "state", b"state", "stop", b"stop"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms", "base_timeout_ms", b"base_timeout_ms", "enabled", b"enabled", "holder", b"holder", "inhibits", b"inhibits", "last_command_age_ms", b"last_command_age_ms", "last_command_available", b"last_command_available", "last_command_stale", b"last_command_stale", "last_command_vx_mps", b"last_command_vx_mps", "last_command_vy_mps", b"last_command_vy_mps", "last_command_wz_rad_s", b"last_command_wz_rad_s", "last_error", b"last_error", "max_angular_rad_s", b"max_angular_rad_s", "max_linear_mps", b"max_linear_mps", "phase", b"phase", "state", b"state", "stop", b"stop"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__base_timeout_ms: _TypeAlias = _typing.Literal["base_timeout_ms"]  # noqa: Y015
+    _WhichOneofArgType__base_timeout_ms: _TypeAlias = _typing.Literal["_base_timeout_ms", b"_base_timeout_ms"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__base_timeout_ms) -> _WhichOneofReturnType__base_timeout_ms | None: ...
 
 Global___TeleopStatus: _TypeAlias = TeleopStatus  # noqa: Y015
 

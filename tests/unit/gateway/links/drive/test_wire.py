@@ -49,6 +49,8 @@ def test_every_field_of_a_report_arrives() -> None:
     assert (report.instance_id, report.monotonic_ns) == (welcome.instance_id, message.monotonic_ns)
     assert report.velocity == Velocity(message.vx_mps, message.vy_mps, message.wz_rad_s)
     assert report.problems == tuple(message.problems)
+    assert report.base_timeout_ms == welcome.base_timeout_ms
+    assert wire.report_from(pb.Welcome(), message).base_timeout_ms is None
     parts = (
         (report.limits, welcome.limits, DriveLimits),
         (report.stop, message.stop, StopLatch),
@@ -58,7 +60,7 @@ def test_every_field_of_a_report_arrives() -> None:
     for part, source, kind in parts:
         assert {field.name for field in fields(kind)} == set(source.DESCRIPTOR.fields_by_name)
         assert part == kind(**{field.name: getattr(source, field.name) for field in fields(kind)})
-    own = {"instance_id", "velocity", "limits"}
+    own = {"instance_id", "velocity", "limits", "base_timeout_ms"}
     sent = set(message.DESCRIPTOR.fields_by_name) - {"vx_mps", "vy_mps", "wz_rad_s"}
     # The gateway knows its own commands.
     assert {field.name for field in fields(DriveActual)} - own == sent - {"newest_sequence", "command_ns"}

@@ -289,6 +289,7 @@ PLACES: dict[str, Any] = {
     "teleop.stop.by": "who stopped",
     "teleop.stop.reason": "a reason to stop",
     "teleop.stop.age_ms": 2625,
+    "teleop.base_timeout_ms": 1009,
 }
 """Path in a SystemStatus, without `sources`, and its value."""
 

@@ -1,0 +1,98 @@
+"""What the robot's audit log keeps of driving: each time of motion, each stop, and who was refused."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from console.client import AsyncGatewayClient, Credentials, NotAllowed, Refused
+from console.robots.login import parse_login
+from gateway.access.credential import Kind
+from gateway.access.credential_admin import CredentialRequest
+from gateway.access.role import Role
+from tests.support.driven_robot import BY_EYE, in_motion
+from tests.support.eventually import eventually
+from tests.support.guarded_program import Guarded, guarded_program
+from tests.support.running_drive import Base, listening_base, running_drive
+
+# Timed: on a machine that is busy with other tests, a late command would end the motion.
+pytestmark = [pytest.mark.ros, pytest.mark.timed]
+SPEED_MPS = 0.1
+
+
+@pytest.fixture
+def guarded(domain: int, tmp_path: Path) -> Iterator[tuple[Guarded, Base]]:  # noqa: ARG001  # for its effect
+    with listening_base() as base, running_drive(tmp_path) as drive:
+        teleop = {"socket": str(drive.socket), "line_of_sight": True}
+        with guarded_program(tmp_path, tmp_path, teleop=teleop) as robot:
+            yield robot, base
+
+
+def added(robot: Guarded, person: str, role: Role) -> tuple[Credentials, str]:
+    """A person's credentials, and the number by which they are revoked."""
+    credential, bundle = robot.admin.add(CredentialRequest(person, role, Kind.TOKEN))
+    return parse_login(bundle.text()).credentials, credential.credential_id
+
+
+def records(file: Path) -> list[dict[str, Any]]:
+    return (
+        [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
+    )
+
+
+async def test_who_drove_who_stopped_and_who_was_refused(
+    guarded: tuple[Guarded, Base], tmp_path: Path
+) -> None:
+    robot, base = guarded
+    (anna, anna_id), (vic, _) = added(robot, "anna", Role.OPERATOR), added(robot, "vic", Role.VIEWER)
+    async with (
+        AsyncGatewayClient(robot.target, credentials=anna) as driver,
+        AsyncGatewayClient(robot.target, credentials=vic) as viewer,
+    ):
+
+        async def enabled() -> bool:
+            return (await driver.status()).teleop.enabled
+
+        await eventually(enabled, bool, "driving is enabled")
+        async with driver.drive(BY_EYE) as session:
+            await in_motion(session, base, SPEED_MPS)
+            stopped = await viewer.stop_robot("a child on the track")
+            with pytest.raises(NotAllowed):
+                await viewer.reset_stop(stopped.stop.stop_id)
+            session.release()
+
+            async def reset() -> bool:
+                try:
+                    await driver.reset_stop(stopped.stop.stop_id)
+                except Refused:
+                    return False  # The release is on its way.
+                return True
+
+            await eventually(reset, bool, "the stop is reset")
+            await in_motion(session, base, SPEED_MPS)
+            robot.admin.revoke(anna_id)
+
+            async def ended() -> bool:
+                session.hold(SPEED_MPS)
+                return session.error is not None
+
+            await eventually(ended, bool, "the driver's access has ended")
+
+        async def motions() -> list[dict[str, Any]]:
+            kept = records(tmp_path / "credentials/audit.jsonl")
+            return [each for each in kept if each["action"] == "Drive" and " m, " in each["request"]]
+
+        first, second = await eventually(motions, lambda it: len(it) == 2, "both times of motion")
+    assert {(each["who"], each["role"]) for each in (first, second)} == {("anna", "operator")}
+    assert all(each["request"].endswith("by test") for each in (first, second))
+    assert "vic" in first["answer"], "stopped by the viewer"
+    assert "access" in second["answer"]
+    kept = records(tmp_path / "credentials/audit.jsonl")
+    # The client sends a stop on two connections.
+    stops = [each for each in kept if each["action"] == "StopRobot"]
+    assert {(each["who"], each["role"], each["result"]) for each in stops} == {("vic", "viewer", "accepted")}
+    assert all("a child on the track" in each["request"] for each in stops)
+    refused = records(tmp_path / "credentials/audit-refused.jsonl")
+    assert {(each["who"], each["action"]) for each in refused} >= {("vic", "ResetStop")}

@@ -1,0 +1,228 @@
+"""Driving by the picture, with real parts: preview, SRT, viewer, gateway, drive program.
+
+The driver reports what the project's own viewer shows, and a subscriber behind the mux judges. All of it runs
+on one machine, so that capture times and what the subscriber notes are of one clock.
+"""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import ExitStack, asynccontextmanager, contextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from console.client import (
+    AsyncGatewayClient,
+    DriveInhibit,
+    DriveOptions,
+    DrivePhase,
+    DriveSession,
+    PreviewProfile,
+    PreviewState,
+)
+from console.receiver.frame import Frame, PixelFormat
+from console.viewer.robot_video import RobotVideo
+from tests.support.driving import Driving, driving
+from tests.support.eventually import eventually
+from tests.support.gateway_program import gateway_program
+from tests.support.promise import keeps_async
+from tests.support.running_preview import RunningPreview
+from tests.support.stalling_camera import StallingCamera
+
+# Timed: on a machine that is busy with other tests, late commands would end the motion.
+pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timed]
+SPEED_MPS = 0.2
+PROMISED_MS = 650
+"""From the capture of the last picture shown to zero, docs/driving.md."""
+TRAVEL_M = 0.10
+PATIENCE_S = 30.0
+TICK_S = 0.02
+HOLDS_S = 2.0
+LONGER_S = 1.0
+"""Longer than any motion may last after a fault."""
+
+
+class Viewer:
+    """The project's viewer, whose screen can freeze.
+
+    Args:
+        target: the gateway's address.
+
+    Attributes:
+        shown_ns: capture of the newest picture that was ever shown.
+    """
+
+    def __init__(self, target: str) -> None:
+        self.video = RobotVideo(target, pixels=PixelFormat.I420)
+        self.video.session.add_frame_listener(self._show)
+        self.frozen = False
+        self.shown_ns = 0
+
+    def _show(self, frame: Frame) -> None:
+        if not self.frozen:
+            self.video.meter.shown(frame)
+            self.shown_ns = max(self.shown_ns, frame.capture_ns or 0)
+
+
+@dataclass
+class Scene:
+    """A robot with a camera and a base.
+
+    Attributes:
+        target: the gateway's address.
+    """
+
+    target: str
+    camera: StallingCamera
+    base: Driving
+
+
+@pytest.fixture(scope="module")
+def scene(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:  # noqa: ARG001
+    directory = tmp_path_factory.mktemp("robot")
+    with ExitStack() as stack:
+        camera = stack.enter_context(StallingCamera())
+        settings = {"source": {"kind": "gst", "description": camera.description}}
+        preview = stack.enter_context(RunningPreview(directory, settings))
+        base = stack.enter_context(driving(directory))
+        gateway = stack.enter_context(
+            gateway_program(
+                directory,
+                sources=[],
+                preview={"socket": str(preview.socket)},
+                teleop={"socket": str(base.socket), "allow_insecure": True},
+            )
+        )
+        yield Scene(f"127.0.0.1:{gateway.port}", camera, base)
+
+
+@contextmanager
+def viewing(target: str) -> Iterator[Viewer]:
+    viewer = Viewer(target)
+    viewer.video.start()
+    try:
+        yield viewer
+    finally:
+        viewer.video.close(10)
+
+
+@asynccontextmanager
+async def seen(
+    scene: Scene, profile: PreviewProfile = PreviewProfile.BALANCED
+) -> AsyncIterator[tuple[AsyncGatewayClient, Viewer]]:
+    """A client and a viewer that shows the robot's picture."""
+    scene.camera.go_on()
+    with viewing(scene.target) as viewer:
+        async with AsyncGatewayClient(scene.target) as client:
+            await client.enable_preview(profile)
+            await eventually(lambda: running(client), bool, "the preview runs", PATIENCE_S)
+            await eventually(lambda: age_ms(viewer), lambda it: it < 300, "a young picture", PATIENCE_S)
+            yield client, viewer
+
+
+def by_picture(viewer: Viewer) -> DriveOptions:
+    return DriveOptions(picture=viewer.video.meter.capture_ns)
+
+
+async def running(client: AsyncGatewayClient) -> bool:
+    return (await client.status()).preview.state is PreviewState.RUNNING
+
+
+async def age_ms(viewer: Viewer) -> float:
+    return viewer.video.meter.reading().age_ms or float("inf")
+
+
+async def in_motion(scene: Scene, session: DriveSession, speed_mps: float = SPEED_MPS) -> None:
+    """Holds until the base has motion; anew, where a reason that has gone has ended the hold."""
+    await session.ready(within_s=PATIENCE_S)
+
+    async def moves() -> bool:
+        if session.state and session.state.phase is DrivePhase.INHIBITED:
+            session.release()
+        else:
+            session.hold(speed_mps)
+        return scene.base.witness.moves()
+
+    await eventually(moves, bool, "the base moves")
+
+
+async def held(session: DriveSession, for_s: float) -> set[DriveInhibit]:
+    """Holds for a time; returns all reasons meanwhile."""
+    reasons, until_s = set[DriveInhibit](), time.monotonic() + for_s
+    while time.monotonic() < until_s:
+        session.hold(SPEED_MPS)
+        assert session.state
+        reasons |= {*session.state.inhibits}
+        await asyncio.sleep(TICK_S)
+    return reasons
+
+
+@pytest.mark.parametrize("profile", [PreviewProfile.LOW_BW, PreviewProfile.BALANCED])
+async def test_it_drives_by_what_the_viewer_shows(scene: Scene, profile: PreviewProfile) -> None:
+    """No picture that the robot has sent is taken for one that it can't have sent."""
+    async with seen(scene, profile) as (client, viewer), client.drive(by_picture(viewer)) as session:
+        await in_motion(scene, session)
+        assert DriveInhibit.PICTURE_MISSING not in await held(session, HOLDS_S)
+        assert session.state
+        assert session.state.picture_age_ms is not None
+        assert 0 < session.state.picture_age_ms < 600
+
+
+@pytest.mark.parametrize("fault", ["camera silent", "preview stopped", "viewer frozen"])
+async def test_a_picture_without_a_successor_stops_the_robot_in_time(scene: Scene, fault: str) -> None:
+    async def zero_after_ms() -> float:
+        async with seen(scene) as (client, viewer), client.drive(by_picture(viewer)) as session:
+            await in_motion(scene, session)
+            match fault:
+                case "camera silent":
+                    scene.camera.stall()
+                case "preview stopped":
+                    await asyncio.gather(client.disable_preview(), held(session, TICK_S))
+                case _:
+                    viewer.frozen = True
+            reasons = await held(session, LONGER_S)
+            assert reasons & {DriveInhibit.PICTURE_MISSING, DriveInhibit.PICTURE_STALE}
+            await asyncio.to_thread(scene.base.settled)
+            assert not scene.base.witness.moves(), "the last message is zero"
+            return scene.base.witness.zero_after_ms(viewer.shown_ns)
+
+    await keeps_async(PROMISED_MS, f"{fault}, ms after the capture of the last picture", zero_after_ms)
+
+
+@pytest.mark.parametrize("camera", ["running", "silent"])
+async def test_a_picture_that_the_robot_cant_have_sent_is_none(scene: Scene, camera: str) -> None:
+    """One of the future; and any of now, while the camera is silent."""
+    async with seen(scene) as (client, _):
+        ahead_ns = 1_000_000_000 if camera == "running" else 0
+        if camera == "silent":
+            scene.camera.stall()
+        async with client.drive(DriveOptions(picture=lambda: time.monotonic_ns() + ahead_ns)) as session:
+
+            async def inhibits() -> tuple[DriveInhibit, ...]:
+                session.hold(SPEED_MPS)
+                return session.state.inhibits if session.state else ()
+
+            missing = DriveInhibit.PICTURE_MISSING
+            await eventually(inhibits, lambda it: missing in it, "refused", PATIENCE_S)
+            assert not scene.base.witness.moves()
+
+
+async def test_the_age_of_the_picture_limits_the_speed(scene: Scene) -> None:
+    async with seen(scene) as (client, viewer):
+        later_ns = 350_000_000
+
+        def picture() -> int | None:
+            newest_ns = viewer.video.meter.capture_ns()
+            return newest_ns - later_ns if newest_ns else None
+
+        async with client.drive(DriveOptions(picture=picture)) as session:
+            await in_motion(scene, session)
+            began_ns = time.monotonic_ns()
+            await held(session, HOLDS_S / 2)
+            moving = [speed for ns, speed in scene.base.witness.seen if ns > began_ns and speed]
+            assert max(moving) <= TRAVEL_M / (later_ns / 1e9), "as if the picture had no other age"
+            assert session.state
+            assert session.state.picture_age_ms
+            at_this_age_mps = TRAVEL_M / session.state.picture_age_ms * 1000
+            assert session.state.speed_limit_mps == pytest.approx(at_this_age_mps, rel=0.25)
