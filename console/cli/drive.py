@@ -26,6 +26,7 @@ from console.client import (
 )
 from console.client.results import TeleopState
 from console.presentation.json_form import json_form
+from console.steering import Speeds, permitted
 
 _TICK_S: Final = 0.02
 _DRAW_EVERY: Final = 10
@@ -104,8 +105,9 @@ class _Cockpit:
         self._session = session
         self._client = client
         self._driving = driving
-        self._speed_mps = speeds[0] or limits.line_of_sight_mps
-        self._turn_rad_s = speeds[1] or limits.line_of_sight_rad_s
+        most = permitted(limits, Supervision.LINE_OF_SIGHT)
+        speed_mps, turn_rad_s = speeds
+        self._speeds = Speeds(speed_mps or most.vx_mps, speed_mps or most.vy_mps, turn_rad_s or most.wz_rad_s)
         self._shown: object = None
         self._note = ""
         self._begun = False
@@ -174,12 +176,11 @@ class _Cockpit:
 
     def _hold(self, hands: Hands) -> None:
         self._begun = self._begun or self._driving.is_ready
-        parts = hands.velocity(time.monotonic())
-        if parts is None or not self._begun:
+        steering = hands.steering(time.monotonic())
+        if steering is None or not self._begun:
             self._driving.release()
             return
-        forward, left, turn = parts
-        self._driving.hold(forward * self._speed_mps, left * self._speed_mps, turn * self._turn_rad_s)
+        self._driving.hold(*self._speeds.velocity(steering))
 
     def _call(self, call: Any) -> None:
         task = asyncio.create_task(call)
