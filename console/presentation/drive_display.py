@@ -74,10 +74,23 @@ class DriveDisplay:
     stop: StopLatch | None = None
 
 
-def watched_display(teleop: Teleop) -> DriveDisplay | None:
-    """Returns driving as one sees it who does not drive; None on a robot that can't be driven."""
+def watched_display(teleop: Teleop, *, known: bool = True) -> DriveDisplay | None:
+    """Returns driving as one sees it who does not drive; None on a robot that can't be driven.
+
+    Args:
+        teleop: of the newest status.
+        known: whether that still holds; else the robot has not answered for a while.
+    """
     if teleop.state is TeleopState.UNKNOWN:
         return None
+    if not known:
+        return DriveDisplay(
+            driver="Driver not known",
+            phase=DrivePhase.UNKNOWN.value.upper(),
+            style=SeverityStyle.WARNING,
+            reason="The robot does not answer. STOP may not reach it",
+            stop=teleop.stop,
+        )
     phase = teleop.phase
     if phase is DrivePhase.UNKNOWN:
         # A gateway of an earlier release has no phases.

@@ -2,19 +2,22 @@
 
 The release of a key that goes up while another window has the focus is never reported. So everything is
 released as soon as the window, or what has the focus in it, is left, and a key counts again only after a new
-press. The window's thread passes on what is held every 20 ms: if it hangs, the session releases after 100 ms.
+press. The window's thread passes on what is held every 10 ms: if it hangs, the session releases after 100 ms,
+and afterwards only a new press counts.
 """
 
+import time
 from typing import Final, Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
+from console.client.driving import HOLD_COUNTS_S
 from console.monitor.driver import Driver
 from console.steering import LETTERS, Direction, Steering, steering_of
 
-TICK_MS: Final = 20
+TICK_MS: Final = 10
 _KEYS: Final = {
     **{Qt.Key(ord(letter.upper())): direction for letter, direction in LETTERS.items()},
     Qt.Key.Key_Up: Direction.FORWARD,
@@ -41,6 +44,9 @@ _PLAIN: Final = (
 class Pad(Protocol):
     """A gamepad; `console.gamepad.reader.GamepadReader` is one."""
 
+    def description(self) -> str:
+        """Returns which gamepad there is, or why there is none."""
+
     def steering(self) -> Steering | None:
         """Returns how it steers; None while it does not hold."""
 
@@ -63,7 +69,7 @@ class DriveHands(QObject):
     stopped = Signal()
     """Space, or the gamepad's button for it, was pressed on a robot that can be driven."""
     ticked = Signal()
-    """Every 20 ms while `driveable`."""
+    """Every 10 ms while `driveable`."""
 
     def __init__(self, window: QWidget, driver: Driver, pad: Pad | None = None) -> None:
         super().__init__(window)
@@ -71,6 +77,7 @@ class DriveHands(QObject):
         self.driveable = False
         """Whether the robot can be driven, so that Space is STOP. Stays as it was while no robot answers."""
         self._down: dict[int, Direction] = {}
+        self._ticked_s = 0.0
         self._begun = False
         """Whether the robot was ready once in this session: a hold before would have no beginning."""
         self._timer = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
@@ -145,8 +152,13 @@ class DriveHands(QObject):
         )
 
     def _tick(self) -> None:
+        now_s = time.monotonic()
+        hung, self._ticked_s = now_s - self._ticked_s > HOLD_COUNTS_S, now_s
         if not self.driveable:
             return
+        if hung:
+            # The session has released; going on now would be motion without a new hold.
+            self.release()
         if self.pad and self.pad.take_stop():
             self.stopped.emit()
         self._pass_on()

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 from console.presentation.drive_display import DriveDisplay, SpeedBar
 from console.presentation.formatting import joined, signed
 from console.presentation.severity_style import SeverityStyle
-from console.window.gauge import DIM_INK, GROUND, INK
+from console.window.gauge import DIM_INK, INK
 from console.window.overlay import Overlay
 from console.window.theme import COLOURS
 
@@ -18,6 +18,8 @@ _TEXT_PX: Final = 13
 _BAR_PX: Final = 18.0
 _BAR_LEFT_PX: Final = 62.0
 _BAR_RIGHT_PX: Final = 96.0
+_GROUND: Final = QColor(16, 18, 20, 215)
+"""Darker than the gauges': there is more to read."""
 _TRACK: Final = QColor(255, 255, 255, 60)
 _NOW: Final = QColor(255, 255, 255, 95)
 _VALUE: Final = QColor("#56B4E9")
@@ -51,7 +53,7 @@ class DriveHud(Overlay):
         if display is None:
             return
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(GROUND)
+        painter.setBrush(_GROUND)
         painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
         colour = COLOURS.get(display.style, INK)
         if display.style in (SeverityStyle.WARNING, SeverityStyle.BAD):

@@ -76,6 +76,12 @@ class DrivePlace(QWidget):
         self.reset.setEnabled(latch is not None)
         self.stop_place.show_pending(view.stopping)
 
+    def show_pad(self, description: str) -> None:
+        """Says in the menu which gamepad there is."""
+        text = f"Gamepad: {description}".replace("&", "&&")
+        if self.pad.text() != text:
+            self.pad.setText(text)
+
     def press_reset(self) -> None:
         """Resets the stop that is shown; no-op without one."""
         self._emit_reset()
@@ -115,6 +121,9 @@ class DrivePlace(QWidget):
         ]
         menu.addSeparator()
         self.enable = menu.addAction("Enable driving, for all", self.enable_chosen.emit)
+        menu.addSeparator()
+        self.pad = menu.addAction("Gamepad: none")
+        self.pad.setEnabled(False)
         return menu
 
 

@@ -1,5 +1,7 @@
 """Driving in the cockpit: what its buttons and keys do, and what it shows."""
 
+import time
+
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QWidget
 
@@ -56,7 +58,9 @@ class Driving(QObject):
         if state.snapshot:
             teleop, view = state.snapshot.status.teleop, self._driver.view()
             self.hands.driveable = teleop.state is not TeleopState.UNKNOWN
-            display = _display(teleop, view)
+            display = _display(teleop, view, known=not state.outdated(time.monotonic()))
+            if self.hands.pad:
+                self._strip.driving.show_pad(self.hands.pad.description())
             self._strip.show_teleop(teleop, view, _latch(display))
             self._picture.show_driving(display)
 
@@ -97,9 +101,9 @@ class Driving(QObject):
             self.show_state(self._worker.latest())
 
 
-def _display(teleop: Teleop, view: DriverView) -> DriveDisplay | None:
+def _display(teleop: Teleop, view: DriverView, *, known: bool) -> DriveDisplay | None:
     if view.supervision is None or view.state is None or view.limits is None:
-        return watched_display(teleop)
+        return watched_display(teleop, known=known)
     return own_display(
         view.state, view.limits, view.supervision, state_age_s=view.state_age_s, ready=view.ready
     )

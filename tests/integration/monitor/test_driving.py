@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
@@ -42,6 +43,9 @@ class PlayedPad:
     steers: Steering | None = None
     stop: bool = False
     forgotten: int = 0
+
+    def description(self) -> str:
+        return "played & tested"
 
     def steering(self) -> Steering | None:
         return self.steers
@@ -194,6 +198,8 @@ def test_a_window_that_hangs_drives_nothing(seat: Seat) -> None:
     time.sleep(1.0)  # the window's thread hangs; the base listens in another one
     assert not seat.robot.base.moves
     assert seat.robot.base.stopped_after_s(hung_s) < 0.6
+    let_pass(0.5)
+    assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
 
 
 def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None:
@@ -259,10 +265,9 @@ def test_space_and_the_button_stop_in_every_state_of_the_window(
     let_pass(0.2)
     stop = seat.window.strip.driving.stop_place
     assert stop.isVisible()
-    for act in (
-        lambda: seat.key(Qt.Key.Key_Space, down=True),
-        lambda: QTest.mousePress(stop, Qt.MouseButton.LeftButton),
-    ):
+    by_key = partial(seat.key, Qt.Key.Key_Space, down=True)
+    by_mouse = partial(QTest.mousePress, stop, Qt.MouseButton.LeftButton)
+    for act in (by_key, by_mouse):
         act()
         until(lambda: seat.robot.teleop.HasField("stop"), "a stop")
         shown = f"Reset stop {seat.robot.teleop.stop.stop_id}"
