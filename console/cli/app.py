@@ -49,7 +49,7 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "drive": (
         "console.cli.drive:drive",
-        "Drive the robot by the keyboard, with your own eyes on it, where the robot permits that.",
+        "Drive the robot by keyboard or gamepad, with your own eyes on it, where the robot permits that.",
     ),
     "robots": ("console.cli.robots:robots_app", "List the robots known by name, or change the list."),
 }

@@ -1,4 +1,4 @@
-"""robotctl drive: drives the robot by the keys of this terminal, within sight of it."""
+"""robotctl drive: drives the robot by the keys of this terminal or by a gamepad, within sight of it."""
 
 import asyncio
 import signal
@@ -12,6 +12,7 @@ import typer
 
 from common.errors import UserError
 from console.cli import drive_keys
+from console.cli.drive_input import Controls, Input, controls
 from console.cli.drive_keys import Action, Hands
 from console.cli.keyboard import Keyboard, has_keyboard
 from console.cli.session import Session, print_json, with_session
@@ -26,12 +27,14 @@ from console.client import (
 )
 from console.client.results import TeleopState
 from console.presentation.json_form import json_form
+from console.steering import Speeds, permitted
 
 _TICK_S: Final = 0.02
 _DRAW_EVERY: Final = 10
 """Ticks between two lines on the terminal."""
 _ANSWER_WITHIN_S: Final = 0.2
 """How long a terminal may take to say which keyboard protocol it speaks."""
+
 
 TakeOverOption = Annotated[
     bool,
@@ -50,6 +53,16 @@ TurnOption = Annotated[
 ]
 
 
+InputOption = Annotated[
+    Input,
+    typer.Option(
+        "--input",
+        help="What steers; auto: the keyboard, and a gamepad where one can be read.",
+        show_default=True,
+    ),
+]
+
+
 @with_session
 def drive(
     session: Session,
@@ -58,18 +71,26 @@ def drive(
     enable: EnableOption = False,
     speed: SpeedOption = None,
     turn: TurnOption = None,
+    by: InputOption = Input.AUTO,
 ) -> None:
-    """Drive the robot by the keyboard, with your own eyes on it, where the robot permits that.
+    """Drive the robot by keyboard or gamepad, with your own eyes on it, where the robot permits that.
 
     w s or the arrows: forward, back. a d or the arrows: turn. q e: sideways. Space stops the robot until r
     resets that. x, Esc or Ctrl-C: end. The robot moves while a key is down; where the terminal does not
-    report releases, for 0.3 s after each press.
+    report releases, for 0.3 s after each press. Gamepad: hold a shoulder button and steer, left stick forward
+    and sideways, right stick turn; B stops the robot.
     """
-    asyncio.run(_drive(session, take_over=take_over, enable=enable, speeds=(speed, turn)))
+    with controls(by) as steered_by:
+        asyncio.run(_drive(session, steered_by, take_over=take_over, enable=enable, speeds=(speed, turn)))
 
 
 async def _drive(
-    session: Session, *, take_over: bool, enable: bool, speeds: tuple[float | None, float | None]
+    session: Session,
+    steered_by: Controls,
+    *,
+    take_over: bool,
+    enable: bool,
+    speeds: tuple[float | None, float | None],
 ) -> None:
     options = DriveOptions(
         take_over=take_over,
@@ -86,11 +107,11 @@ async def _drive(
             if not answer.accepted:
                 raise UserError(f"the robot refused: {answer.message}")
         async with client.drive(options) as driving:
-            await _Cockpit(session, client, driving, speeds).run()
+            await _Cockpit(session, client, driving, speeds, steered_by).run()
 
 
 class _Cockpit:
-    """The keyboard, the session and the line on the terminal."""
+    """The keyboard, the gamepad, the session and the line on the terminal."""
 
     def __init__(
         self,
@@ -98,14 +119,17 @@ class _Cockpit:
         client: AsyncGatewayClient,
         driving: DriveSession,
         speeds: tuple[float | None, float | None],
+        controls: Controls,
     ) -> None:
         limits = driving.limits
         assert limits is not None, "it is open"  # noqa: S101  # the session has them from its opening
         self._session = session
         self._client = client
         self._driving = driving
-        self._speed_mps = speeds[0] or limits.line_of_sight_mps
-        self._turn_rad_s = speeds[1] or limits.line_of_sight_rad_s
+        self._controls = controls
+        most = permitted(limits, Supervision.LINE_OF_SIGHT)
+        speed_mps, turn_rad_s = speeds
+        self._speeds = Speeds(speed_mps or most.vx_mps, speed_mps or most.vy_mps, turn_rad_s or most.wz_rad_s)
         self._shown: object = None
         self._note = ""
         self._begun = False
@@ -128,6 +152,9 @@ class _Cockpit:
                 ticks = 0
                 while not self._ending:
                     self._driving.check()
+                    if self._controls.take_stop():
+                        hands.release()
+                        self._call(self._stop("by the driver's gamepad"))
                     self._hold(hands)
                     if ticks % _DRAW_EVERY == 0:
                         self._show()
@@ -167,28 +194,27 @@ class _Cockpit:
                     self._ending = True
                 case Action.STOP:
                     hands.release()
-                    self._call(self._stop())
+                    self._call(self._stop("by the driver's keyboard"))
                 case Action.RESET:
                     self._call(self._reset())
         self._hold(hands)
 
     def _hold(self, hands: Hands) -> None:
         self._begun = self._begun or self._driving.is_ready
-        parts = hands.velocity(time.monotonic())
-        if parts is None or not self._begun:
+        steering, device = self._controls.steering(hands)
+        if steering is None or not self._begun:
             self._driving.release()
-            return
-        forward, left, turn = parts
-        self._driving.hold(forward * self._speed_mps, left * self._speed_mps, turn * self._turn_rad_s)
+        else:
+            self._driving.hold(*self._speeds.velocity(steering), input_device=device)
 
     def _call(self, call: Any) -> None:
         task = asyncio.create_task(call)
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
 
-    async def _stop(self) -> None:
+    async def _stop(self, reason: str) -> None:
         try:
-            self._note = (await self._client.stop_robot("by the driver's keyboard")).message
+            self._note = (await self._client.stop_robot(reason)).message
         except GatewayError as error:
             self._note = str(error)
 
@@ -211,7 +237,9 @@ class _Cockpit:
                 self._shown = key
                 print_json(self._session.out, json_form(state), on_one_line=True)
             return
-        line = _line(state, self._driving, self._note) if self._begun else self._driving.reasons()
+        line = self._driving.reasons()
+        if self._begun:
+            line = _line(state, self._driving, self._note or self._controls.advice())
         if line != self._shown:
             self._shown = line
             width = self._session.out.width - 1
@@ -221,7 +249,7 @@ class _Cockpit:
 def _line(state: DriveState, driving: DriveSession, note: str) -> str:
     speeds = f"{state.vx_mps:+.2f} {state.vy_mps:+.2f} m/s {state.wz_rad_s:+.2f} rad/s"
     moves = state.phase in {DrivePhase.ARMED, DrivePhase.DRIVING, DrivePhase.STOPPING} and not state.inhibits
-    words = (note if moves else driving.reasons()) or "hold w a s d to drive, space stops, x ends"
+    words = note if moves else driving.reasons()
     return f"{state.phase.value}  {speeds}  {words}"
 
 

@@ -10,6 +10,8 @@ import re
 from enum import Enum
 from typing import Final
 
+from console.steering import LETTERS, Direction, Steering, steering_of
+
 TAP_S: Final = 0.3
 """How long a press counts where releases are not reported: beyond the usual interval of repeats (30 a
 second), and short of the delay before the first."""
@@ -40,25 +42,6 @@ class Action(Enum):
     QUIT = "quit"
 
 
-class Direction(Enum):
-    """What a key does while it is down: its part of forward, left and turning left."""
-
-    FORWARD = (1, 0, 0)
-    BACK = (-1, 0, 0)
-    LEFT = (0, 1, 0)
-    RIGHT = (0, -1, 0)
-    TURN_LEFT = (0, 0, 1)
-    TURN_RIGHT = (0, 0, -1)
-
-
-DIRECTIONS: Final = {
-    "w": Direction.FORWARD,
-    "s": Direction.BACK,
-    "a": Direction.TURN_LEFT,
-    "d": Direction.TURN_RIGHT,
-    "q": Direction.LEFT,
-    "e": Direction.RIGHT,
-}
 _ARROWS: Final = {
     "A": Direction.FORWARD,
     "B": Direction.BACK,
@@ -110,14 +93,11 @@ class Hands:
         """Releases all keys."""
         self._down.clear()
 
-    def velocity(self, now_s: float) -> tuple[int, int, int] | None:
-        """Returns the parts of forward, left and turning left, each -1, 0 or 1; None with no key down."""
+    def steering(self, now_s: float) -> Steering | None:
+        """Returns what the keys that are down amount to; None with no key down."""
         if not self._releases:
             self._down = {key: at_s for key, at_s in self._down.items() if now_s - at_s < TAP_S}
-        if not self._down:
-            return None
-        forward, left, turn = (sum(parts) for parts in zip(*(key.value for key in self._down), strict=True))
-        return forward, left, turn
+        return steering_of(self._down)
 
     def _key(self, found: "re.Match[str]", now_s: float) -> Action | None:
         if found["character"]:
@@ -144,13 +124,13 @@ class Hands:
         if bits.isdigit() and (int(bits) - 1) & _CONTROL:
             return Action.QUIT if character == "c" else None
         if released:
-            self._move(DIRECTIONS.get(character), now_s, released=True)
+            self._move(LETTERS.get(character), now_s, released=True)
             return None
         return self._press(character, now_s, repeated=event == "2")
 
     def _press(self, character: str, now_s: float, *, repeated: bool = False) -> Action | None:
         lowered = character.lower()
-        self._move(DIRECTIONS.get(lowered), now_s, released=False)
+        self._move(LETTERS.get(lowered), now_s, released=False)
         return None if repeated else ACTIONS.get(lowered)
 
     def _move(self, direction: Direction | None, now_s: float, *, released: bool) -> None:

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Final, Self, TypeAlias
@@ -27,6 +27,7 @@ from console.client.results import (
     DriveOpened,
     DrivePhase,
     DriveState,
+    StopLatch,
     Supervision,
 )
 from console.client.transport import Duplex, GrpcTransport
@@ -59,7 +60,7 @@ class DriveOptions:
         supervision: How the driver sees the robot.
         picture: Returns when the picture that the driver sees now was captured, in ns of the robot's
             monotonic clock; None without one. Called 50 times a second in the session's loop; must not wait.
-        input_device: What the driver steers with, for the robot's audit log.
+        input_device: What the driver steers with, for the robot's audit log; `hold` may name another.
         client_name: The driver's program, for the same.
     """
 
@@ -75,6 +76,7 @@ class _Hold:
     vx_mps: float
     vy_mps: float
     wz_rad_s: float
+    input_device: str
     at_s: float
 
 
@@ -164,22 +166,37 @@ class DriveSession:
         return self._error
 
     @property
+    def state_age_s(self) -> float:
+        """Time since the newest state has arrived; infinite before the first."""
+        echo_ns, at_s = self._echo
+        return time.monotonic() - at_s if echo_ns else math.inf
+
+    @property
     def open_lanes(self) -> int:
         """Lanes that are connected."""
         return self._open_lanes
 
-    def hold(self, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0) -> None:
+    def hold(
+        self, vx_mps: float, vy_mps: float = 0.0, wz_rad_s: float = 0.0, *, input_device: str = ""
+    ) -> None:
         """Holds, with a velocity in the robot's frame; counts for 100 ms, so it has to be repeated.
 
         Motion begins with a hold after a release, while the robot has no reason not to move. After a reason,
         or a stop, it takes another release and another hold.
+
+        Args:
+            vx_mps: Forward.
+            vy_mps: To the left.
+            wz_rad_s: Turning rate, counter-clockwise.
+            input_device: What the driver steers with now; by default that of the options.
 
         Raises:
             ValueError: A velocity is not finite.
         """
         if not all(map(math.isfinite, (vx_mps, vy_mps, wz_rad_s))):
             raise ValueError("a velocity has to be finite")
-        self._hold = _Hold(vx_mps, vy_mps, wz_rad_s, time.monotonic())
+        device = input_device or self._options.input_device
+        self._hold = _Hold(vx_mps, vy_mps, wz_rad_s, device, time.monotonic())
 
     def release(self) -> None:
         """Releases: the robot stops. Sent at once, and with every command until the next hold."""
@@ -221,11 +238,7 @@ class DriveSession:
         state = self.state
         if state is None:
             return "it has not reported its state yet"
-        if state.stop:
-            why = f": {state.stop.reason}" if state.stop.reason else ""
-            return f"it is stopped by {state.stop.by}{why} (stop {state.stop.stop_id})"
-        words = [*(SENTENCES[each] for each in state.inhibits), *state.problems]
-        return "; ".join(dict.fromkeys(words)) or f"it is {state.phase.value}"
+        return rest_reasons(state.stop, state.inhibits, state.problems) or f"it is {state.phase.value}"
 
     def check(self) -> None:
         """Raises the `GatewayError` that has ended the session, if it has ended."""
@@ -294,7 +307,7 @@ class DriveSession:
                 echo_monotonic_ns=echo_ns,
                 picture_monotonic_ns=self._picture_ns(),
                 valid_until_monotonic_ns=valid_until_ns,
-                input_device=self._options.input_device,
+                input_device=hold.input_device if hold else self._options.input_device,
             )
         )
 
@@ -406,6 +419,16 @@ class _Acknowledged:
     """The newest command that the robot has confirmed on one lane."""
 
     sequence: int = 0
+
+
+def rest_reasons(
+    stop: StopLatch | None, inhibits: Sequence[DriveInhibit], problems: Sequence[str] = ()
+) -> str:
+    """Returns why the robot does not move, for people; empty where there is no reason."""
+    if stop:
+        why = f": {stop.reason}" if stop.reason else ""
+        return f"it is stopped by {stop.by}{why} (stop {stop.stop_id})"
+    return "; ".join(dict.fromkeys([*(SENTENCES[each] for each in inhibits), *problems]))
 
 
 SENTENCES: Final = {

@@ -19,6 +19,7 @@ from console.client import (
     Unsupported,
     results,
 )
+from console.monitor.driver import DriveClient
 from console.monitor.event_log import EventLine, line_of
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState
@@ -38,7 +39,7 @@ _LONGEST_RETRY_AFTER_S: Final = 60.0
 _MS_PER_S: Final = 1000
 
 
-class RobotClient(Protocol):
+class RobotClient(DriveClient, Protocol):
     """The calls of `console.client.AsyncGatewayClient` that the monitor makes."""
 
     def watch_status(

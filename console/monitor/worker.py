@@ -21,6 +21,7 @@ from console.client import (
 )
 from console.monitor.conversation import Conversation, RetryBackoff, RobotSession, first_to_end
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
+from console.monitor.driver import Driver
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
 from console.monitor.viewer_feedback import ViewerFeedback
@@ -53,6 +54,11 @@ class Worker:
         connect: makes the client, inside the worker's loop; by default one without credentials.
         retry: the pauses between attempts.
         picture: returns the report on the picture that is shown; None while there is none to report.
+        captured: returns when the picture that is shown was captured, in ns of the robot's monotonic clock;
+            None without one.
+
+    Attributes:
+        driver: drives, and stops the robot.
 
     Raises:
         UserError: the target is not an address.
@@ -64,7 +70,9 @@ class Worker:
         on_change: Callable[[], None],
         connect: Connect | None = None,
         retry: RetryBackoff | None = None,
+        *,
         picture: Callable[[], PictureReport | None] = lambda: None,
+        captured: Callable[[], int | None] = lambda: None,
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(state=LinkState.CONNECTING, since_s=time.monotonic()))
@@ -75,6 +83,7 @@ class Worker:
         self._closing = asyncio.Event()
         self._feedback = ViewerFeedback(picture)
         self._conversation = Conversation(self._latest, retry or RetryBackoff(), self._feedback)
+        self.driver = Driver(self._call_soon, on_change, captured)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -145,7 +154,7 @@ class Worker:
 
     async def _converse(self) -> None:
         async with self._connect(self.target) as robot:
-            await first_to_end(self._conversation.run(robot), self._closing.wait())
+            await first_to_end(self._conversation.run(robot), self.driver.run(robot), self._closing.wait())
         # gRPC's own tasks end when its cancelled calls have. Its queue of completions is the process's: what
         # came for this loop after its end would be an error in another worker's.
         if left := asyncio.all_tasks() - {asyncio.current_task()}:

@@ -46,7 +46,9 @@ class RobotVideo:
     ) -> None:
         self._on_change = on_change
         self.recording = recording
-        self.worker = Worker(target, self._update_session, connecting(load), picture=self._report)
+        self.worker = Worker(
+            target, self._update_session, connecting(load), picture=self._report, captured=self._captured
+        )
         self.meter = PictureMeter(self.worker.clock_offset, self._delivery, self._preview)
         """Ages of the pictures; what shows them notes them here."""
         self.session = VideoSession(
@@ -79,6 +81,9 @@ class RobotVideo:
 
     def _report(self) -> PictureReport | None:
         return self.meter.report()
+
+    def _captured(self) -> int | None:
+        return self.meter.capture_ns()
 
     def _delivery(self) -> Delivery | None:
         return self.session.delivery()

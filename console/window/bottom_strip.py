@@ -5,7 +5,9 @@ from typing import Final
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from console.client import StopLatch
 from console.client.results import Teleop
+from console.monitor.driver import DriverView
 from console.window.drive_place import DrivePlace
 from console.window.layout import fill
 from console.window.preview_panel import PreviewPanel
@@ -29,9 +31,9 @@ class BottomStrip(QWidget):
         fill(QHBoxLayout(self), (self.preview, 1), self.driving, spacing=20, margins=(8, 4, 8, 4))
         self.setFixedHeight(_HEIGHT_PX)
 
-    def show_teleop(self, teleop: Teleop) -> None:
+    def show_teleop(self, teleop: Teleop, view: DriverView, latch: StopLatch | None) -> None:
         """Makes room for driving on a robot that has it."""
-        self.driving.show_teleop(teleop)
+        self.driving.show_teleop(teleop, view, latch)
         self._arrange()
 
     def show_preview(self, shown: bool) -> None:

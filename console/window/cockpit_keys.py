@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from console.presentation.preview_switch import PROFILES
 from console.window.keys import Key, full_screen_key
@@ -10,6 +10,12 @@ from console.window.keys import Key, full_screen_key
 if TYPE_CHECKING:
     from console.window.monitor_window import MonitorWindow
 
+KEYS_OF_THE_HANDS: Final = (
+    Key(("Space",), "STOP, until it is reset (to type one: Shift+Space)", None),
+    Key(("W A S D", "arrows"), "while driving: forward, turn, back", None),
+    Key(("Q E",), "while driving: sideways, left and right", None),
+)
+"""`drive_hands.py` reads them, on a robot that can be driven."""
 _PROFILES = ("low bandwidth", "balanced", "high quality")
 
 
@@ -28,6 +34,8 @@ def cockpit_keys(window: "MonitorWindow") -> Sequence[Key]:
         *profiles,
         Key(("O",), "boxes around objects", window.toggle_boxes),
         Key(("S",), "save the picture and its status", window.save_picture),
+        Key(("T",), "drive, and end driving", window.driving.toggle),
+        Key(("Shift+R",), "reset the stop that is shown", window.driving.reset),
         Key(("A",), "acknowledge all faults", window.acknowledge),
         Key(("M",), "alarm sound on or off", window.toggle_sound),
         Key(("R",), "retry to connect now", window.retry),

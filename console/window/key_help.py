@@ -10,16 +10,16 @@ from console.window.labels import PlainLabel, set_bold
 
 
 class KeyHelp(QFrame):
-    """Hidden until it is asked for.
+    """Hidden until it is asked for."""
 
-    Args:
-        keys: in the order of the list.
-    """
-
-    def __init__(self, keys: Sequence[Key]) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.setAutoFillBackground(True)
         self.setFrameShape(QFrame.Shape.Box)
+        self.setVisible(False)
+
+    def fill(self, keys: Sequence[Key]) -> None:
+        """Fills the list, in this order; once."""
         self.setAccessibleName("Keys: " + "; ".join(f"{key.shown}: {key.does}" for key in keys))
         grid = QGridLayout(self)
         grid.setContentsMargins(18, 12, 18, 14)
@@ -35,7 +35,6 @@ class KeyHelp(QFrame):
             set_bold(name, True)
             grid.addWidget(name, row + 1, 2 * column, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(PlainLabel(key.does), row + 1, 2 * column + 1)
-        self.setVisible(False)
 
     def toggle(self) -> None:
         """Shows or hides the list."""

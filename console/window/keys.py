@@ -17,12 +17,12 @@ class Key:
     Args:
         names: as `QKeySequence` names them.
         does: what they do, for the operator.
-        act: the function that is called.
+        act: the function that is called; None where other code reads the keys.
     """
 
     names: tuple[str, ...]
     does: str
-    act: Callable[[], object]
+    act: Callable[[], object] | None
 
     @property
     def shown(self) -> str:
@@ -45,5 +45,5 @@ def leave_full_screen(window: QWidget) -> None:
 def bind_keys(window: QWidget, keys: Sequence[Key]) -> None:
     """Makes keys call functions while the window is active."""
     for key in keys:
-        for name in key.names:
+        for name in key.names if key.act else ():
             QShortcut(name, window, key.act)

@@ -25,9 +25,10 @@ from console.viewer.playback import PlaybackState
 from console.window import window_settings
 from console.window.alarm_sound import AlarmSound
 from console.window.bottom_strip import BottomStrip
-from console.window.cockpit_keys import cockpit_keys
+from console.window.cockpit_keys import KEYS_OF_THE_HANDS, cockpit_keys
+from console.window.drive_hands import Pad
+from console.window.driving import Driving
 from console.window.handover import ThreadHandover
-from console.window.key_help import KeyHelp
 from console.window.keys import bind_keys, leave_full_screen
 from console.window.layout import fill
 from console.window.picture_area import PictureArea
@@ -57,6 +58,7 @@ class MonitorWindow(QWidget):
         changes: signals changes of the worker's state; the window takes it over.
         video: shows the video.
         roster: lists the robots to switch to; by default the known ones.
+        pad: a gamepad; None without one.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class MonitorWindow(QWidget):
         changes: ThreadHandover,
         video: VideoView,
         roster: Roster | None = None,
+        pad: Pad | None = None,
     ) -> None:
         super().__init__()
         self._worker = worker
@@ -78,15 +81,17 @@ class MonitorWindow(QWidget):
         self.next_robot: RobotChoice | None = None
         """The robot to open after this window was closed; None to end."""
         self.video = video
-        keys = cockpit_keys(self)
         self.header = TopBar(worker.target, roster or Roster())
-        self.picture = PictureArea(video, KeyHelp(keys))
+        self.picture = PictureArea(video)
         self.banner, self.toasts = self.picture.banner, self.picture.toasts
         self.strip, self.plots, self.side = (
             BottomStrip(),
             Plots(QBoxLayout.Direction.LeftToRight),
             SidePanel(),
         )
+        self.driving = Driving(self, worker, self.strip, self.picture, pad)
+        keys = cockpit_keys(self)
+        self.picture.show_keys((*keys, *KEYS_OF_THE_HANDS))
         self.preview = self.strip.preview
         self.saver, self.sound = Saver(self, self.toasts.show_passing), AlarmSound(self.alarm, self)
         self.plots.setPalette(COCKPIT)
@@ -115,8 +120,8 @@ class MonitorWindow(QWidget):
         self.toasts.show_answers(() if hidden else controls.answers)
         self._show_faults(state)
         self.side.show_state(state, controls, self.alarm, now_s)
+        self.driving.show_state(state)
         if state.snapshot:
-            self.strip.show_teleop(state.snapshot.status.teleop)
             self._trail.add(state.snapshot.status.odometry, state.received_s)
         self._motion = motion(state, now_s, self._motion)
         self.picture.show_motion(self._motion, self._trail)
@@ -223,7 +228,8 @@ class MonitorWindow(QWidget):
         self.arrange()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
-        """Saves the settings, and waits for a file that is being written."""
+        """Ends driving, saves the settings, and waits for a file that is being written."""
+        self.driving.close()
         self._timer.stop()
         window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on))
         self.saver.job.wait(_SAVES_END_WITHIN_S)

@@ -1,16 +1,20 @@
-"""The picture, edge to edge, with what lies over it: gauges, trail, messages, connection banner, keys."""
+"""The picture, edge to edge, with what lies over it: driving, gauges, trail, messages, keys."""
 
+from collections.abc import Sequence
 from typing import Final
 
-from PySide6.QtCore import QEvent, QRect, Qt
+from PySide6.QtCore import QEvent, QPoint, QRect, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from console.monitor.motion import Motion
 from console.monitor.trail import Trail
+from console.presentation.drive_display import DriveDisplay
 from console.window.connection_banner import ConnectionBanner
+from console.window.drive_hud import DriveHud
 from console.window.gauge import Gauge
 from console.window.key_help import KeyHelp
+from console.window.keys import Key
 from console.window.layout import fill
 from console.window.theme import COCKPIT
 from console.window.toasts import Toasts
@@ -25,26 +29,30 @@ _WIDEST_MESSAGE_PX: Final = 560
 
 
 class PictureArea(QWidget):
-    """Places everything by the picture itself, not by its letterbox. The upper left corner is reserved.
+    """Places everything by the picture itself, not by its letterbox.
 
     Args:
         video: the picture.
-        key_help: the list of keys.
     """
 
-    def __init__(self, video: VideoView, key_help: KeyHelp) -> None:
+    def __init__(self, video: VideoView) -> None:
         super().__init__()
         self.setPalette(COCKPIT)
-        self.video, self.key_help = video, key_help
+        self.video, self.key_help = video, KeyHelp()
         self.banner, self.toasts = ConnectionBanner(), Toasts()
         self.speed = Gauge("Speed", "m/s")
         self.turn = Gauge("Turn rate, left is positive", "rad/s", directed=True)
         self.trail, self._trail_place = TrailView(), QRect()
+        self.hud, self._corner = DriveHud(), QPoint()
         fill(QVBoxLayout(self), (video, 1))
-        for overlay in (self.speed, self.turn, self.trail, self.toasts, self.banner, key_help):
+        for overlay in (self.speed, self.turn, self.trail, self.hud, self.toasts, self.banner, self.key_help):
             overlay.setParent(self)
         # Not inside the paint event that found the new shape.
         video.reshaped.connect(self.place, Qt.ConnectionType.QueuedConnection)
+
+    def show_keys(self, keys: Sequence[Key]) -> None:
+        """Fills the list of keys, in this order."""
+        self.key_help.fill(keys)
 
     def show_motion(self, motion: Motion | None, trail: Trail) -> None:
         """Shows the gauges, on a robot that has odometry, and its trail as soon as it has moved."""
@@ -56,6 +64,11 @@ class PictureArea(QWidget):
         self.trail.setVisible(trail.moved)
         self.trail.show_trail(trail)
 
+    def show_driving(self, display: DriveDisplay | None) -> None:
+        """Shows the head-up display, on a robot that can be driven."""
+        self.hud.show_display(display)
+        self._place_messages()
+
     def place(self) -> None:
         """Places everything anew."""
         box = self.video.frame_box()
@@ -65,6 +78,7 @@ class PictureArea(QWidget):
         self.speed.setGeometry(left, bottom - side, side, side)
         self.turn.setGeometry(right - side, bottom - side, side, side)
         self._trail_place = QRect(right - side, top, side, side)
+        self._corner = QPoint(left, top)
         self.video.keep_clear(side + 2 * _EDGE_PX)
         self._place_messages()
 
@@ -86,9 +100,13 @@ class PictureArea(QWidget):
         top = 0 if self.banner.isHidden() else self.banner.height()
         self.trail.setGeometry(self._trail_place)
         self.trail.move(self._trail_place.left(), max(self._trail_place.top(), top + _EDGE_PX))
-        room = min(_WIDEST_MESSAGE_PX, width - 2 * _EDGE_PX)
+        self.hud.move(self._corner.x(), max(self._corner.y(), top + _EDGE_PX))
+        # Beside the head-up display where there is room: an answer must not cover who drives.
+        left = 0 if self.hud.isHidden() else self.hud.geometry().right()
+        room = min(_WIDEST_MESSAGE_PX, width - left - 2 * _EDGE_PX)
         height = self.toasts.height_for(room)
-        self.toasts.setGeometry((width - room) // 2, top + _EDGE_PX, room, min(height, self.height() // 2))
+        middle = max((width - room) // 2, left + _EDGE_PX)
+        self.toasts.setGeometry(middle, top + _EDGE_PX, room, min(height, self.height() // 2))
         size = self.key_help.sizeHint().boundedTo(self.size())
         corner = (self.width() - size.width()) // 2, (self.height() - size.height()) // 2
         self.key_help.setGeometry(*corner, size.width(), size.height())

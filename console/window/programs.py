@@ -9,6 +9,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QWidget
 
 from common.errors import UserError
+from console.gamepad.reader import GamepadReader
 from console.monitor.credential_refresh import LoadCredentials
 from console.presentation.picture_age import PictureAge
 from console.presentation.preview_switch import Note
@@ -20,6 +21,7 @@ from console.viewer.picture_meter import PictureMeter
 from console.viewer.robot_video import RobotVideo
 from console.viewer.summary import FrameCounter, ViewSummary
 from console.window.application import application
+from console.window.drive_hands import Pad
 from console.window.handover import ThreadHandover
 from console.window.monitor_window import MonitorWindow
 from console.window.video_view import VideoView
@@ -47,9 +49,9 @@ def run_monitor(
         UserError: the target is not an address, the credentials can't be used, or there is no display.
     """
     notice: Note | None = None
-    with application("Robot monitor") as app:
+    with application("Robot monitor") as app, reading_gamepad() as pad:
         while True:
-            with monitor(target, load, roster) as window:
+            with monitor(target, load, roster, pad) as window:
                 if notice:
                     window.toasts.show_passing(notice)
                 app.exec()
@@ -94,14 +96,28 @@ def run_view(
 
 
 @contextmanager
+def reading_gamepad() -> Iterator[GamepadReader]:
+    """Reads the gamepad while the block lasts; without SDL there is none, and the reader says why."""
+    reader = GamepadReader()
+    reader.start()
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+@contextmanager
 def monitor(
-    target: str, load: LoadCredentials | None = None, roster: Roster | None = None
+    target: str,
+    load: LoadCredentials | None = None,
+    roster: Roster | None = None,
+    pad: Pad | None = None,
 ) -> Iterator[MonitorWindow]:
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
     robot = RobotVideo(target, load, on_change=changes.post)
     video = VideoView(robot.session, robot.detections, robot.meter)
-    window = MonitorWindow(robot.worker, changes, video, roster)
+    window = MonitorWindow(robot.worker, changes, video, roster, pad)
     # The bar has the age; the card would cover the trail.
     video.show_age(False)
     window.read_picture_age = partial(_age_of, robot.meter, window.reported_age)

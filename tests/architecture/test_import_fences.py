@@ -117,6 +117,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             "console/monitor/",
             (*HEAVY, *WIRE, "common.gst", "console.receiver", "console.window", "console.cli"),
         ),
+        ("console/gamepad/", (*HEAVY, *WIRE, "asyncio", "console.window", "console.monitor", "console.cli")),
+        *(
+            (f"console/gamepad/{name}.py", ("sdl2", "ctypes", "time", "threading"))
+            for name in ("shaping", "hands")
+        ),
+        ("console/steering.py", (*HEAVY, *WIRE, "asyncio", "time")),
         ("console/window/", ("console.cli",)),
     ],
 )
@@ -131,6 +137,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("rclpy", ("common/ros_node.py", "gateway/ros/", "drive/base.py", "drive/doctor", "simrobot/")),
         ("gi", ("common/gst.py",)),
         ("PySide6", ("console/window/",)),
+        ("sdl2", ("console/gamepad/sdl.py",)),
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/ca.py",)),
         ("yaml", ("common/config.py",)),

@@ -18,7 +18,7 @@ atexit.register(lambda: print(json.dumps(sorted(sys.modules)), file=sys.stderr))
 from console.cli import main
 main()
 """
-WINDOWS = {"gi", "PySide6", "numpy", "pydantic", "rclpy"}
+WINDOWS = {"gi", "PySide6", "numpy", "pydantic", "rclpy", "sdl2"}
 FOR_TABLES = {"rich"}
 FOR_CALLS = {"grpc", "google", "asyncio", "omniseer"}
 FOR_EDITS = {"tomlkit"}

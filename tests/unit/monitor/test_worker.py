@@ -16,6 +16,8 @@ from console.client import (
     Clock,
     DeadlineExceeded,
     DesiredPreview,
+    DriveOptions,
+    DriveSession,
     Event,
     EventGap,
     EventPosition,
@@ -30,11 +32,12 @@ from console.client import (
     PreviewChange,
     PreviewProfile,
     Refused,
+    RobotStopped,
     Unreachable,
     Unsupported,
     WatchedStatus,
 )
-from console.client.results import EventKind, RobotTime
+from console.client.results import EventKind, RobotTime, StopReset, TeleopAnswer
 from console.monitor.conversation import RetryBackoff
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState
@@ -48,7 +51,23 @@ ROBOT_NS = 5_000_000_000_000
 """What the robot's clock shows at each ping."""
 
 
-class PlayedRobot:
+class NotDriven:
+    """The part of the client that drives; nothing here does."""
+
+    def drive(self, options: DriveOptions | None = None) -> DriveSession:
+        raise NotImplementedError(options)
+
+    async def stop_robot(self, reason: str = "") -> RobotStopped:
+        raise NotImplementedError(reason)
+
+    async def reset_stop(self, stop_id: int) -> StopReset:
+        raise NotImplementedError(stop_id)
+
+    async def set_driving_enabled(self, enabled: bool) -> TeleopAnswer:
+        raise NotImplementedError(enabled)
+
+
+class PlayedRobot(NotDriven):
     """Answers as the test sets it up, and records the calls."""
 
     def __init__(self) -> None:

@@ -1,13 +1,15 @@
 """robotctl drive, stop and reset-stop, typed on a real terminal, at a robot of real parts."""
 
 import json
+import signal
+import sys
 import time
 
 import pytest
 
 from tests.support.driven_robot import DrivenRobot
 from tests.support.robotctl import robotctl, robotctl_process
-from tests.support.terminal import Terminal, robotctl_on_terminal
+from tests.support.terminal import Terminal, robotctl_on_terminal, terminal_with
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.ros
@@ -100,6 +102,26 @@ def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> 
         assert reset.returncode == 0, reset.stderr
         assert "is reset" in reset.stdout
         screen.press("\x03")
+        assert screen.process.wait(20) == 0
+
+
+def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot: DrivenRobot) -> None:
+    words = ["drive", "--input", "gamepad", "--target", robot.target]
+    with terminal_with(
+        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=160
+    ) as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(PLAIN_ANSWER)
+        screen.wait_for("hold a shoulder button of")
+        screen.press("w")
+        screen.process.send_signal(signal.SIGUSR1)
+        wait_until(lambda: robot.base.moves, "the base moves")
+        time.sleep(1.0)
+        assert robot.base.moves, "as long as it is held"
+        screen.process.send_signal(signal.SIGUSR2)
+        at_rest(robot)
+        screen.wait_for("plug a gamepad in")
+        screen.press("x")
         assert screen.process.wait(20) == 0
 
 

@@ -2,22 +2,23 @@
 
 import pytest
 
-from console.cli.drive_keys import ACTIONS, DIRECTIONS, TAP_S, Action, Hands, reports_releases
+from console.cli.drive_keys import ACTIONS, TAP_S, Action, Hands, reports_releases
+from console.steering import LETTERS
 
 
 def test_without_releases_a_press_counts_for_a_moment() -> None:
     hands = Hands(releases=False)
-    assert hands.velocity(0.0) is None
+    assert hands.steering(0.0) is None
     assert hands.take("w", 0.0) == []
-    assert hands.velocity(TAP_S - 0.01) == (1, 0, 0)
-    assert hands.velocity(TAP_S) is None
+    assert hands.steering(TAP_S - 0.01) == (1, 0, 0)
+    assert hands.steering(TAP_S) is None
 
 
 def test_a_repeated_key_goes_on() -> None:
     hands = Hands(releases=False)
     for number in range(40):
         hands.take("a", number / 30)
-        assert hands.velocity(number / 30 + 0.03) == (0, 0, 1)
+        assert hands.steering(number / 30 + 0.03) == (0, 0, 1)
 
 
 @pytest.mark.parametrize(
@@ -39,28 +40,28 @@ def test_a_repeated_key_goes_on() -> None:
 def test_each_key_has_its_direction(typed: str, velocity: tuple[int, int, int]) -> None:
     hands = Hands(releases=False)
     hands.take(typed, 0.0)
-    assert hands.velocity(0.0) == velocity
+    assert hands.steering(0.0) == velocity
 
 
 def test_with_releases_a_key_counts_while_it_is_down() -> None:
     hands = Hands(releases=True)
     hands.take("\x1b[119;1:1u", 0.0)
-    assert hands.velocity(60.0) == (1, 0, 0)
+    assert hands.steering(60.0) == (1, 0, 0)
     hands.take("\x1b[119;1:2u\x1b[1;1:1D", 61.0)
-    assert hands.velocity(61.0) == (1, 0, 1)
+    assert hands.steering(61.0) == (1, 0, 1)
     hands.take("\x1b[119;1:3u", 62.0)
-    assert hands.velocity(62.0) == (0, 0, 1)
+    assert hands.steering(62.0) == (0, 0, 1)
     hands.take("\x1b[1;1:3D", 63.0)
-    assert hands.velocity(63.0) is None
+    assert hands.steering(63.0) is None
 
 
 def test_a_terminal_that_loses_the_focus_releases_everything() -> None:
     hands = Hands(releases=True)
     hands.take("\x1b[119u", 0.0)
     hands.take("\x1b[O", 1.0)
-    assert hands.velocity(1.0) is None
+    assert hands.steering(1.0) is None
     hands.take("\x1b[I", 2.0)
-    assert hands.velocity(2.0) is None
+    assert hands.steering(2.0) is None
 
 
 @pytest.mark.parametrize(
@@ -89,11 +90,11 @@ def test_a_sequence_may_arrive_in_pieces() -> None:
     hands = Hands(releases=True)
     for piece in ("\x1b[11", "9;1", ":1", "u"):
         assert hands.take(piece, 0.0) == []
-    assert hands.velocity(0.0) == (1, 0, 0)
+    assert hands.steering(0.0) == (1, 0, 0)
 
 
 def test_no_key_has_two_meanings() -> None:
-    assert not DIRECTIONS.keys() & ACTIONS.keys()
+    assert not LETTERS.keys() & ACTIONS.keys()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,271 @@
+"""Driving from a window: the session, and what a driver or a viewer asks for besides it.
+
+The session lives in the worker's loop, so that a window that hangs sends nothing: what it held counts for
+100 ms (`console.client.driving.HOLD_COUNTS_S`), and the session itself goes on to send releases.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, NoReturn, Protocol
+
+from console.client import (
+    DriveOptions,
+    DriveSession,
+    DriveState,
+    GatewayError,
+    Supervision,
+)
+from console.client.results import DriveLimits, RobotStopped, StopReset, TeleopAnswer
+from console.presentation.preview_switch import Note
+from console.presentation.severity_style import SeverityStyle
+from console.steering import Steering, permitted
+
+_MOST_NOTES: Final = 8
+_MOST_CALLS: Final = 4
+"""On their way at a time. A further one would say nothing that these do not say already."""
+_STOPS_END_WITHIN_S: Final = 0.5
+"""How long a window that is closed waits for the confirmation of a stop."""
+
+
+class DriveClient(Protocol):
+    """The calls of `console.client.AsyncGatewayClient` that a driver makes."""
+
+    def drive(self, options: DriveOptions | None = ...) -> DriveSession:
+        """Returns a session."""
+
+    async def stop_robot(self, reason: str = ...) -> RobotStopped:
+        """Stops the robot."""
+
+    async def reset_stop(self, stop_id: int) -> StopReset:
+        """Resets a stop."""
+
+    async def set_driving_enabled(self, enabled: bool) -> TeleopAnswer:
+        """Enables driving, or disables it."""
+
+
+class DriveRobot(Protocol):
+    """The client in use; another one after each change of the credentials."""
+
+    @property
+    def client(self) -> DriveClient:
+        """The client with the credentials in use."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverView:
+    """The window's own driving at one moment.
+
+    Args:
+        opening: whether a session is being opened.
+        supervision: how the driver sees the robot, while a session is open; else None.
+        limits: what the robot accepts; None without a session.
+        state: the robot's newest; None without a session, and before the first.
+        state_age_s: time since it has arrived.
+        ready: whether a hold would move the robot.
+        stopping: whether a stop waits for the robot's confirmation.
+    """
+
+    opening: bool = False
+    supervision: Supervision | None = None
+    limits: DriveLimits | None = None
+    state: DriveState | None = None
+    state_age_s: float = 0.0
+    ready: bool = False
+    stopping: bool = False
+
+    @property
+    def open(self) -> bool:
+        """Whether this window has the lease."""
+        return self.supervision is not None
+
+
+class Driver:
+    """Opens a session, passes on what the hands hold, stops and resets. Thread-safe; nothing here waits.
+
+    Args:
+        call_soon: calls a function in the loop that runs `run`.
+        on_change: called in that loop after each change of what `view` and `take_notes` return, but for the
+            robot's states; must only hand over.
+        picture: returns when the picture on the screen was captured (`DriveOptions.picture`).
+    """
+
+    _robot: DriveRobot
+
+    def __init__(
+        self,
+        call_soon: Callable[[Callable[[], object]], None],
+        on_change: Callable[[], None],
+        picture: Callable[[], int | None],
+    ) -> None:
+        self._call_soon = call_soon
+        self._on_change = on_change
+        self._picture = picture
+        self._requested = asyncio.Event()
+        self._ending = asyncio.Event()
+        self._options: DriveOptions | None = None
+        """Of the session that is open, or being opened."""
+        self._session: DriveSession | None = None
+        self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
+        self._calls: set[asyncio.Task[None]] = set()
+        self._stops: set[asyncio.Task[None]] = set()
+
+    # --- any thread ---
+
+    def view(self) -> DriverView:
+        """Returns the present view."""
+        session, options, stopping = self._session, self._options, bool(self._stops)
+        if session is None or options is None:
+            return DriverView(opening=options is not None, stopping=stopping)
+        return DriverView(
+            supervision=options.supervision,
+            limits=session.limits,
+            state=session.state,
+            state_age_s=session.state_age_s,
+            ready=session.is_ready,
+            stopping=stopping,
+        )
+
+    def take_notes(self) -> list[Note]:
+        """Returns the answers that were not taken yet."""
+        notes = []
+        while self._notes:
+            notes.append(self._notes.popleft())
+        return notes
+
+    def begin(self, supervision: Supervision = Supervision.PICTURE, *, take_over: bool = False) -> None:
+        """Opens a session; no-op while there is one."""
+        options = DriveOptions(
+            take_over=take_over,
+            supervision=supervision,
+            picture=self._picture if supervision is Supervision.PICTURE else None,
+            input_device="monitor",
+        )
+        self._call_soon(partial(self._begin, options))
+
+    def end(self) -> None:
+        """Releases, and ends the session."""
+        self.release()
+        self._call_soon(self._ending.set)
+
+    def hold(self, steering: Steering, input_device: str) -> None:
+        """Holds, for 100 ms; no-op without a session."""
+        session, options = self._session, self._options
+        if session and options and session.limits:
+            speeds = permitted(session.limits, options.supervision)
+            session.hold(*speeds.velocity(steering), input_device=input_device)
+
+    def release(self) -> None:
+        """Releases: the robot stops. At once."""
+        if session := self._session:
+            session.release()
+
+    def stop(self, reason: str) -> None:
+        """Stops the robot until a reset, no matter who drives it. Needs no session."""
+        self.release()
+        self._call_soon(partial(self._start, self._stops, partial(self._stop, reason)))
+
+    def reset(self, stop_id: int) -> None:
+        """Resets this stop; a newer one stays."""
+        self._call_soon(partial(self._start, self._calls, partial(self._reset, stop_id)))
+
+    def enable(self) -> None:
+        """Enables driving, for all."""
+        self._call_soon(partial(self._start, self._calls, self._enable))
+
+    # --- the loop ---
+
+    async def run(self, robot: DriveRobot) -> NoReturn:
+        """Serves until cancelled: then the session ends with a release, and pending stops are confirmed."""
+        self._robot = robot
+        try:
+            while True:
+                await self._requested.wait()
+                self._requested.clear()
+                if self._options:
+                    await self._drive(self._options)
+        finally:
+            if self._stops:
+                await asyncio.wait(self._stops, timeout=_STOPS_END_WITHIN_S)
+            for call in (*self._stops, *self._calls):
+                call.cancel()
+
+    def _begin(self, options: DriveOptions) -> None:
+        if self._options is None:
+            self._options = options
+            self._ending.clear()
+            self._requested.set()
+            self._on_change()
+
+    async def _drive(self, options: DriveOptions) -> None:
+        try:
+            async with self._robot.client.drive(options) as session:
+                self._session = session
+                self._on_change()
+                await self._until_the_end(session)
+        except GatewayError as error:
+            self._note(f"Not driving: {error}", SeverityStyle.BAD)
+        finally:
+            self._session = self._options = None
+            self._on_change()
+
+    async def _until_the_end(self, session: DriveSession) -> None:
+        """Waits until `end` is called.
+
+        Raises:
+            GatewayError: The session has ended by itself.
+        """
+        watching = asyncio.create_task(_until_lost(session))
+        ending = asyncio.create_task(self._ending.wait())
+        try:
+            await asyncio.wait((watching, ending), return_when=asyncio.FIRST_COMPLETED)
+            if not self._ending.is_set():
+                watching.result()
+        finally:
+            for task in (watching, ending):
+                task.cancel()
+            await asyncio.gather(watching, ending, return_exceptions=True)
+
+    def _start(self, calls: "set[asyncio.Task[None]]", call: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        if len(calls) < _MOST_CALLS:
+            task = asyncio.create_task(call())
+            calls.add(task)
+            task.add_done_callback(partial(self._ended, calls))
+            self._on_change()
+
+    def _ended(self, calls: "set[asyncio.Task[None]]", task: "asyncio.Task[None]") -> None:
+        calls.discard(task)
+        self._on_change()
+
+    async def _stop(self, reason: str) -> None:
+        try:
+            stopped = await self._robot.client.stop_robot(reason)
+        except GatewayError as error:
+            self._note(f"The robot has NOT confirmed the stop: {error}", SeverityStyle.BAD)
+        else:
+            self._note(f"Stopped: {stopped.message}", SeverityStyle.WARNING)
+
+    async def _reset(self, stop_id: int) -> None:
+        try:
+            self._note((await self._robot.client.reset_stop(stop_id)).message, SeverityStyle.QUIET)
+        except GatewayError as error:
+            self._note(f"Not reset: {error}", SeverityStyle.BAD)
+
+    async def _enable(self) -> None:
+        try:
+            answer = await self._robot.client.set_driving_enabled(True)
+        except GatewayError as error:
+            self._note(f"Driving is not enabled: {error}", SeverityStyle.BAD)
+        else:
+            self._note(answer.message, SeverityStyle.QUIET if answer.accepted else SeverityStyle.BAD)
+
+    def _note(self, text: str, style: SeverityStyle) -> None:
+        self._notes.append(Note(text, style))
+        self._on_change()
+
+
+async def _until_lost(session: DriveSession) -> None:
+    async for _ in session.states():
+        pass

@@ -1,0 +1,310 @@
+"""Driving in the cockpit: a real gateway and drive program, and a base that listens."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import pytest
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QDialog, QWidget
+
+from console.client import Supervision
+from console.steering import Steering
+from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor
+from tests.support.driven_robot import DrivenRobot, driven_robot
+from tests.support.free import free_domain
+from tests.support.qt import keep_screenshot, let_pass, press, until
+from tests.support.robotctl import robotctl
+
+pytestmark = [pytest.mark.ros, pytest.mark.gst]
+
+BY_EYE = Supervision.LINE_OF_SIGHT
+BY_EYE_MPS = 0.15
+"""What line of sight permits."""
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:
+    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(domain))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
+            yield robot
+
+
+@dataclass
+class PlayedPad:
+    """A gamepad in the test's hands."""
+
+    steers: Steering | None = None
+    stop: bool = False
+    forgotten: int = 0
+
+    def description(self) -> str:
+        return "played & tested"
+
+    def steering(self) -> Steering | None:
+        return self.steers
+
+    def take_stop(self) -> bool:
+        pressed, self.stop = self.stop, False
+        return pressed
+
+    def forget(self) -> None:
+        self.forgotten += 1
+
+
+@dataclass
+class Seat:
+    """A driver in front of the window."""
+
+    window: MonitorWindow
+    robot: DrivenRobot
+
+    def ready(self) -> None:
+        """Takes the robot; the next hold moves it."""
+        self.window.driving.begin(BY_EYE, False)
+        until(lambda: self.window._worker.driver.view().ready, "the robot may be driven")
+        let_pass(0.1)
+
+    def key(self, key: Qt.Key, *, down: bool) -> None:
+        """Presses or releases a key, in what has the focus."""
+        (QTest.keyPress if down else QTest.keyRelease)(QApplication.focusWidget() or self.window, key)
+
+    def repeats(self, key: Qt.Key) -> None:
+        """The desktop repeats a key that is down: X11 sends both, marked as repeated."""
+        target = QApplication.focusWidget() or self.window
+        for kind in (QEvent.Type.KeyRelease, QEvent.Type.KeyPress):
+            QApplication.sendEvent(target, QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, "", True))
+
+    def moves(self) -> None:
+        until(lambda: self.robot.base.moves, "the base moves")
+
+    def rests(self) -> None:
+        until(lambda: not self.robot.base.moves, "the base is at rest")
+        before = len(self.robot.base.heard)
+        let_pass(0.3)
+        assert not any(each.moves for each in self.robot.base.heard[before:])
+
+    def shown(self) -> str:
+        return self.window.picture.hud.accessibleName()
+
+    def note(self, words: str) -> str:
+        return until(lambda: next((n.text for n in self.window.toasts.notes if words in n.text), ""), words)
+
+
+@pytest.fixture
+def seat(robot: DrivenRobot) -> Iterator[Seat]:
+    if robot.teleop.HasField("stop"):
+        robotctl("reset-stop", str(robot.teleop.stop.stop_id), "--target", robot.target)
+    with monitor(robot.target) as window:
+        window.activateWindow()
+        until(window.isActiveWindow, "the window is active")
+        until(window.strip.driving.isVisible, "the place of driving")
+        yield Seat(window, robot)
+    until(lambda: not robot.base.moves, "a closed window drives nothing")
+    until(lambda: not robot.teleop.holder, "nor keeps it the robot")
+
+
+def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+    until(lambda: seat.robot.base.heard[-1].vx_mps == pytest.approx(BY_EYE_MPS), "full speed")
+    for _ in range(3):
+        seat.repeats(Qt.Key.Key_W)
+        let_pass(0.05)
+    assert seat.robot.base.moves, "repeats are neither presses nor releases"
+    until(lambda: "DRIVING" in seat.shown(), "the phase")
+    assert "You drive, by line of sight" in seat.shown()
+    keep_screenshot(seat.window, "driving-by-eye")
+    seat.key(Qt.Key.Key_W, down=False)
+    seat.rests()
+    assert seat.robot.teleop.holder
+    press(seat.window, Qt.Key.Key_T)
+    until(lambda: not seat.robot.teleop.holder, "the lease is given back")
+
+
+def leaves_for_a_text(seat: Seat) -> None:
+    seat.window.search_events()
+
+
+def leaves_for_another_window(seat: Seat) -> None:
+    other = QWidget(seat.window, Qt.WindowType.Window)
+    other.show()
+    other.activateWindow()
+    until(other.isActiveWindow, "another window is active")
+    let_pass(0.3)
+    assert not seat.robot.base.moves
+    other.close()
+    seat.window.activateWindow()
+    until(seat.window.isActiveWindow, "the window is active again")
+
+
+def leaves_for_a_dialog(seat: Seat) -> None:
+    dialog = QDialog(seat.window)
+    dialog.open()
+    let_pass(0.3)
+    assert not seat.robot.base.moves
+    dialog.close()
+    seat.window.activateWindow()
+    until(seat.window.isActiveWindow, "the window is active again")
+
+
+def leaves_for_a_menu(seat: Seat) -> None:
+    menu = seat.window.strip.driving.drive.menu()
+    menu.popup(seat.window.mapToGlobal(QPoint(50, 50)))
+    let_pass(0.3)
+    assert not seat.robot.base.moves
+    menu.close()
+
+
+def leaves_the_program(_seat: Seat) -> None:
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    application.applicationStateChanged.emit(Qt.ApplicationState.ApplicationInactive)
+
+
+@pytest.mark.parametrize(
+    "leave",
+    [
+        leaves_for_a_text,
+        leaves_for_another_window,
+        leaves_for_a_dialog,
+        leaves_for_a_menu,
+        leaves_the_program,
+    ],
+)
+def test_what_takes_the_driver_away_releases_everything(seat: Seat, leave: Callable[[Seat], None]) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_Up, down=True)
+    seat.moves()
+    leave(seat)
+    seat.rests()
+    seat.repeats(Qt.Key.Key_Up)
+    let_pass(0.3)
+    assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
+
+
+def test_a_window_that_hangs_drives_nothing(seat: Seat) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+    hung_s = time.monotonic()
+    time.sleep(1.0)  # the window's thread hangs; the base listens in another one
+    assert not seat.robot.base.moves
+    assert seat.robot.base.stopped_after_s(hung_s) < 0.6
+    let_pass(0.5)
+    assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
+
+
+def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None:
+    pad = PlayedPad()
+    seat.window.driving.hands.pad = pad
+    seat.ready()
+    assert pad.forgotten, "what it held before counts for nothing"
+    pad.steers = Steering(0.0, 0.0, -0.5)
+    seat.moves()
+    until(lambda: seat.robot.base.heard[-1].wz_rad_s == pytest.approx(-0.2), "half of what is permitted")
+    pad.steers = None
+    seat.rests()
+    pad.steers = Steering(1.0, 0.0, 0.0)
+    seat.moves()
+    pad.stop = True
+    seat.rests()
+    until(lambda: "STOPPED" in seat.shown(), "the phase")
+
+
+def test_stop_is_for_anyone_and_the_latch_that_is_shown_is_reset(seat: Seat) -> None:
+    reset = seat.window.strip.driving.reset
+    assert not reset.isEnabled()
+    seat.key(Qt.Key.Key_Space, down=True)
+    seat.note("Stopped")
+    until(lambda: "STOPPED" in seat.shown(), "the phase")
+    assert "by STOP in the monitor" in seat.shown()
+    until(reset.isEnabled, "it may be reset")
+    assert reset.text() == f"Reset stop {seat.robot.teleop.stop.stop_id}"
+    keep_screenshot(seat.window, "driving-stopped")
+    press(seat.window, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
+    until(lambda: not seat.robot.teleop.HasField("stop"), "the stop is reset")
+    until(lambda: not reset.isEnabled(), "nothing to reset")
+
+
+def in_the_search(seat: Seat) -> None:
+    seat.window.search_events()
+
+
+def on_a_button(seat: Seat) -> None:
+    seat.window.preview.switch.setFocus()
+
+
+def in_the_picture_alone(seat: Seat) -> None:
+    press(seat.window, Qt.Key.Key_F)
+
+
+def in_the_full_screen(seat: Seat) -> None:
+    press(seat.window, Qt.Key.Key_F11)
+
+
+def under_the_list_of_keys(seat: Seat) -> None:
+    press(seat.window, Qt.Key.Key_F1)
+
+
+@pytest.mark.parametrize(
+    "somewhere",
+    [in_the_search, on_a_button, in_the_picture_alone, in_the_full_screen, under_the_list_of_keys],
+)
+def test_space_and_the_button_stop_in_every_state_of_the_window(
+    seat: Seat, somewhere: Callable[[Seat], None]
+) -> None:
+    somewhere(seat)
+    let_pass(0.2)
+    stop = seat.window.strip.driving.stop_place
+    assert stop.isVisible()
+    by_key = partial(seat.key, Qt.Key.Key_Space, down=True)
+    by_mouse = partial(QTest.mousePress, stop, Qt.MouseButton.LeftButton)
+    for act in (by_key, by_mouse):
+        act()
+        until(lambda: seat.robot.teleop.HasField("stop"), "a stop")
+        shown = f"Reset stop {seat.robot.teleop.stop.stop_id}"
+        until(lambda: seat.window.strip.driving.reset.text() == shown, "it is shown")  # noqa: B023  # at once
+        seat.window.driving.reset()
+        until(lambda: not seat.robot.teleop.HasField("stop"), "it is reset")
+    QTest.mouseRelease(stop, Qt.MouseButton.LeftButton)
+    assert not seat.window.side.events_tab.search.text()
+
+
+def test_letters_drive_instead_of_their_other_meanings(seat: Seat) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_Q, down=True)
+    seat.moves()
+    until(lambda: seat.robot.base.heard[-1].vy_mps > 0, "to the left")
+    assert seat.window.isVisible()
+    seat.key(Qt.Key.Key_Q, down=False)
+    seat.rests()
+    press(seat.window, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    assert seat.window.isVisible()
+
+
+def test_without_a_picture_nothing_moves_and_the_reason_is_shown(seat: Seat) -> None:
+    press(seat.window, Qt.Key.Key_T)
+    until(lambda: "There is no picture" in seat.shown(), "why")
+    seat.key(Qt.Key.Key_W, down=True)
+    let_pass(0.5)
+    assert not seat.robot.base.moves
+    assert "You drive" in seat.shown()
+
+
+def test_another_ones_driving_is_shown_and_a_refusal_said(seat: Seat) -> None:
+    with monitor(seat.robot.target) as other:
+        until(lambda: other.driving.hands.driveable, "it may be driven")
+        other.driving.begin(BY_EYE, False)
+        until(lambda: "drives" in seat.shown() and "You" not in seat.shown(), "who drives")
+        seat.window.driving.begin(BY_EYE, False)
+        seat.note("Not driving")
+        until(lambda: not seat.window._worker.driver.view().opening, "it is not asked for any more")
+    until(lambda: "No driver" in seat.shown(), "no one drives")

@@ -1,0 +1,122 @@
+"""How fast a driver who lets go, or is taken away, stops the robot: seen behind the multiplexer."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import pytest
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from console.client import Supervision
+from console.window.monitor_window import MonitorWindow
+from console.window.programs import monitor, reading_gamepad
+from tests.support.driven_robot import TELEOP
+from tests.support.driving import Driving, driving
+from tests.support.free import free_domain
+from tests.support.gateway_program import gateway_program
+from tests.support.qt import let_pass, until
+from tests.support.virtual_pad import VirtualPad, virtual_pad
+
+pytestmark = [pytest.mark.ros, pytest.mark.gst, pytest.mark.timed]
+
+_ATTEMPTS = 5
+LET_GO_MS = 60.0
+"""From the event on this computer to a zero behind the multiplexer that no motion follows."""
+
+
+@dataclass
+class Ground:
+    """A whole robot, and a window with a gamepad before it."""
+
+    robot: Driving
+    target: str
+
+
+@pytest.fixture(scope="module")
+def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
+    directory = tmp_path_factory.mktemp("robot")
+    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(domain))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        with driving(directory) as robot:
+            teleop = {"socket": str(robot.socket), **TELEOP}
+            with gateway_program(directory, sources=[], teleop=teleop) as gateway:
+                yield Ground(robot, f"127.0.0.1:{gateway.port}")
+
+
+@dataclass
+class Seat:
+    """A driver before the window."""
+
+    ground: Ground
+    window: MonitorWindow
+    pad: VirtualPad
+
+    def begins(self, hold: Callable[[], None], let_go: Callable[[], None]) -> None:
+        """Takes the robot, holds, and lets it come to speed; a machine that is too busy needs another try."""
+        self.window.driving.begin(Supervision.LINE_OF_SIGHT, False)
+        until(lambda: self.window._worker.driver.view().ready, "the robot may be driven", 30)
+        until(lambda: self.window.driving.hands.pad is not None, "the gamepad")
+        for _ in range(_ATTEMPTS):
+            let_pass(0.2)
+            hold()
+            let_pass(0.6)
+            if self.ground.robot.witness.moves():
+                return
+            let_go()
+        raise AssertionError(f"it does not drive; it is {self.ground.robot.state()}")
+
+    def stops_within(self, limit_ms: float, act: Callable[[], object]) -> None:
+        """The act ends the motion in time."""
+        since_ns = time.monotonic_ns()
+        act()
+        let_pass(0.5)
+        found_ms = self.ground.robot.witness.zero_after_ms(since_ns)
+        print(f"zero after {found_ms:.1f} ms")
+        assert found_ms <= limit_ms
+
+    def presses(self) -> None:
+        QTest.keyPress(self.window, Qt.Key.Key_W)
+
+    def lets_go(self) -> None:
+        QTest.keyRelease(self.window, Qt.Key.Key_W)
+
+    def holds_the_pad(self) -> None:
+        self.pad.deflect(left_y=-1.0)
+        self.pad.shoulder(down=True)
+
+    def lets_the_pad_go(self) -> None:
+        self.pad.deflect(left_y=0.0)
+        self.pad.shoulder(down=False)
+
+
+@pytest.fixture
+def seat(ground: Ground) -> Iterator[Seat]:
+    with virtual_pad() as pad, reading_gamepad() as reader, monitor(ground.target, pad=reader) as window:
+        window.activateWindow()
+        until(window.isActiveWindow, "the window is active")
+        until(lambda: window.driving.hands.driveable, "it may be driven")
+        yield Seat(ground, window, pad)
+
+
+def test_a_key_is_released(seat: Seat) -> None:
+    seat.begins(seat.presses, seat.lets_go)
+    seat.stops_within(LET_GO_MS, seat.lets_go)
+
+
+def test_the_window_loses_the_focus(seat: Seat) -> None:
+    seat.begins(seat.presses, seat.lets_go)
+    lost = QEvent(QEvent.Type.WindowDeactivate)
+    seat.stops_within(LET_GO_MS, lambda: QApplication.sendEvent(seat.window, lost))
+
+
+def test_the_gamepads_shoulder_is_released(seat: Seat) -> None:
+    seat.begins(seat.holds_the_pad, seat.lets_the_pad_go)
+    seat.stops_within(LET_GO_MS, seat.lets_the_pad_go)
+
+
+def test_the_gamepad_is_unplugged(seat: Seat) -> None:
+    seat.begins(seat.holds_the_pad, seat.lets_the_pad_go)
+    seat.stops_within(LET_GO_MS, seat.pad.unplug)
