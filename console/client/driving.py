@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import math
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -349,14 +350,14 @@ class DriveSession:
         Raises:
             GatewayError: The lane has ended.
         """
-        acknowledged = _Acknowledged()
+        on_their_way = OnTheirWay()
         self._open_lanes += 1
-        writer = asyncio.create_task(self._write(lane, acknowledged), name="drive lane, commands")
+        writer = asyncio.create_task(self._write(lane, on_their_way), name="drive lane, commands")
         try:
             while True:
                 item = await lane.read()
                 if isinstance(item, DriveState):
-                    acknowledged.sequence = item.newest_sequence
+                    on_their_way.acknowledge(item.newest_sequence)
                     self._take(item)
         finally:
             self._open_lanes -= 1
@@ -366,14 +367,15 @@ class DriveSession:
             await transport.close()
             self._changes.notify_all()
 
-    async def _write(self, lane: _Lane, acknowledged: "_Acknowledged") -> None:
+    async def _write(self, lane: _Lane, on_their_way: "OnTheirWay") -> None:
         """Writes the newest command whenever there is a new one; those in between are skipped."""
-        written = 0
+        seen = 0
         while True:
-            await self._sends.wait_until(lambda: self._sequence > written)  # noqa: B023  # read at once
-            written, holds, last = self._sequence, self._command_holds, self._ending
-            if written - acknowledged.sequence > MAX_UNACKNOWLEDGED and acknowledged.sequence and not last:
+            await self._sends.wait_until(lambda: self._sequence > seen)  # noqa: B023  # read at once
+            seen, holds, last = self._sequence, self._command_holds, self._ending
+            if on_their_way.full and not last:
                 continue
+            on_their_way.add(seen)
             with contextlib.suppress(GatewayError):  # The reader finds out why the lane has ended.
                 await lane.write(self._command)
                 self._released = self._released or not holds
@@ -401,11 +403,25 @@ class DriveSession:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
 
-@dataclass(slots=True)
-class _Acknowledged:
-    """The newest command that the robot has confirmed on one lane."""
+class OnTheirWay:
+    """The commands that were written on one lane and are not acknowledged yet."""
 
-    sequence: int = 0
+    def __init__(self) -> None:
+        self._sequences: deque[int] = deque()
+
+    @property
+    def full(self) -> bool:
+        """Whether another command would only queue behind these."""
+        return len(self._sequences) >= MAX_UNACKNOWLEDGED
+
+    def add(self, sequence: int) -> None:
+        """Adds a command that is written now."""
+        self._sequences.append(sequence)
+
+    def acknowledge(self, newest: int) -> None:
+        """Removes what the robot has received: all commands up to the newest, on whichever lane it came."""
+        while self._sequences and self._sequences[0] <= newest:
+            self._sequences.popleft()
 
 
 SENTENCES: Final = {
