@@ -1,20 +1,24 @@
-"""A robot to drive: the real gateway and drive program in processes of their own, and a base that listens."""
+"""A robot to drive: real gateway and drive program, the mux double behind them, and a base that listens."""
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from console.client import DriveOptions, DriveSession, Supervision
+from console.client import AsyncGatewayClient, DriveOptions, DriveSession, GatewayError, Supervision
+from drive.config import DriveSettings
+from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.ros import simulated_robot
 from tests.support.running_drive import Base, RunningDrive, listening_base, running_drive
 from tests.support.waiting import wait_until
 
 REST_S = 0.3
 """Longer than any message takes that is on its way."""
+_HOLD_EVERY_S = 0.02
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
 
 
@@ -40,11 +44,28 @@ TELEOP = {"line_of_sight": True, "legacy_clients": True, "allow_insecure": True}
 
 
 @contextmanager
+def driven_base(directory: Path, **settings: Any) -> Iterator[tuple[Base, RunningDrive]]:
+    """The drive program, the mux double and a base behind it, in the ROS domain of the environment.
+
+    Args:
+        directory: for sockets, state and logs.
+        settings: of the drive program.
+    """
+    watched = DriveSettings().model_dump(mode="json", include={"mux_output", "odometry"})
+    with (
+        simulated_robot(directory, "--base", "commander=nobody"),
+        listening_base(BEHIND_THE_MUX) as base,
+        running_drive(directory, **(watched | settings)) as program,
+    ):
+        yield base, program
+
+
+@contextmanager
 def driven_robot(
     directory: Path, *, drive: dict[str, Any] | None = None, **settings: Any
 ) -> Iterator[DrivenRobot]:
     """Ready to be driven when the block begins; in the ROS domain of the environment."""
-    with listening_base() as base, running_drive(directory, **(drive or {})) as program:
+    with driven_base(directory, **(drive or {})) as (base, program):
         teleop = {"socket": str(program.socket), **TELEOP, **settings.pop("teleop", {})}
         with gateway_program(directory, sources=[], teleop=teleop, **settings) as gateway:
             robot = DrivenRobot(gateway, program, base)
@@ -61,6 +82,41 @@ async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None
         return base.moves
 
     await eventually(moves, bool, "the base moves")
+
+
+@asynccontextmanager
+async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
+    """A client of a robot that is not stopped."""
+    async with AsyncGatewayClient(robot.target) as client:
+
+        async def free() -> bool:
+            teleop = (await client.status()).teleop
+            if teleop.stop:
+                try:
+                    await client.reset_stop(teleop.stop.stop_id)
+                except GatewayError:
+                    return False
+            return not teleop.holder and not teleop.stop
+
+        await eventually(free, bool, "the robot is free")
+        yield client
+
+
+@asynccontextmanager
+async def held(session: DriveSession, speed_mps: float) -> AsyncIterator[None]:
+    """Holds all the time while the block lasts, as a person who notices nothing; at its end it releases."""
+
+    async def hold() -> None:
+        while True:
+            session.hold(speed_mps)
+            await asyncio.sleep(_HOLD_EVERY_S)
+
+    holding = asyncio.create_task(hold())
+    try:
+        yield
+    finally:
+        holding.cancel()
+        session.release()
 
 
 async def is_at_rest(base: Base) -> bool:

@@ -7,24 +7,24 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from console.client import AsyncGatewayClient, Credentials, DriveInhibit, GatewayError, NotAllowed
+from console.client import AsyncGatewayClient, Credentials, DriveInhibit, NotAllowed
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
 from tests.support.bad_links import Relay
-from tests.support.driven_robot import BY_EYE, DrivenRobot, driven_robot, in_motion
+from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_base, driven_robot, in_motion
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.promise import keeps_async
-from tests.support.running_drive import Base, listening_base, running_drive
+from tests.support.running_drive import Base
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 ROOT = Path(__file__).parents[4]
@@ -32,24 +32,6 @@ SPEED_MPS = 0.1
 QUIET_S = 0.7
 """Longer than any motion may last after a fault."""
 WATCHERS, STOPS = 100, 60
-
-
-@asynccontextmanager
-async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
-    """A client of a robot that is not stopped."""
-    async with AsyncGatewayClient(robot.target) as client:
-
-        async def free() -> bool:
-            teleop = (await client.status()).teleop
-            if teleop.stop:
-                try:
-                    await client.reset_stop(teleop.stop.stop_id)
-                except GatewayError:
-                    return False
-            return not teleop.holder and not teleop.stop
-
-        await eventually(free, bool, "the robot is free")
-        yield client
 
 
 @contextmanager
@@ -129,7 +111,7 @@ async def test_two_lost_lanes_stop_within_280_ms(robot: DrivenRobot) -> None:
     ("number", "promised_s"), [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28)], ids=["killed", "frozen"]
 )
 async def test_a_lost_gateway_stops_in_time(
-    domain: int,  # noqa: ARG001  # for its effect
+    ros_domain: int,  # noqa: ARG001  # for its effect
     tmp_path: Path,
     number: signal.Signals,
     promised_s: float,
@@ -165,13 +147,12 @@ async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRob
     await keeps_async(0.05, "s at the 99th percentile of StopRobot", measure)
 
 
-async def test_a_revoked_driver_stops_within_1_1_s(domain: int, tmp_path: Path) -> None:  # noqa: ARG001
+async def test_a_revoked_driver_stops_within_1_1_s(ros_domain: int, tmp_path: Path) -> None:  # noqa: ARG001
     async def measure() -> float:
         with TemporaryDirectory(dir=tmp_path) as name:
             directory = Path(name)
             with (
-                listening_base() as base,
-                running_drive(directory) as drive,
+                driven_base(directory) as (base, drive),
                 guarded_program(
                     directory, directory, teleop={"socket": str(drive.socket), "line_of_sight": True}
                 ) as robot,
