@@ -33,7 +33,8 @@ from console.client.results import (
 from console.client.transport import Duplex, GrpcTransport
 
 HOLD_COUNTS_S: Final = 0.1
-"""A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs."""
+"""A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs.
+When it goes on, its driver has to release and to hold again: no recovery of a program moves the robot."""
 VALID_S: Final = 0.25
 """Longest validity of a command after the echoed instant has arrived."""
 COMMANDS_PER_S: Final = 50
@@ -102,6 +103,8 @@ class DriveSession:
         self._opens_within_s = opens_within_s
         self._name = options.client_name or f"robotctl {project_version()}"
         self._hold: _Hold | None = None
+        self._lapsed = False
+        """Whether the hold was not renewed in time; until a release, no other counts."""
         self._released = True
         """Whether a command that is no hold has left since the last hold: only then a new one begins."""
         self._sequence = 0
@@ -178,12 +181,14 @@ class DriveSession:
         Raises:
             ValueError: A velocity is not finite.
         """
+        self._lapsed = self._lapsed or self._unrenewed(time.monotonic())
         if not all(map(math.isfinite, (vx_mps, vy_mps, wz_rad_s))):
             raise ValueError("a velocity has to be finite")
         self._hold = _Hold(vx_mps, vy_mps, wz_rad_s, time.monotonic())
 
     def release(self) -> None:
         """Releases: the robot stops. Sent at once, and with every command until the next hold."""
+        self._lapsed = False
         held, self._hold = self._hold, None
         if held and self._loop and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._send_now)
@@ -219,6 +224,8 @@ class DriveSession:
 
     def reasons(self) -> str:
         """Returns why the robot does not move, for people."""
+        if self._lapsed and self.state and self.state.phase is DrivePhase.ARMED:
+            return "the last hold was not renewed in time; release, then hold again"
         state = self.state
         if state is None:
             return "it has not reported its state yet"
@@ -254,7 +261,7 @@ class DriveSession:
         if state is None or state.phase is not DrivePhase.ARMED or state.inhibits:
             return False
         # A hold begins after a release that the robot has seen since it was armed.
-        return state.newest_sequence > self._armed_at and not self._command_holds
+        return state.newest_sequence > self._armed_at and not self._command_holds and self._hold is None
 
     # --- commands ---
 
@@ -274,7 +281,7 @@ class DriveSession:
 
     def _make_command(self) -> None:
         now_s, hold = time.monotonic(), self._hold
-        if hold and now_s - hold.at_s > HOLD_COUNTS_S:
+        if self._lapsed or self._unrenewed(now_s):
             hold = None
         if hold is None and self._command_holds:
             self._released = False
@@ -298,6 +305,11 @@ class DriveSession:
                 input_device=self._options.input_device,
             )
         )
+
+    def _unrenewed(self, now_s: float) -> bool:
+        """Whether there is a hold, and it counts no more."""
+        hold = self._hold
+        return hold is not None and now_s - hold.at_s > HOLD_COUNTS_S
 
     def _picture_ns(self) -> int:
         return (self._options.picture() or 0) if self._options.picture else 0

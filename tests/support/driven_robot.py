@@ -1,6 +1,7 @@
 """A robot to drive: real gateway and drive program, the mux double behind them, and a base that listens."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from tests.support.waiting import wait_until
 REST_S = 0.3
 """Longer than any message takes that is on its way."""
 _HOLD_EVERY_S = 0.02
+_ATTEMPT = 100
+"""Holds without motion, each 10 ms or more, after which the driver releases and holds anew."""
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
 
 
@@ -74,10 +77,15 @@ def driven_robot(
 
 
 async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None:
-    """Holds until the base has motion."""
-    await session.ready(within_s=15)
+    """Holds anew until the base has motion; a busy machine may take several attempts."""
+    attempts = 0
 
     async def moves() -> bool:
+        nonlocal attempts
+        if attempts % _ATTEMPT == 0:
+            session.release()
+            await session.ready(within_s=15)
+        attempts += 1
         session.hold(speed_mps)
         return base.moves
 
@@ -117,6 +125,31 @@ async def held(session: DriveSession, speed_mps: float) -> AsyncIterator[None]:
     finally:
         holding.cancel()
         session.release()
+
+
+async def stop_by(
+    viewer: AsyncGatewayClient, operator: AsyncGatewayClient, base: Base
+) -> tuple[float, float]:
+    """Stops a robot that is not stopped, and resets that.
+
+    Args:
+        viewer: who stops it.
+        operator: who resets it.
+        base: where zero has to arrive.
+
+    Returns:
+        Seconds until the base had zero, and until the viewer was answered.
+    """
+    heard, began_s = len(base.heard), time.monotonic()
+    stopped = await viewer.stop_robot()
+    answered_s = time.monotonic() - began_s
+
+    async def has_zero() -> bool:
+        return len(base.heard) > heard
+
+    await eventually(has_zero, bool, "the base has zero")
+    await operator.reset_stop(stopped.stop.stop_id)
+    return base.heard[heard].at_s - began_s, answered_s
 
 
 async def is_at_rest(base: Base) -> bool:

@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from console.client import AsyncGatewayClient, DrivePhase
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
+from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion, stop_by
 from tests.support.driving import Observer
-from tests.support.eventually import eventually
 from tests.support.free import free_tcp_port
 from tests.support.promise import keeps_async
 from tests.support.tcp_link import TcpLink, needs_tun
@@ -87,27 +86,10 @@ async def test_a_stop_reaches_the_base_in_150_ms_with_3_percent_loss(
     async def measure() -> float:
         link.impair(loss=LOSS, delay_s=ONE_WAY_S)
         async with available(robot) as operator, AsyncGatewayClient(link.target) as viewer:
-            took_s = [await stop_reaches_base_s(robot, viewer, operator) for _ in range(STOPS)]
+            took_s = [(await stop_by(viewer, operator, robot.base))[0] for _ in range(STOPS)]
         return statistics.quantiles(took_s, n=100)[98]
 
     await keeps_async(0.15, "s at the 99th percentile until the base has zero", measure)
-
-
-async def stop_reaches_base_s(
-    robot: DrivenRobot, viewer: AsyncGatewayClient, operator: AsyncGatewayClient
-) -> float:
-    """Stops a robot that is not stopped, and resets that; returns how long the base waited for zero."""
-    heard, began_s = len(robot.base.heard), time.monotonic()
-    stopping = asyncio.create_task(viewer.stop_robot())
-    await eventually(lambda: count(robot), lambda now: now > heard, "the base has zero")
-    took_s = robot.base.heard[heard].at_s - began_s
-    stopped = await stopping
-    await operator.reset_stop(stopped.stop.stop_id)
-    return took_s
-
-
-async def count(robot: DrivenRobot) -> int:
-    return len(robot.base.heard)
 
 
 async def test_3_percent_loss_stops_nothing_and_no_old_command_passes(
