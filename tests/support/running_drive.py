@@ -68,9 +68,15 @@ def running_drive(directory: Path, **settings: Any) -> Iterator[RunningDrive]:
 
 @dataclass(frozen=True)
 class Heard:
-    """A velocity that reached the subscriber; the instant is of CLOCK_MONOTONIC, in seconds."""
+    """A velocity that reached the subscriber.
+
+    Attributes:
+        at_s: when, by CLOCK_MONOTONIC.
+        stamp_s: its stamp, by the publisher's calendar clock.
+    """
 
     at_s: float
+    stamp_s: float
     vx_mps: float
     vy_mps: float
     wz_rad_s: float
@@ -106,8 +112,9 @@ def listening_base(topic: str = TOPIC) -> Iterator[Base]:
     base = Base()
 
     def hear(message: Any) -> None:
-        twist = message.twist
-        base.heard.append(Heard(time.monotonic(), twist.linear.x, twist.linear.y, twist.angular.z))
+        twist, stamp = message.twist, message.header.stamp
+        stamp_s = stamp.sec + stamp.nanosec / 1e9
+        base.heard.append(Heard(time.monotonic(), stamp_s, twist.linear.x, twist.linear.y, twist.angular.z))
 
     node.create_subscription(message_class(_TYPE), topic, hear, QoSProfile(depth=50))
     executor = SingleThreadedExecutor(context=context)
