@@ -64,16 +64,32 @@ def driven_base(directory: Path, **settings: Any) -> Iterator[tuple[Base, Runnin
 
 
 @contextmanager
+def gateway_for(directory: Path, base: Base, program: RunningDrive, **settings: Any) -> Iterator[DrivenRobot]:
+    """A gateway in front of a drive program; ready to be driven when the block begins.
+
+    Args:
+        directory: for its configuration and log.
+        base: behind the drive program.
+        program: the drive program.
+        settings: of `gateway_program`; keys of the configuration.
+    """
+    teleop = {"socket": str(program.socket), **TELEOP, **settings.pop("teleop", {})}
+    with gateway_program(directory, sources=[], teleop=teleop, **settings) as gateway:
+        robot = DrivenRobot(gateway, program, base)
+        wait_until(lambda: robot.teleop.enabled, "driving is enabled")
+        yield robot
+
+
+@contextmanager
 def driven_robot(
     directory: Path, *, drive: dict[str, Any] | None = None, **settings: Any
 ) -> Iterator[DrivenRobot]:
     """Ready to be driven when the block begins; in the ROS domain of the environment."""
-    with driven_base(directory, **(drive or {})) as (base, program):
-        teleop = {"socket": str(program.socket), **TELEOP, **settings.pop("teleop", {})}
-        with gateway_program(directory, sources=[], teleop=teleop, **settings) as gateway:
-            robot = DrivenRobot(gateway, program, base)
-            wait_until(lambda: robot.teleop.enabled, "driving is enabled")
-            yield robot
+    with (
+        driven_base(directory, **(drive or {})) as (base, program),
+        gateway_for(directory, base, program, **settings) as robot,
+    ):
+        yield robot
 
 
 async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None:
@@ -150,6 +166,11 @@ async def stop_by(
     await eventually(has_zero, bool, "the base has zero")
     await operator.reset_stop(stopped.stop.stop_id)
     return base.heard[heard].at_s - began_s, answered_s
+
+
+def network_settings(port: int) -> dict[str, Any]:
+    """Returns settings of `driven_robot` for a gateway that all networks of this machine reach."""
+    return {"port": port, "grpc": {"host": "0.0.0.0", "port": port}, "security": {"insecure": True}}  # noqa: S104
 
 
 async def is_at_rest(base: Base) -> bool:

@@ -11,7 +11,16 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from console.client import AsyncGatewayClient, DrivePhase
-from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion, stop_by
+from tests.support.driven_robot import (
+    BY_EYE,
+    DrivenRobot,
+    available,
+    driven_robot,
+    held,
+    in_motion,
+    network_settings,
+    stop_by,
+)
 from tests.support.driving import Observer
 from tests.support.free import free_tcp_port
 from tests.support.promise import keeps_async
@@ -33,9 +42,7 @@ BLACKOUTS = 4
 @pytest.fixture(scope="module")
 def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:  # noqa: ARG001
     """A robot that is reached by networks."""
-    port = free_tcp_port()
-    network = {"grpc": {"host": "0.0.0.0", "port": port}, "security": {"insecure": True}}  # noqa: S104
-    with driven_robot(tmp_path_factory.mktemp("robot"), port=port, **network) as robot:
+    with driven_robot(tmp_path_factory.mktemp("robot"), **network_settings(free_tcp_port())) as robot:
         yield robot
 
 
