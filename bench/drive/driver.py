@@ -75,6 +75,7 @@ class Driver:
 
     async def begin(self) -> None:
         """Releases and holds, until the robot moves."""
+        self._moves = False
         while not self._moves:
             self.release()
             await self._session.ready(READY_WITHIN_S)
@@ -106,7 +107,6 @@ class Driver:
             case "release":
                 return self.release()
             case "again":
-                self._moves = False
                 await self.begin()
                 return True
             case "summary":

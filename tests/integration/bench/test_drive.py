@@ -17,9 +17,8 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
         yield running
 
 
-@pytest.mark.parametrize("fault", ["release", "client_killed", "gateway_killed"])
-def test_a_round_of_a_fault(ground: Ground, fault: str) -> None:
-    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS[fault]) < 1000
+def test_a_round_of_a_fault(ground: Ground) -> None:
+    assert 0 < stopping.stopped_ms(ground, stopping.FAULTS["gateway_killed"]) < 1000
 
 
 def test_a_round_of_stops_under_siege(ground: Ground) -> None:
@@ -38,8 +37,7 @@ def test_a_window_of_cpu(ground: Ground) -> None:
 
 
 @needs_tun
-@pytest.mark.parametrize("lanes", [1, 2])
-def test_a_round_over_a_link_that_loses_packets(ground: Ground, lanes: int) -> None:
+def test_a_round_over_a_link_that_loses_packets(ground: Ground) -> None:
     with ground.robot() as robot:
-        found = losses.drive(robot, loss=0.03, lanes=lanes, seconds=2.0, seed=1)
+        found = losses.drive(robot, loss=0.03, lanes=1, seconds=2.0, seed=1)
     assert found.p99_ms > 10, "one way takes 10 ms"

@@ -140,7 +140,9 @@ async def test_two_lost_lanes_stop_within_280_ms(robot: DrivenRobot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "promised_s"), [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28)], ids=["killed", "frozen"]
+    ("number", "promised_s"),
+    [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28), (signal.SIGTERM, 0.28)],
+    ids=["killed", "frozen", "ended"],
 )
 async def test_a_lost_gateway_stops_in_time(
     ros_domain: int,  # noqa: ARG001  # for its effect
