@@ -33,8 +33,10 @@ ONE_WAY_S = 0.01
 LOSS = 0.03
 QUIET_S = 0.7
 """Longer than any motion may last after a fault."""
-STOPS = 150
-DRIVEN_S = 15.0
+STOPS = 300
+"""Both copies of a stop are lost in 0.09 % of the cases, with a retransmission after 0.2 s or more: the
+percentile has to leave room for two of them."""
+DRIVEN_S = 10.0
 BLACKOUT_S = 0.3
 BLACKOUTS = 4
 
