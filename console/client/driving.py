@@ -319,18 +319,30 @@ class DriveSession:
     async def _first_lane(self) -> tuple[GrpcTransport, _Lane]:
         options = self._options
         opening = open_request(self._name, options.supervision, take_over=options.take_over)
-        return await self._open_lane(opening)
+        deadline_s = time.monotonic() + self._opens_within_s
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        while True:
+            left_s = deadline_s - time.monotonic()
+            try:
+                return await self._open_lane(opening, left_s)
+            except Unreachable:
+                # The first packet of a connection, when lost, is sent again only after 1 s (RFC 6298 2.1): as
+                # long as gRPC lets an attempt take.
+                pause_s = backoff.next_s()
+                if time.monotonic() + pause_s >= deadline_s:
+                    raise
+            await asyncio.sleep(pause_s)
 
-    async def _open_lane(self, opening: bytes) -> tuple[GrpcTransport, _Lane]:
+    async def _open_lane(self, opening: bytes, within_s: float) -> tuple[GrpcTransport, _Lane]:
         transport = self._connect()
         try:
-            async with asyncio.timeout(self._opens_within_s):
+            async with asyncio.timeout(within_s):
                 lane = transport.open_both_ways(DRIVE)
                 await lane.write(opening)
                 opened = await lane.read()
         except TimeoutError:
             await transport.close()
-            raise Unreachable(f"no lane was opened within {self._opens_within_s:g} s") from None
+            raise Unreachable(f"no lane was opened within {within_s:.1f} s") from None
         except BaseException:
             await transport.close()
             raise
@@ -343,7 +355,8 @@ class DriveSession:
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while not self._ending and self._error is None:
             try:
-                transport, lane = opened or await self._open_lane(join_request(self._name, self._session_id))
+                joining = join_request(self._name, self._session_id)
+                transport, lane = opened or await self._open_lane(joining, self._opens_within_s)
                 backoff.reset()
                 await self._serve_lane(transport, lane)
             except GatewayError as error:

@@ -131,6 +131,19 @@ async def test_3_percent_loss_stops_nothing_and_no_old_command_passes(
         observer.close()
 
 
+async def test_a_session_opens_though_the_first_packets_are_lost(robot: DrivenRobot, link: TcpLink) -> None:
+    async def opened() -> bool:
+        async with AsyncGatewayClient(link.target) as client, client.drive(BY_EYE) as session:
+            return session.limits is not None
+
+    async with available(robot):
+        link.cut()
+        opening = asyncio.create_task(opened())
+        await asyncio.sleep(BLACKOUT_S)
+        link.impair(delay_s=ONE_WAY_S)
+        assert await opening
+
+
 async def test_blackouts_of_300_ms_end_the_motion_until_a_release(robot: DrivenRobot, link: TcpLink) -> None:
     """TCP delivers afterwards what was sent meanwhile, all of it held."""
 
