@@ -133,6 +133,9 @@ async def drive(target: str, *, stay: bool) -> None:
             await driver.begin()
             print("ready", flush=True)
             while line := await asyncio.to_thread(sys.stdin.readline):
+                for job in jobs:
+                    if job.done():
+                        await job  # Raises why it has ended.
                 print(json.dumps(await driver.answer(line.strip())), flush=True)
             for job in jobs:
                 job.cancel()

@@ -12,7 +12,6 @@ from typing import Final
 from bench.drive.ground import Ground, driver, link
 from bench.progress import log
 from bench.rows import FEWEST_ROUNDS, Row
-from tests.support.driven_robot import DrivenRobot
 
 ROUNDS: Final = FEWEST_ROUNDS
 ROUND_S: Final = 120.0
@@ -40,21 +39,24 @@ def rows(ground: Ground, wanted: set[str]) -> list[Row]:
     two: list[Drive] = []
     one: list[Drive] = []
     made = []
-    with ground.robot() as robot:
-        if wanted - {"drive.false_stops_very_lossy"}:
-            for seed in range(1, ROUNDS + 1):
-                two.append(drive(robot, LOSS, 2, ROUND_S, seed))
-                one.append(drive(robot, LOSS, 1, ONE_LANE_S, seed))
-            made += _lossy_rows(two, one)
-        if "drive.false_stops_very_lossy" in wanted:
-            much = [drive(robot, MUCH_LOSS, 2, ROUND_S, seed) for seed in range(1, ROUNDS + 1)]
-            made.append(_very_lossy_row(much))
+    if wanted - {"drive.false_stops_very_lossy"}:
+        for seed in range(1, ROUNDS + 1):
+            two.append(drive(ground, LOSS, 2, ROUND_S, seed))
+            one.append(drive(ground, LOSS, 1, ONE_LANE_S, seed))
+        made += _lossy_rows(two, one)
+    if "drive.false_stops_very_lossy" in wanted:
+        much = [drive(ground, MUCH_LOSS, 2, ROUND_S, seed) for seed in range(1, ROUNDS + 1)]
+        made.append(_very_lossy_row(much))
     return [row for row in made if row.name in wanted]
 
 
-def drive(robot: DrivenRobot, loss: float, lanes: int, seconds: float, seed: int) -> Drive:
+def drive(ground: Ground, loss: float, lanes: int, seconds: float, seed: int) -> Drive:
     """Drives for a while over a link that loses packets."""
-    with link(robot, loss, seed) as far, driver(far.target, "--lanes", str(lanes)) as hands:
+    with (
+        ground.robot() as robot,
+        link(robot, loss, seed) as far,
+        driver(far.target, "--lanes", str(lanes)) as hands,
+    ):
         hands.ask("summary")
         time.sleep(seconds)
         seen = hands.ask("summary")

@@ -38,6 +38,5 @@ def test_a_window_of_cpu(ground: Ground) -> None:
 
 @needs_tun
 def test_a_round_over_a_link_that_loses_packets(ground: Ground) -> None:
-    with ground.robot() as robot:
-        found = losses.drive(robot, loss=0.03, lanes=1, seconds=2.0, seed=1)
+    found = losses.drive(ground, loss=0.03, lanes=1, seconds=2.0, seed=1)
     assert found.p99_ms > 10, "one way takes 10 ms"
