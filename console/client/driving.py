@@ -10,7 +10,6 @@ import asyncio
 import contextlib
 import math
 import time
-from collections import deque
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -432,7 +431,7 @@ class OnTheirWay:
     """The commands that were written on one lane and are not acknowledged yet."""
 
     def __init__(self) -> None:
-        self._sequences: deque[int] = deque()
+        self._sequences: list[int] = []
 
     @property
     def full(self) -> bool:
@@ -445,8 +444,7 @@ class OnTheirWay:
 
     def acknowledge(self, newest: int) -> None:
         """Removes what the robot has received: all commands up to the newest, on whichever lane it came."""
-        while self._sequences and self._sequences[0] <= newest:
-            self._sequences.popleft()
+        self._sequences = [each for each in self._sequences if each > newest]
 
 
 SENTENCES: Final = {
