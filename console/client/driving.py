@@ -33,7 +33,8 @@ from console.client.results import (
 from console.client.transport import Duplex, GrpcTransport
 
 HOLD_COUNTS_S: Final = 0.1
-"""A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs."""
+"""A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs.
+When it goes on, its driver has to release and to hold again: no recovery of a program moves the robot."""
 VALID_S: Final = 0.25
 """Longest validity of a command after the echoed instant has arrived."""
 COMMANDS_PER_S: Final = 50
@@ -103,6 +104,8 @@ class DriveSession:
         self._opens_within_s = opens_within_s
         self._name = options.client_name or f"robotctl {project_version()}"
         self._hold: _Hold | None = None
+        self._lapsed = False
+        """Whether the hold was not renewed in time; until a release, no other counts."""
         self._released = True
         """Whether a command that is no hold has left since the last hold: only then a new one begins."""
         self._sequence = 0
@@ -193,6 +196,7 @@ class DriveSession:
         Raises:
             ValueError: A velocity is not finite.
         """
+        self._lapsed = self._lapsed or self._unrenewed(time.monotonic())
         if not all(map(math.isfinite, (vx_mps, vy_mps, wz_rad_s))):
             raise ValueError("a velocity has to be finite")
         device = input_device or self._options.input_device
@@ -200,6 +204,7 @@ class DriveSession:
 
     def release(self) -> None:
         """Releases: the robot stops. Sent at once, and with every command until the next hold."""
+        self._lapsed = False
         held, self._hold = self._hold, None
         if held and self._loop and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._send_now)
@@ -235,6 +240,8 @@ class DriveSession:
 
     def reasons(self) -> str:
         """Returns why the robot does not move, for people."""
+        if self._lapsed and self.state and self.state.phase is DrivePhase.ARMED:
+            return "the last hold was not renewed in time; release, then hold again"
         state = self.state
         if state is None:
             return "it has not reported its state yet"
@@ -266,7 +273,7 @@ class DriveSession:
         if state is None or state.phase is not DrivePhase.ARMED or state.inhibits:
             return False
         # A hold begins after a release that the robot has seen since it was armed.
-        return state.newest_sequence > self._armed_at and not self._command_holds
+        return state.newest_sequence > self._armed_at and not self._command_holds and self._hold is None
 
     # --- commands ---
 
@@ -286,7 +293,7 @@ class DriveSession:
 
     def _make_command(self) -> None:
         now_s, hold = time.monotonic(), self._hold
-        if hold and now_s - hold.at_s > HOLD_COUNTS_S:
+        if self._lapsed or self._unrenewed(now_s):
             hold = None
         if hold is None and self._command_holds:
             self._released = False
@@ -311,6 +318,11 @@ class DriveSession:
             )
         )
 
+    def _unrenewed(self, now_s: float) -> bool:
+        """Whether there is a hold, and it counts no more."""
+        hold = self._hold
+        return hold is not None and now_s - hold.at_s > HOLD_COUNTS_S
+
     def _picture_ns(self) -> int:
         return (self._options.picture() or 0) if self._options.picture else 0
 
@@ -319,18 +331,30 @@ class DriveSession:
     async def _first_lane(self) -> tuple[GrpcTransport, _Lane]:
         options = self._options
         opening = open_request(self._name, options.supervision, take_over=options.take_over)
-        return await self._open_lane(opening)
+        deadline_s = time.monotonic() + self._opens_within_s
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        while True:
+            left_s = deadline_s - time.monotonic()
+            try:
+                return await self._open_lane(opening, left_s)
+            except Unreachable:
+                # The first packet of a connection, when lost, is sent again only after 1 s (RFC 6298 2.1): as
+                # long as gRPC lets an attempt take.
+                pause_s = backoff.next_s()
+                if time.monotonic() + pause_s >= deadline_s:
+                    raise
+            await asyncio.sleep(pause_s)
 
-    async def _open_lane(self, opening: bytes) -> tuple[GrpcTransport, _Lane]:
+    async def _open_lane(self, opening: bytes, within_s: float) -> tuple[GrpcTransport, _Lane]:
         transport = self._connect()
         try:
-            async with asyncio.timeout(self._opens_within_s):
+            async with asyncio.timeout(within_s):
                 lane = transport.open_both_ways(DRIVE)
                 await lane.write(opening)
                 opened = await lane.read()
         except TimeoutError:
             await transport.close()
-            raise Unreachable(f"no lane was opened within {self._opens_within_s:g} s") from None
+            raise Unreachable(f"no lane was opened within {within_s:.1f} s") from None
         except BaseException:
             await transport.close()
             raise
@@ -343,7 +367,8 @@ class DriveSession:
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while not self._ending and self._error is None:
             try:
-                transport, lane = opened or await self._open_lane(join_request(self._name, self._session_id))
+                joining = join_request(self._name, self._session_id)
+                transport, lane = opened or await self._open_lane(joining, self._opens_within_s)
                 backoff.reset()
                 await self._serve_lane(transport, lane)
             except GatewayError as error:
@@ -362,14 +387,14 @@ class DriveSession:
         Raises:
             GatewayError: The lane has ended.
         """
-        acknowledged = _Acknowledged()
+        on_their_way = OnTheirWay()
         self._open_lanes += 1
-        writer = asyncio.create_task(self._write(lane, acknowledged), name="drive lane, commands")
+        writer = asyncio.create_task(self._write(lane, on_their_way), name="drive lane, commands")
         try:
             while True:
                 item = await lane.read()
                 if isinstance(item, DriveState):
-                    acknowledged.sequence = item.newest_sequence
+                    on_their_way.acknowledge(item.newest_sequence)
                     self._take(item)
         finally:
             self._open_lanes -= 1
@@ -379,14 +404,15 @@ class DriveSession:
             await transport.close()
             self._changes.notify_all()
 
-    async def _write(self, lane: _Lane, acknowledged: "_Acknowledged") -> None:
+    async def _write(self, lane: _Lane, on_their_way: "OnTheirWay") -> None:
         """Writes the newest command whenever there is a new one; those in between are skipped."""
-        written = 0
+        seen = 0
         while True:
-            await self._sends.wait_until(lambda: self._sequence > written)  # noqa: B023  # read at once
-            written, holds, last = self._sequence, self._command_holds, self._ending
-            if written - acknowledged.sequence > MAX_UNACKNOWLEDGED and acknowledged.sequence and not last:
+            await self._sends.wait_until(lambda: self._sequence > seen)  # noqa: B023  # read at once
+            seen, holds, last = self._sequence, self._command_holds, self._ending
+            if on_their_way.full and not last:
                 continue
+            on_their_way.add(seen)
             with contextlib.suppress(GatewayError):  # The reader finds out why the lane has ended.
                 await lane.write(self._command)
                 self._released = self._released or not holds
@@ -414,11 +440,24 @@ class DriveSession:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
 
-@dataclass(slots=True)
-class _Acknowledged:
-    """The newest command that the robot has confirmed on one lane."""
+class OnTheirWay:
+    """The commands that were written on one lane and are not acknowledged yet."""
 
-    sequence: int = 0
+    def __init__(self) -> None:
+        self._sequences: list[int] = []
+
+    @property
+    def full(self) -> bool:
+        """Whether another command would only queue behind these."""
+        return len(self._sequences) >= MAX_UNACKNOWLEDGED
+
+    def add(self, sequence: int) -> None:
+        """Adds a command that is written now."""
+        self._sequences.append(sequence)
+
+    def acknowledge(self, newest: int) -> None:
+        """Removes what the robot has received: all commands up to the newest, on whichever lane it came."""
+        self._sequences = [each for each in self._sequences if each > newest]
 
 
 def rest_reasons(

@@ -1,20 +1,27 @@
-"""A robot to drive: the real gateway and drive program in processes of their own, and a base that listens."""
+"""A robot to drive: real gateway and drive program, the mux double behind them, and a base that listens."""
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from console.client import DriveOptions, DriveSession, Supervision
+from console.client import AsyncGatewayClient, DriveOptions, DriveSession, GatewayError, Supervision
+from drive.config import DriveSettings
+from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
 from tests.support.gateway_program import GatewayProgram, gateway_program
+from tests.support.ros import simulated_robot
 from tests.support.running_drive import Base, RunningDrive, listening_base, running_drive
 from tests.support.waiting import wait_until
 
 REST_S = 0.3
 """Longer than any message takes that is on its way."""
+_HOLD_EVERY_S = 0.02
+_ATTEMPT = 100
+"""Holds without motion, each 10 ms or more, after which the driver releases and holds anew."""
 BY_EYE = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
 
 
@@ -40,27 +47,130 @@ TELEOP = {"line_of_sight": True, "legacy_clients": True, "allow_insecure": True}
 
 
 @contextmanager
+def driven_base(directory: Path, **settings: Any) -> Iterator[tuple[Base, RunningDrive]]:
+    """The drive program, the mux double and a base behind it, in the ROS domain of the environment.
+
+    Args:
+        directory: for sockets, state and logs.
+        settings: of the drive program.
+    """
+    watched = DriveSettings().model_dump(mode="json", include={"mux_output", "odometry"})
+    with (
+        simulated_robot(directory, "--base", "commander=nobody"),
+        listening_base(BEHIND_THE_MUX) as base,
+        running_drive(directory, **(watched | settings)) as program,
+    ):
+        yield base, program
+
+
+@contextmanager
+def gateway_for(directory: Path, base: Base, program: RunningDrive, **settings: Any) -> Iterator[DrivenRobot]:
+    """A gateway in front of a drive program; ready to be driven when the block begins.
+
+    Args:
+        directory: for its configuration and log.
+        base: behind the drive program.
+        program: the drive program.
+        settings: of `gateway_program`; keys of the configuration.
+    """
+    teleop = {"socket": str(program.socket), **TELEOP, **settings.pop("teleop", {})}
+    with gateway_program(directory, sources=[], teleop=teleop, **settings) as gateway:
+        robot = DrivenRobot(gateway, program, base)
+        wait_until(lambda: robot.teleop.enabled, "driving is enabled")
+        yield robot
+
+
+@contextmanager
 def driven_robot(
     directory: Path, *, drive: dict[str, Any] | None = None, **settings: Any
 ) -> Iterator[DrivenRobot]:
     """Ready to be driven when the block begins; in the ROS domain of the environment."""
-    with listening_base() as base, running_drive(directory, **(drive or {})) as program:
-        teleop = {"socket": str(program.socket), **TELEOP, **settings.pop("teleop", {})}
-        with gateway_program(directory, sources=[], teleop=teleop, **settings) as gateway:
-            robot = DrivenRobot(gateway, program, base)
-            wait_until(lambda: robot.teleop.enabled, "driving is enabled")
-            yield robot
+    with (
+        driven_base(directory, **(drive or {})) as (base, program),
+        gateway_for(directory, base, program, **settings) as robot,
+    ):
+        yield robot
 
 
 async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None:
-    """Holds until the base has motion."""
-    await session.ready(within_s=15)
+    """Holds anew until the base has motion; a busy machine may take several attempts."""
+    attempts = 0
 
     async def moves() -> bool:
+        nonlocal attempts
+        if attempts % _ATTEMPT == 0:
+            session.release()
+            await session.ready(within_s=15)
+        attempts += 1
         session.hold(speed_mps)
         return base.moves
 
     await eventually(moves, bool, "the base moves")
+
+
+@asynccontextmanager
+async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
+    """A client of a robot that is not stopped."""
+    async with AsyncGatewayClient(robot.target) as client:
+
+        async def free() -> bool:
+            teleop = (await client.status()).teleop
+            if teleop.stop:
+                try:
+                    await client.reset_stop(teleop.stop.stop_id)
+                except GatewayError:
+                    return False
+            return not teleop.holder and not teleop.stop
+
+        await eventually(free, bool, "the robot is free")
+        yield client
+
+
+@asynccontextmanager
+async def held(session: DriveSession, speed_mps: float) -> AsyncIterator[None]:
+    """Holds all the time while the block lasts, as a person who notices nothing; at its end it releases."""
+
+    async def hold() -> None:
+        while True:
+            session.hold(speed_mps)
+            await asyncio.sleep(_HOLD_EVERY_S)
+
+    holding = asyncio.create_task(hold())
+    try:
+        yield
+    finally:
+        holding.cancel()
+        session.release()
+
+
+async def stop_by(
+    viewer: AsyncGatewayClient, operator: AsyncGatewayClient, base: Base
+) -> tuple[float, float]:
+    """Stops a robot that is not stopped, and resets that.
+
+    Args:
+        viewer: who stops it.
+        operator: who resets it.
+        base: where zero has to arrive.
+
+    Returns:
+        Seconds until the base had zero, and until the viewer was answered.
+    """
+    heard, began_s = len(base.heard), time.monotonic()
+    stopped = await viewer.stop_robot()
+    answered_s = time.monotonic() - began_s
+
+    async def has_zero() -> bool:
+        return len(base.heard) > heard
+
+    await eventually(has_zero, bool, "the base has zero")
+    await operator.reset_stop(stopped.stop.stop_id)
+    return base.heard[heard].at_s - began_s, answered_s
+
+
+def network_settings(port: int) -> dict[str, Any]:
+    """Returns settings of `driven_robot` for a gateway that all networks of this machine reach."""
+    return {"port": port, "grpc": {"host": "0.0.0.0", "port": port}, "security": {"insecure": True}}  # noqa: S104
 
 
 async def is_at_rest(base: Base) -> bool:

@@ -15,6 +15,8 @@ from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervi
 
 _ROOT: Final = Path(__file__).parents[2]
 SPEED_MPS: Final = 0.1
+_ATTEMPT: Final = 100
+"""Holds without motion after which the driver releases and holds anew, as a busy machine may need."""
 
 
 @contextmanager
@@ -34,14 +36,14 @@ async def drive(target: str) -> None:
     """Drives until the process ends."""
     by_eye = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
     async with AsyncGatewayClient(target) as client, client.drive(by_eye) as session:
-        await session.ready(within_s=15)
-        said = False
+        holds, said = 0, False
         while True:
             session.check()
-            if session.state and session.state.phase is DrivePhase.INHIBITED:
-                session.release()  # Without a release no hold begins anew.
-            else:
-                session.hold(SPEED_MPS)
+            if not said and holds % _ATTEMPT == 0:
+                session.release()
+                await session.ready(within_s=15)
+            session.hold(SPEED_MPS)
+            holds += 1
             if not said and session.state and session.state.phase is DrivePhase.DRIVING:
                 said = session.open_lanes == 2
                 if said:

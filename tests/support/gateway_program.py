@@ -39,13 +39,23 @@ class GatewayProgram:
 
 
 @contextmanager
-def gateway_program(directory: Path, port: int = 0, **settings: Any) -> Iterator[GatewayProgram]:
-    """Up when the block begins, gone when it ends; its log is in `directory`. Without a port, at any."""
+def gateway_program(
+    directory: Path, port: int = 0, first: str = "pass", **settings: Any
+) -> Iterator[GatewayProgram]:
+    """Up when the block begins, gone when it ends.
+
+    Args:
+        directory: for its configuration and log.
+        port: without one, any.
+        first: what its process executes before the program.
+        settings: keys of its configuration.
+    """
     port = port or free_tcp_port()
     config = directory / "gateway.yaml"
     values = {"grpc": {"port": port}, "preview": {"socket": str(directory / "preview.sock")}, **settings}
     config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-    command = [sys.executable, "-c", "from gateway.cli import main; main()", "serve", "--config", str(config)]
+    program = f"{first}; from gateway.cli import main; main()"
+    command = [sys.executable, "-c", program, "serve", "--config", str(config)]
     with (directory / "gateway.log").open("wb") as log:
         process = subprocess.Popen(command, cwd=_ROOT, stderr=log)
     try:

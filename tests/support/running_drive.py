@@ -1,6 +1,7 @@
 """The real drive program as processes of their own, and a subscriber that notes what it publishes."""
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -68,9 +69,15 @@ def running_drive(directory: Path, **settings: Any) -> Iterator[RunningDrive]:
 
 @dataclass(frozen=True)
 class Heard:
-    """A velocity that reached the subscriber; the instant is of CLOCK_MONOTONIC, in seconds."""
+    """A velocity that reached the subscriber.
+
+    Attributes:
+        at_s: when, by CLOCK_MONOTONIC.
+        stamp_s: its stamp, by the publisher's calendar clock.
+    """
 
     at_s: float
+    stamp_s: float
     vx_mps: float
     vy_mps: float
     wz_rad_s: float
@@ -92,9 +99,13 @@ class Base:
         return bool(self.heard) and self.heard[-1].moves
 
     def stopped_after_s(self, since_s: float) -> float:
-        """How long after an instant the last motion came; a robot without motion after it counts as 0."""
-        moving = [each.at_s for each in self.heard if each.moves]
-        return max(0.0, moving[-1] - since_s) if moving else 0.0
+        """Returns how long after an instant zero has come that no motion followed.
+
+        0 without motion and without a zero after it; infinite if the motion never ended.
+        """
+        last_s = max((each.at_s for each in self.heard if each.moves and each.at_s >= since_s), default=None)
+        zeros_s = (each.at_s for each in self.heard if not each.moves and each.at_s >= (last_s or since_s))
+        return next(zeros_s, since_s if last_s is None else math.inf) - since_s
 
 
 @contextmanager
@@ -106,8 +117,9 @@ def listening_base(topic: str = TOPIC) -> Iterator[Base]:
     base = Base()
 
     def hear(message: Any) -> None:
-        twist = message.twist
-        base.heard.append(Heard(time.monotonic(), twist.linear.x, twist.linear.y, twist.angular.z))
+        twist, stamp = message.twist, message.header.stamp
+        stamp_s = stamp.sec + stamp.nanosec / 1e9
+        base.heard.append(Heard(time.monotonic(), stamp_s, twist.linear.x, twist.linear.y, twist.angular.z))
 
     node.create_subscription(message_class(_TYPE), topic, hear, QoSProfile(depth=50))
     executor = SingleThreadedExecutor(context=context)

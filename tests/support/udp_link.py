@@ -8,7 +8,11 @@ import time
 from collections import deque
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Final, Self
+from typing import Final, Generic, Self, TypeAlias, TypeVar
+
+ItemT = TypeVar("ItemT")
+_Sent: TypeAlias = tuple[socket.socket, bytes, tuple[str, int]]
+"""The socket to send on, the payload, the address to send to."""
 
 _MAX_WAITING: Final = 4096
 """Packets that wait in one direction; more are dropped, as by a full queue."""
@@ -92,8 +96,8 @@ class UdpLink:
         self.bytes_to_callers = 0
         """Of all packets that have arrived at callers so far."""
         self._to = ("127.0.0.1", to_port)
-        self._towards_listener = _Line(Direction(self.impairment, seed))
-        self._towards_callers = _Line(Direction(self.impairment, seed + 1))
+        self._towards_listener = Line[_Sent](Direction(self.impairment, seed))
+        self._towards_callers = Line[_Sent](Direction(self.impairment, seed + 1))
         self._front = _socket(at)
         self.port: int = self._front.getsockname()[1]
         self._backs: dict[tuple[str, int], socket.socket] = {}
@@ -123,8 +127,9 @@ class UdpLink:
             self._front.sendto(packet, caller)
 
     def _run(self) -> None:
+        lines = self._towards_listener, self._towards_callers
         while True:
-            for key, _ in self._selector.select(self._next_arrival_in_s()):
+            for key, _ in self._selector.select(next_arrival_in_s(*lines)):
                 if key.fileobj is self._stop_here:
                     return
                 if key.fileobj is self._front:
@@ -138,11 +143,6 @@ class UdpLink:
                 self.bytes_to_callers += len(packet)
                 sender.sendto(packet, caller)
 
-    def _next_arrival_in_s(self) -> float | None:
-        lines = (self._towards_listener, self._towards_callers)
-        next_s = min((line.next_s for line in lines if line.next_s is not None), default=None)
-        return None if next_s is None else max(0.0, next_s - time.monotonic())
-
     def _from_caller(self) -> None:
         packet, caller = self._front.recvfrom(_LONGEST_PACKET)
         if caller not in self._backs:
@@ -150,38 +150,47 @@ class UdpLink:
                 return
             self._backs[caller] = _socket()
             self._selector.register(self._backs[caller], selectors.EVENT_READ, caller)
-        self._towards_listener.send(self._backs[caller], packet, self._to)
+        self._towards_listener.send(packet, (self._backs[caller], packet, self._to))
 
     def _from_listener(self, caller: tuple[str, int]) -> None:
         packet = self._backs[caller].recv(_LONGEST_PACKET)
-        self._towards_callers.send(self._front, packet, caller)
+        self._towards_callers.send(packet, (self._front, packet, caller))
 
 
-class _Line:
-    """The packets that are on their way in one direction, in order."""
+class Line(Generic[ItemT]):
+    """What is on its way in one direction of a link, in order.
+
+    Args:
+        direction: what becomes of each packet.
+    """
 
     def __init__(self, direction: Direction) -> None:
         self._direction = direction
-        self._waiting: deque[tuple[float, socket.socket, bytes, tuple[str, int]]] = deque()
+        self._waiting: deque[tuple[float, ItemT]] = deque()
 
     @property
     def next_s(self) -> float | None:
-        """When the next packet arrives."""
+        """When the next one arrives."""
         return self._waiting[0][0] if self._waiting else None
 
-    def send(self, sender: socket.socket, packet: bytes, to: tuple[str, int]) -> None:
-        """Takes a packet, unless it is lost."""
+    def send(self, packet: bytes, item: ItemT) -> None:
+        """Takes the item that stands for a packet, unless the packet is lost."""
         arrival_s = self._direction.arrival_s(packet, time.monotonic())
         if arrival_s is not None and len(self._waiting) < _MAX_WAITING:
-            self._waiting.append((arrival_s, sender, packet, to))
+            self._waiting.append((arrival_s, item))
 
-    def arrived(self, now_s: float) -> list[tuple[socket.socket, bytes, tuple[str, int]]]:
-        """Removes and returns the packets that have arrived: with the socket and address to send them on."""
+    def arrived(self, now_s: float) -> list[ItemT]:
+        """Removes and returns what has arrived."""
         found = []
         while self._waiting and self._waiting[0][0] <= now_s:
-            _, sender, packet, to = self._waiting.popleft()
-            found.append((sender, packet, to))
+            found.append(self._waiting.popleft()[1])
         return found
+
+
+def next_arrival_in_s(*lines: Line[ItemT]) -> float | None:
+    """Returns in how many seconds something arrives on one of the lines; None while nothing is on its way."""
+    next_s = min((line.next_s for line in lines if line.next_s is not None), default=None)
+    return None if next_s is None else max(0.0, next_s - time.monotonic())
 
 
 def _socket(at: tuple[str, int] = ("127.0.0.1", 0)) -> socket.socket:

@@ -7,49 +7,41 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from console.client import AsyncGatewayClient, Credentials, DriveInhibit, GatewayError, NotAllowed
+from console.client import AsyncGatewayClient, Credentials, DriveInhibit, NotAllowed
 from console.robots.login import parse_login
 from gateway.access.credential import Kind
 from gateway.access.credential_admin import CredentialRequest
 from gateway.access.role import Role
 from tests.support.bad_links import Relay
-from tests.support.driven_robot import BY_EYE, DrivenRobot, driven_robot, in_motion
+from tests.support.driven_robot import (
+    BY_EYE,
+    DrivenRobot,
+    available,
+    driven_base,
+    driven_robot,
+    in_motion,
+    stop_by,
+)
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.promise import keeps_async
-from tests.support.running_drive import Base, listening_base, running_drive
+from tests.support.running_drive import Base
 
 pytestmark = [pytest.mark.ros, pytest.mark.timed]
 ROOT = Path(__file__).parents[4]
 SPEED_MPS = 0.1
+FROZEN_S = 0.3
 QUIET_S = 0.7
 """Longer than any motion may last after a fault."""
 WATCHERS, STOPS = 100, 60
-
-
-@asynccontextmanager
-async def available(robot: DrivenRobot) -> AsyncIterator[AsyncGatewayClient]:
-    """A client of a robot that is not stopped."""
-    async with AsyncGatewayClient(robot.target) as client:
-
-        async def free() -> bool:
-            teleop = (await client.status()).teleop
-            if teleop.stop:
-                try:
-                    await client.reset_stop(teleop.stop.stop_id)
-                except GatewayError:
-                    return False
-            return not teleop.holder and not teleop.stop
-
-        await eventually(free, bool, "the robot is free")
-        yield client
+THAWS = 3
 
 
 @contextmanager
@@ -69,14 +61,21 @@ def program(module: str, *arguments: str, says: str) -> Iterator["subprocess.Pop
             process.stdout.close()
 
 
-async def stopped_after_s(robot: DrivenRobot, target: str, fault: Callable[[int], object]) -> float:
-    """How long the base moves after a fault, which gets the driver's process ID."""
+async def stopped_after_s(
+    robot: DrivenRobot,
+    target: str,
+    fault: Callable[[int], object],
+    recovery: Callable[[int], object] = lambda _: None,
+) -> float:
+    """How long the base moves after a fault, also if the fault ends; both get the driver's process ID."""
     async with available(robot):
         pass
     with program("tests.support.driver_program", target, says="driving") as process:
         await eventually(lambda: moves(robot), bool, "the base moves")
         began_s = time.monotonic()
         fault(process.pid)
+        await asyncio.sleep(FROZEN_S)
+        recovery(process.pid)
         await asyncio.sleep(QUIET_S)
         assert not await moves(robot), "the last message is zero"
         return robot.base.stopped_after_s(began_s)
@@ -117,6 +116,21 @@ async def test_a_frozen_client_stops_within_280_ms(robot: DrivenRobot) -> None:
     )
 
 
+async def test_a_client_that_thaws_moves_nothing_until_its_driver_releases(robot: DrivenRobot) -> None:
+    """Its program goes on holding, as the window of a laptop that was suspended with a key down."""
+    for _ in range(THAWS):
+        await keeps_async(
+            0.28,
+            "s of motion after the client was frozen for a moment",
+            lambda: stopped_after_s(
+                robot,
+                robot.target,
+                lambda pid: os.kill(pid, signal.SIGSTOP),
+                lambda pid: os.kill(pid, signal.SIGCONT),
+            ),
+        )
+
+
 async def test_two_lost_lanes_stop_within_280_ms(robot: DrivenRobot) -> None:
     async def measure() -> float:
         with Relay(robot.gateway.port) as relay:
@@ -126,10 +140,12 @@ async def test_two_lost_lanes_stop_within_280_ms(robot: DrivenRobot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "promised_s"), [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28)], ids=["killed", "frozen"]
+    ("number", "promised_s"),
+    [(signal.SIGKILL, 0.06), (signal.SIGSTOP, 0.28), (signal.SIGTERM, 0.28)],
+    ids=["killed", "frozen", "ended"],
 )
 async def test_a_lost_gateway_stops_in_time(
-    domain: int,  # noqa: ARG001  # for its effect
+    ros_domain: int,  # noqa: ARG001  # for its effect
     tmp_path: Path,
     number: signal.Signals,
     promised_s: float,
@@ -154,24 +170,18 @@ async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRob
     async def measure() -> float:
         async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
             with program("tests.support.status_siege", robot.target, str(WATCHERS), says="ready"):
-                took_s = []
-                for number in range(STOPS):
-                    began_s = time.monotonic()
-                    stopped = await viewer.stop_robot(str(number))
-                    took_s.append(time.monotonic() - began_s)
-                    await operator.reset_stop(stopped.stop.stop_id)
+                took_s = [max(await stop_by(viewer, operator, robot.base)) for _ in range(STOPS)]
         return statistics.quantiles(took_s, n=100)[98]
 
-    await keeps_async(0.05, "s at the 99th percentile of StopRobot", measure)
+    await keeps_async(0.05, "s at the 99th percentile until the base has zero, and the viewer knows", measure)
 
 
-async def test_a_revoked_driver_stops_within_1_1_s(domain: int, tmp_path: Path) -> None:  # noqa: ARG001
+async def test_a_revoked_driver_stops_within_1_1_s(ros_domain: int, tmp_path: Path) -> None:  # noqa: ARG001
     async def measure() -> float:
         with TemporaryDirectory(dir=tmp_path) as name:
             directory = Path(name)
             with (
-                listening_base() as base,
-                running_drive(directory) as drive,
+                driven_base(directory) as (base, drive),
                 guarded_program(
                     directory, directory, teleop={"socket": str(drive.socket), "line_of_sight": True}
                 ) as robot,

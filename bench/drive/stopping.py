@@ -1,0 +1,163 @@
+"""How long the base moves after a fault: behind the multiplexer, until a zero that no motion follows.
+
+Each round has a gateway and a driver of its own.
+"""
+
+import asyncio
+import signal
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from bench.drive.ground import Driver, Ground, driver, link
+from bench.processes import program
+from bench.progress import log
+from bench.rows import FEWEST_ROUNDS, Row
+from console.client import AsyncGatewayClient
+from tests.support.driven_robot import DrivenRobot, available, stop_by
+from tests.support.tcp_link import TcpLink
+from tests.support.waiting import wait_until
+
+ROUNDS: Final = FEWEST_ROUNDS
+QUIET_S: Final = 0.8
+"""Longer than any motion may last after a fault."""
+STOPS: Final = 200
+WATCHERS: Final = 100
+LOSS: Final = 0.03
+LOSSY_STOPS: Final = 400
+"""Both copies of a stop are lost in 0.09 % of the cases: the percentile leaves room for three of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Round:
+    robot: DrivenRobot
+    driver: Driver
+    link: TcpLink | None
+
+
+def _release(it: _Round) -> float:
+    return float(it.driver.ask("release")) / 1e9
+
+
+def _kill_driver(it: _Round) -> float:
+    began_s = time.monotonic()
+    it.driver.process.kill()
+    return began_s
+
+
+def _cut(it: _Round) -> float:
+    assert it.link
+    began_s = time.monotonic()
+    it.link.cut()
+    return began_s
+
+
+def _signal_gateway(number: signal.Signals) -> Callable[[_Round], float]:
+    def send(it: _Round) -> float:
+        began_s = time.monotonic()
+        it.robot.gateway.process.send_signal(number)
+        return began_s
+
+    return send
+
+
+@dataclass(frozen=True, slots=True)
+class _Fault:
+    """What happens, and the promise.
+
+    Args:
+        happens: has it happen; returns when, in s of CLOCK_MONOTONIC.
+        far: whether the driver is behind a link.
+    """
+
+    what: str
+    happens: Callable[[_Round], float]
+    bar_ms: float
+    far: bool = False
+
+
+FAULTS: Final[Mapping[str, _Fault]] = {
+    "release": _Fault("the driver releases", _release, 60),
+    "client_killed": _Fault("the driver's program is killed", _kill_driver, 100),
+    "cable_cut": _Fault("the network is cut, round trip 20 ms", _cut, 280, far=True),
+    "gateway_killed": _Fault("the gateway is killed", _signal_gateway(signal.SIGKILL), 60),
+    "gateway_frozen": _Fault("the gateway is frozen", _signal_gateway(signal.SIGSTOP), 280),
+}
+
+
+def rows(ground: Ground, wanted: set[str]) -> list[Row]:
+    made = []
+    for name, fault in FAULTS.items():
+        if f"drive.stop_{name}_ms" in wanted:
+            values = [stopped_ms(ground, fault) for _ in range(ROUNDS)]
+            what = f"{fault.what}: until the base has zero"
+            made.append(_row(name, what, values, fault.bar_ms))
+    if "drive.stop_viewer_ms" in wanted:
+        what = (
+            f"StopRobot by a viewer beside {WATCHERS} watchers and one that floods: until the base has zero"
+            f" and the viewer knows, 99th percentile of {STOPS}"
+        )
+        made.append(_row("viewer", what, [viewer_ms(ground) for _ in range(ROUNDS)], 50))
+    if "drive.stop_viewer_lossy_ms" in wanted:
+        what = (
+            f"the same without them, {LOSS:.0%} loss both ways, round trip 20 ms: until the base has zero,"
+            f" 99th percentile of {LOSSY_STOPS}"
+        )
+        values = [viewer_lossy_ms(ground, seed) for seed in range(1, ROUNDS + 1)]
+        made.append(_row("viewer_lossy", what, values, 150))
+    return made
+
+
+def stopped_ms(ground: Ground, fault: _Fault) -> float:
+    """Returns how long the base moves after a fault, in ms."""
+    with ground.robot() as robot:
+        if not fault.far:
+            return _stopped_ms(robot, fault, robot.target, None)
+        with link(robot) as far:
+            return _stopped_ms(robot, fault, far.target, far)
+
+
+def _stopped_ms(robot: DrivenRobot, fault: _Fault, target: str, far: TcpLink | None) -> float:
+    with driver(target, "--stay") as hands:
+        wait_until(lambda: robot.base.moves, "the base moves")
+        began_s = fault.happens(_Round(robot, hands, far))
+        time.sleep(QUIET_S)
+        took_ms = robot.base.stopped_after_s(began_s) * 1000
+        # What was frozen, or waits for packets, could not end.
+        robot.gateway.process.send_signal(signal.SIGCONT)
+        hands.process.kill()
+    log(f"{fault.what}: {took_ms:.1f} ms")
+    return took_ms
+
+
+def viewer_ms(ground: Ground, stops: int = STOPS, watchers: int = WATCHERS) -> float:
+    """Returns the 99th percentile of the time until the base has zero and the viewer knows."""
+    with ground.robot() as robot, program("tests.support.status_siege", robot.target, str(watchers)) as siege:
+        took = asyncio.run(_stops(robot, robot.target, stops))
+        siege.kill()
+    return _percentile_ms("StopRobot under siege", [max(each) for each in took])
+
+
+def viewer_lossy_ms(ground: Ground, seed: int, stops: int = LOSSY_STOPS) -> float:
+    """Returns the 99th percentile of the time until the base has zero, over a link that loses packets."""
+    with ground.robot() as robot, link(robot, LOSS, seed) as far:
+        took = asyncio.run(_stops(robot, far.target, stops))
+    _percentile_ms(f"StopRobot with {LOSS:.0%} loss, until the answer", [each[1] for each in took])
+    return _percentile_ms(f"StopRobot with {LOSS:.0%} loss, at the base", [each[0] for each in took])
+
+
+async def _stops(robot: DrivenRobot, target: str, count: int) -> list[tuple[float, float]]:
+    async with available(robot) as operator, AsyncGatewayClient(target) as viewer:
+        return [await stop_by(viewer, operator, robot.base) for _ in range(count)]
+
+
+def _percentile_ms(what: str, took_s: list[float]) -> float:
+    found = statistics.quantiles(took_s, n=100)[98] * 1000
+    log(f"{what}: median {statistics.median(took_s) * 1000:.1f}, 99 % {found:.1f} ms")
+    return found
+
+
+def _row(name: str, what: str, values: list[float], bar_ms: float) -> Row:
+    return Row(name=f"drive.stop_{name}_ms", what=what, unit="ms", values=values, bar=bar_ms, judged="worst")
