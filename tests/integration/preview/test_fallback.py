@@ -235,6 +235,7 @@ def keeps_the_outage(tmp_path: Path, scenario: Callable[[Path], float]) -> None:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_an_encoder_that_takes_the_process_with_it_is_not_used_again(tmp_path: Path) -> None:
     keeps_the_outage(tmp_path, crashes_the_process)
 
