@@ -1,8 +1,9 @@
 """Which tests run at the same time, and in which order.
 
-pytest-xdist's workers get whole files, the longest first. Files that share the containers of `_shared_demo`
-(tests/e2e/containers/conftest.py) are one unit. What starts a whole robot with video or in containers, and
-measures time, gets the mark `alone`: it takes all processors.
+pytest-xdist's workers get whole files, the longest first. The files of tests/e2e/containers are two units,
+those that share the containers of `_shared_demo` (its conftest.py) and the others, because the start of a
+deployment takes all processors. What starts a whole robot with video or in containers, and measures time,
+gets the mark `alone` for the same reason.
 """
 
 from typing import Any, Final
@@ -10,24 +11,23 @@ from typing import Any, Final
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
+_CONTAINERS: Final = "tests/e2e/containers/"
 _SHARING: Final = tuple(
-    f"tests/e2e/containers/test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
+    f"{_CONTAINERS}test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
 )
 LONGEST: Final = (
     *_SHARING,
-    "tests/e2e/test_demo.py",
+    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
     "tests/integration/drive/test_doubt.py",
     "tests/integration/preview/test_fallback.py",
-    "tests/e2e/containers/test_guarded.py",
+    "tests/e2e/test_demo.py",
     "tests/integration/fuzz/test_fuzz.py",
     "tests/integration/monitor/test_with_a_robot.py",
     "tests/integration/ros/test_seen_by_operators.py",
     "tests/integration/drive/test_stopping.py",
-    "tests/e2e/containers/test_on_the_robot.py",
     "tests/integration/preview/test_service.py",
     "tests/integration/monitor/test_cockpit.py",
     "tests/integration/console/test_client.py",
-    "tests/e2e/containers/test_bad_ground.py",
     "tests/integration/console/test_documented_commands.py",
     "tests/contract/test_operator_contract.py",
     "tests/integration/simrobot/test_program.py",
@@ -55,10 +55,7 @@ LONGEST: Final = (
     "tests/integration/viewer/test_decoders.py",
     "tests/integration/preview/test_program.py",
 )
-"""Files of more than 10 s, the longest first: one that a worker began late would leave the others idle.
-
-The deployments begin one after the other, because each start takes all processors.
-"""
+"""Files of more than 10 s, the longest first: one that a worker began late would leave the others idle."""
 _RANKS: Final = {file: rank for rank, file in enumerate(LONGEST)}
 
 
@@ -82,7 +79,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
     def _split_scope(self, nodeid: str) -> str:
         file = _file_of(nodeid)
-        return _SHARING[0] if file in _SHARING else file
+        if file in _SHARING:
+            return _SHARING[0]
+        return _CONTAINERS if file.startswith(_CONTAINERS) else file
 
 
 def _file_of(nodeid: str) -> str:
