@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,9 @@ def imports_below(package: str) -> Iterator[Import]:
                         yield Import(file, node.lineno, f"{module}.{name.name}")
 
 
-ALL = [found for package in OURS for found in imports_below(package)]
+@cache
+def imports() -> tuple[Import, ...]:
+    return tuple(found for package in OURS for found in imports_below(package))
 
 
 def is_within(module: str, prefix: str) -> bool:
@@ -45,7 +48,7 @@ def is_within(module: str, prefix: str) -> bool:
 def offenders(importer: str, forbidden: tuple[str, ...]) -> list[str]:
     return [
         f"{found.importer}:{found.line} imports {found.module}"
-        for found in ALL
+        for found in imports()
         if found.importer.startswith(importer) and any(is_within(found.module, bad) for bad in forbidden)
     ]
 
@@ -127,7 +130,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
     ],
 )
 def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) -> None:
-    assert any(found.importer.startswith(importer) for found in ALL), f"nothing is left of {importer}"
+    assert any(found.importer.startswith(importer) for found in imports()), f"nothing is left of {importer}"
     assert not offenders(importer, forbidden)
 
 
@@ -162,7 +165,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
 def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:
     strangers = [
         f"{found.importer}:{found.line}"
-        for found in ALL
+        for found in imports()
         if is_within(found.module, library) and not found.importer.startswith(homes)
     ]
     assert not strangers
@@ -172,7 +175,7 @@ def test_the_gateways_packages_do_not_import_each_other_in_circles() -> None:
     modules = {str(path.relative_to(ROOT)) for path in (ROOT / "gateway").rglob("*.py")}
     packages = {str(Path(file).parent) for file in modules}
     imported: dict[str, set[str]] = {package: set() for package in packages}
-    for found in ALL:
+    for found in imports():
         path = found.module.replace(".", "/")
         home = path if path in packages else str(Path(path).parent)
         if found.importer in modules and home in packages and f"{path}.py" in modules:
@@ -188,4 +191,4 @@ def test_the_gateways_packages_do_not_import_each_other_in_circles() -> None:
 def test_the_fence_sees_what_it_should() -> None:
     """A fence that reads no imports would let everybody through."""
     assert offenders("common/gst.py", ("gi",))
-    assert len({found.importer for found in ALL}) > 20
+    assert len({found.importer for found in imports()}) > 20

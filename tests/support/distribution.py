@@ -1,6 +1,9 @@
-"""How pytest-xdist spreads the tests over its workers: a file stays together, the longest files go first.
+"""Which tests run at the same time, and in which order.
 
-Files that share the containers of `_shared_demo` (tests/e2e/containers/conftest.py) are one unit.
+pytest-xdist's workers get whole files, the longest first. The files of tests/e2e/containers are two units,
+those that share the containers of `_shared_demo` (its conftest.py) and the others, because the start of a
+deployment takes all processors. What starts a whole robot with video or in containers, and measures time,
+gets the mark `alone` for the same reason.
 """
 
 from typing import Any, Final
@@ -8,34 +11,62 @@ from typing import Any, Final
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
+_CONTAINERS: Final = "tests/e2e/containers/"
 _SHARING: Final = tuple(
-    f"tests/e2e/containers/test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
+    f"{_CONTAINERS}test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
 )
-_LONGEST: Final = (
-    "tests/e2e/test_demo.py",
+LONGEST: Final = (
     *_SHARING,
-    *(f"tests/e2e/containers/test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
-    *(f"tests/integration/preview/test_{name}.py" for name in ("listener", "encrypted", "sources")),
-    "tests/integration/console/test_client.py",
-    "tests/integration/viewer/test_session.py",
-    "tests/integration/gateway/test_hostile_callers.py",
-    *(f"tests/integration/viewer/test_{name}.py" for name in ("window", "decoders", "command")),
-    "tests/e2e/test_install_console.py",
-    *(
-        f"tests/integration/ros/test_{name}.py"
-        for name in ("told_to_operators", "freshness", "no_harm", "rates")
-    ),
-    *(f"tests/integration/preview/test_{name}.py" for name in ("program", "fallback", "service")),
-    "tests/integration/access/test_takes_effect.py",
-    "tests/integration/monitor/test_with_a_robot.py",
+    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
+    "tests/integration/drive/test_doubt.py",
+    "tests/integration/preview/test_fallback.py",
+    "tests/e2e/test_demo.py",
     "tests/integration/fuzz/test_fuzz.py",
+    "tests/integration/monitor/test_with_a_robot.py",
+    "tests/integration/ros/test_seen_by_operators.py",
+    "tests/integration/drive/test_stopping.py",
+    "tests/integration/preview/test_service.py",
+    "tests/integration/monitor/test_cockpit.py",
+    "tests/integration/console/test_client.py",
+    "tests/integration/console/test_documented_commands.py",
+    "tests/contract/test_operator_contract.py",
+    "tests/integration/simrobot/test_program.py",
+    "tests/integration/monitor/test_sizes.py",
+    "tests/integration/access/test_takes_effect.py",
+    "tests/e2e/test_install_console.py",
+    *(f"tests/integration/preview/test_{name}.py" for name in ("adaptive_link", "listener", "sources")),
+    "tests/integration/viewer/test_session.py",
+    "tests/contract/test_schema_guard.py",
+    "tests/integration/gateway/teleop/test_stopping.py",
+    "tests/integration/receiver/test_direct.py",
+    "tests/integration/ros/test_environment.py",
+    "tests/integration/gateway/test_hostile_callers.py",
+    "tests/integration/drive/test_stop_input.py",
+    "tests/integration/drive/test_commands.py",
+    "tests/integration/monitor/test_hands_on.py",
+    "tests/integration/ros/test_no_harm.py",
+    "tests/integration/gateway/test_shares.py",
+    "tests/integration/ros/test_rates.py",
+    "tests/integration/viewer/test_picture_age.py",
+    "tests/integration/console/test_discovery.py",
+    "tests/contract/test_lock_files.py",
+    "tests/integration/monitor/test_guarded.py",
+    "tests/integration/ros/test_freshness.py",
+    "tests/integration/viewer/test_decoders.py",
+    "tests/integration/preview/test_program.py",
 )
-"""Files of more than 20 s, the longest first: one that a worker began late would leave the others idle."""
-_RANKS: Final = {file: rank for rank, file in enumerate(_LONGEST)}
+"""Files of more than 10 s, the longest first: one that a worker began late would leave the others idle."""
+_RANKS: Final = {file: rank for rank, file in enumerate(LONGEST)}
 
 
+# First, because pytest selects by marks in the same hook.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts the longest files first."""
+    """Marks what runs alone, and puts the longest files first."""
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()}
+        if "timed" in marks and ("docker" in marks or {"ros", "gst"} <= marks):
+            item.add_marker(pytest.mark.alone)
     items.sort(key=lambda item: _RANKS.get(_file_of(item.nodeid), len(_RANKS)))
 
 
@@ -48,7 +79,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
     def _split_scope(self, nodeid: str) -> str:
         file = _file_of(nodeid)
-        return _SHARING[0] if file in _SHARING else file
+        if file in _SHARING:
+            return _SHARING[0]
+        return _CONTAINERS if file.startswith(_CONTAINERS) else file
 
 
 def _file_of(nodeid: str) -> str:

@@ -145,11 +145,12 @@ class RunningPreview:
             call.cancel()
         raise AssertionError(f"not within {within_s:g} s: {what}; last: {last}")
 
-    def running(self, *, revision: int | None = None) -> pb.ActualState:
+    def running(self, *, revision: int | None = None, within_s: float = PATIENCE_S) -> pb.ActualState:
         """Waits until frames flow."""
         return self.wait_for(
             lambda a: a.state == pb.LIFECYCLE_STATE_RUNNING and a.applied_revision >= (revision or 0),
             "running",
+            within_s,
         )
 
     def disabled(self) -> pb.ActualState:

@@ -156,6 +156,7 @@ async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 async def test_a_change_of_the_credentials_is_in_force_within_a_second(tmp_path: Path) -> None:
     async with guarded_gateway(new_robot(tmp_path)) as robot:
         calls = stub(robot)

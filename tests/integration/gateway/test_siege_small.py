@@ -9,7 +9,7 @@ from bench.siege.judgement import MEMORY_MIB, REVOCATION_S
 from bench.siege.rounds import Outcome, besiege
 from bench.siege.size import SMALL
 
-pytestmark = pytest.mark.timed
+pytestmark = [pytest.mark.timed, pytest.mark.alone]
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from tests.support.promise import keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 
-pytestmark = [pytest.mark.gst, pytest.mark.timed]
+pytestmark = [pytest.mark.gst, pytest.mark.timed, pytest.mark.alone]
 
 SECONDS = 3
 SWITCHES = ((pb.PROFILE_LOW_BW, 15), (pb.PROFILE_BALANCED, 30), (pb.PROFILE_LOW_BW, 15))

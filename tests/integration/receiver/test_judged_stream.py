@@ -11,7 +11,7 @@ from tests.support.promise import keeps
 from tests.support.recording import record
 from tests.support.running_preview import RunningPreview
 
-pytestmark = [pytest.mark.gst, pytest.mark.timed]
+pytestmark = [pytest.mark.gst, pytest.mark.timed, pytest.mark.alone]
 
 SECONDS = 4
 

@@ -72,6 +72,7 @@ def banner_is_on_screen(view: ViewWindow) -> bool:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_the_window_adds_less_than_one_and_a_half_frames_to_the_latency(tmp_path: Path) -> None:
     def extra_frames() -> float:
         return statistics.median(extra_latency_ms(tmp_path, rounds=3, watch_s=WATCH_S)) * FPS / 1000

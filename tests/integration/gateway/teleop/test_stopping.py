@@ -166,6 +166,7 @@ async def test_a_lost_gateway_stops_in_time(
     await keeps_async(promised_s, "s of motion after the gateway was lost", measure)
 
 
+@pytest.mark.alone
 async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRobot) -> None:
     async def measure() -> float:
         async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
