@@ -79,8 +79,7 @@ class PictureMeter:
             return
         age_ms = (now_s + offset.seconds) * _MS_PER_S - frame.capture_ns / 1e6
         own_ms = None if frame.received_s is None else (now_s - frame.received_s) * _MS_PER_S
-        error_ms = offset.error_s * _MS_PER_S
-        picture = ShownPicture(now_s, max(0.0, age_ms), error_ms, own_ms, frame.capture_ns)
+        picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:
             self._shown.append(picture)
 
@@ -98,13 +97,14 @@ class PictureMeter:
         with self._lock:
             return self._shown[-1] if self._shown else None
 
-    def captured_ns(self) -> int | None:
-        """Returns when the picture on the screen was captured, on the robot's monotonic clock.
+    def capture_ns(self) -> int | None:
+        """Returns when the picture on the screen was captured, on the robot's monotonic clock, in ns.
 
-        None without one, or while that is not known: a driver then has no picture.
+        It is what a driver's session reports of the picture (`DriveOptions.picture`). None without a picture
+        of known age.
         """
-        shown = self.latest()
-        return shown.capture_ns if shown else None
+        picture = self.latest()
+        return picture.capture_ns if picture else None
 
     def history(self) -> list[float | None]:
         """Returns the largest age in each half second of the last minute, the newest last.

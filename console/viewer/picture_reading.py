@@ -41,14 +41,14 @@ class ShownPicture:
         age_ms: from capture to the screen.
         error_ms: bound of the error of that, as it follows from Ping.
         own_ms: the part of it on this computer: from the arrival of its last packet; None if unknown.
-        capture_ns: when it was captured, on the robot's monotonic clock.
+        capture_ns: when the camera took it, on the robot's monotonic clock.
     """
 
     at_s: float
     age_ms: float
     error_ms: float
     own_ms: float | None
-    capture_ns: int = 0
+    capture_ns: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

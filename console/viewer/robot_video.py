@@ -83,7 +83,7 @@ class RobotVideo:
         return self.meter.report()
 
     def _captured(self) -> int | None:
-        return self.meter.captured_ns()
+        return self.meter.capture_ns()
 
     def _delivery(self) -> Delivery | None:
         return self.session.delivery()

@@ -43,6 +43,7 @@ def test_the_age_is_from_capture_to_shown_with_the_clocks_error(played: Played) 
     assert found.age_ms == pytest.approx(17.25, abs=1e-3)
     assert found.error_ms == pytest.approx(1.5)
     assert played.meter.robot_now_ns() == round(3700.0 * 1e9)
+    assert played.meter.capture_ns() == round(3700.0 * 1e9 - 17.25e6)
 
 
 def test_without_a_clock_or_a_capture_time_there_is_no_age(played: Played) -> None:
@@ -59,6 +60,7 @@ def test_a_picture_that_is_gone_has_no_age(played: Played) -> None:
     played.show(20)
     played.meter.forget()
     assert played.meter.reading().age_ms is None
+    assert played.meter.capture_ns() is None
 
 
 def test_the_worst_age_since_the_last_report_is_reported(played: Played) -> None:

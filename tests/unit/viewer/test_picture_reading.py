@@ -25,7 +25,7 @@ def robot(last_frame_age_ms: int | None, measured_age_ms: int = 300, fps: float 
 
 
 def shown(age_ms: float, *, since_s: float = 0.01, own_ms: float | None = 5.0) -> ShownPicture:
-    return ShownPicture(NOW_S - since_s, age_ms, 0.4, own_ms)
+    return ShownPicture(NOW_S - since_s, age_ms, 0.4, own_ms, capture_ns=1)
 
 
 def test_a_young_picture_has_no_cause() -> None:
