@@ -175,6 +175,11 @@ class DriveSession:
         return time.monotonic() - at_s if echo_ns else math.inf
 
     @property
+    def lapsed(self) -> bool:
+        """Whether a hold was not renewed in time: until a release, no other counts."""
+        return self._lapsed
+
+    @property
     def open_lanes(self) -> int:
         """Lanes that are connected."""
         return self._open_lanes

@@ -65,6 +65,7 @@ class DriverView:
         state: the robot's newest; None without a session, and before the first.
         state_age_s: time since it has arrived.
         ready: whether a hold would move the robot.
+        lapsed: whether the window was too slow to renew what it holds: until a release, no other hold counts.
         stopping: whether a stop waits for the robot's confirmation.
     """
 
@@ -74,6 +75,7 @@ class DriverView:
     state: DriveState | None = None
     state_age_s: float = 0.0
     ready: bool = False
+    lapsed: bool = False
     stopping: bool = False
 
     @property
@@ -125,6 +127,7 @@ class Driver:
             state=session.state,
             state_age_s=session.state_age_s,
             ready=session.is_ready,
+            lapsed=session.lapsed,
             stopping=stopping,
         )
 

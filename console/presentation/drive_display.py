@@ -8,22 +8,11 @@ from console.client import DrivePhase, DriveState, StopLatch, Supervision
 from console.client.driving import rest_reasons
 from console.client.results import DriveLimits, Teleop, TeleopState
 from console.presentation.formatting import joined
-from console.presentation.severity_style import SeverityStyle
+from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle
 from console.steering import permitted
 
 LATE_S: Final = 0.4
 """Silence of the robot after which it stops its driver (LOOP_LATE, docs/driving.md)."""
-STYLES: Final[Mapping[DrivePhase, SeverityStyle]] = {
-    DrivePhase.UNKNOWN: SeverityStyle.QUIET,
-    DrivePhase.DISABLED: SeverityStyle.QUIET,
-    DrivePhase.AVAILABLE: SeverityStyle.QUIET,
-    DrivePhase.ARMED: SeverityStyle.GOOD,
-    DrivePhase.DRIVING: SeverityStyle.GOOD,
-    DrivePhase.STOPPING: SeverityStyle.GOOD,
-    DrivePhase.INHIBITED: SeverityStyle.WARNING,
-    DrivePhase.STOPPED: SeverityStyle.BAD,
-}
-"""Total: a test checks it."""
 _NEXT_STEPS: Final[Mapping[DrivePhase, str]] = {
     DrivePhase.ARMED: "Hold W A S D, or the gamepad's shoulder button",
     DrivePhase.INHIBITED: "Release, then hold again",
@@ -98,7 +87,7 @@ def watched_display(teleop: Teleop, *, known: bool = True) -> DriveDisplay | Non
     return DriveDisplay(
         driver=f"{teleop.holder} drives" if teleop.holder else "No driver",
         phase=phase.value.upper(),
-        style=STYLES[phase],
+        style=DRIVE_STYLES[phase],
         reason=_sentence(rest_reasons(teleop.stop, teleop.inhibits)),
         stop=teleop.stop,
     )
@@ -125,7 +114,7 @@ def own_display(
     return DriveDisplay(
         driver=f"You drive{by}",
         phase=state.phase.value.upper(),
-        style=SeverityStyle.BAD if late else STYLES[state.phase],
+        style=SeverityStyle.BAD if late else DRIVE_STYLES[state.phase],
         reason=". ".join(filter(None, (_sentence(reason), step))),
         bars=tuple(_bars(state, limits, supervision)),
         ages=joined(

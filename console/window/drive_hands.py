@@ -2,8 +2,8 @@
 
 The release of a key that goes up while another window has the focus is never reported. So everything is
 released as soon as the window, or what has the focus in it, is left, and a key counts again only after a new
-press. The window's thread passes on what is held every 10 ms: if it hangs, the session releases after 100 ms,
-and afterwards only a new press counts.
+press. The window's thread passes on what is held every 10 ms: if it hangs, the session releases after 100 ms
+(the hold has lapsed), and afterwards only a new press counts.
 """
 
 import time
@@ -167,7 +167,7 @@ class DriveHands(QObject):
     def _pass_on(self) -> None:
         view = self._driver.view()
         self._begun = view.open and (self._begun or view.ready)
-        if not (view.open and self._counts()):
+        if view.lapsed or not (view.open and self._counts()):
             self.release()
             return
         by_pad = self.pad.steering() if self.pad else None

@@ -202,6 +202,19 @@ def test_a_window_that_hangs_drives_nothing(seat: Seat) -> None:
     assert not seat.robot.base.moves, "the key is still down, and counts only when it is pressed anew"
 
 
+def test_a_hold_that_lapses_although_the_window_goes_on_counts_when_it_is_pressed_anew(seat: Seat) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+    time.sleep(0.3)
+    seat.window.driving.hands._ticked_s = time.monotonic()  # so that the window itself notices nothing
+    until(lambda: not seat.window.driving.hands._down, "the key counts no more")
+    seat.rests()
+    seat.key(Qt.Key.Key_W, down=False)
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+
+
 def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None:
     pad = PlayedPad()
     seat.window.driving.hands.pad = pad

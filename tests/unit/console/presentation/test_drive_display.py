@@ -6,7 +6,7 @@ import pytest
 
 from console.client import DriveInhibit, DrivePhase, DriveState, StopLatch, Supervision
 from console.client.results import Teleop, TeleopState
-from console.presentation.drive_display import LATE_S, STYLES, own_display, watched_display
+from console.presentation.drive_display import LATE_S, own_display, watched_display
 from console.presentation.severity_style import SeverityStyle
 from tests.support.snapshots import snapshot
 from tests.unit.console.test_steering import LIMITS
@@ -39,10 +39,6 @@ def own(
 def teleop(**changes: object) -> Teleop:
     status = replace(snapshot().status.teleop, state=TeleopState.ENABLED, enabled=True)
     return replace(status, **changes)  # type: ignore[arg-type]
-
-
-def test_every_phase_has_a_style() -> None:
-    assert STYLES.keys() == set(DrivePhase)
 
 
 def test_the_driver_sees_speeds_limits_and_ages() -> None:
