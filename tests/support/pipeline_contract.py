@@ -33,6 +33,8 @@ class Events:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.goes_on = False
+        """Whether a pipeline goes on without its listener."""
         self.faults: list[Fault] = []
         self._changed = asyncio.Event()
 
@@ -42,6 +44,11 @@ class Events:
     def failed(self, fault: Fault) -> None:
         self.faults.append(fault)
         self._count("failed")
+
+    def listener_failed(self, fault: Fault) -> bool:
+        self.faults.append(fault)
+        self._count("listener_failed")
+        return self.goes_on
 
     def measured(self, viewers_refused: int) -> None:
         assert viewers_refused == 0
