@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("common", "gateway", "preview", "drive", "console", "simrobot")
+OURS = ("common", "gateway", "preview", "drive", "recorder", "console", "simrobot")
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,16 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
 @pytest.mark.parametrize(
     ("importer", "forbidden"),
     [
-        ("common/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("common/", ("gateway", "preview", "drive", "recorder", "console", "simrobot")),
         ("drive/", ("gateway", "preview", "console", "simrobot", "omniseer.gateway", "grpc", "asyncio")),
         ("gateway/", ("preview", "console", "simrobot")),
         ("preview/", ("gateway", "console", "simrobot", "omniseer.gateway")),
         ("console/", ("gateway", "preview", "simrobot", "omniseer.preview")),
         ("simrobot/", ("gateway", "preview", "console")),
+        ("recorder/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("recorder/values.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap", "recorder")),
+        ("recorder/intake/", (*WIRE, "omniseer", "asyncio", "mcap", "recorder.mcap", "recorder.config")),
+        ("recorder/mcap/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.config")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -128,9 +132,21 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
 @pytest.mark.parametrize(
     ("library", "homes"),
     [
-        ("rclpy", ("common/ros_node.py", "gateway/ros/", "drive/base.py", "drive/doctor", "simrobot/")),
+        (
+            "rclpy",
+            (
+                "common/ros_node.py",
+                "gateway/ros/",
+                "drive/base.py",
+                "drive/doctor",
+                "recorder/intake/",
+                "simrobot/",
+            ),
+        ),
         ("gi", ("common/gst.py",)),
         ("PySide6", ("console/window/",)),
+        ("mcap", ("recorder/mcap/",)),
+        ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/ca.py",)),
         ("yaml", ("common/config.py",)),
