@@ -79,12 +79,12 @@ class VideoTap:
         if len(self._readers) >= MAX_READERS:
             _log.warning("video tap: refused a reader, %d are connected", len(self._readers))
             return False
+        self._inform()
+        reader.inform(self._info)
         self._readers.add(reader)
         _log.info("video tap: %d readers", len(self._readers))
         if len(self._readers) == 1:
             self._supervisor.record(self)
-        self._inform()
-        reader.inform(self._info)
         self._supervisor.request_recorded_key_frame()
         return True
 

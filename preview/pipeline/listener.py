@@ -32,6 +32,7 @@ class Listener:
         on_failure: called once, on the event loop, with the first fault; not once it is being stopped.
 
     Attributes:
+        pipeline: of the two elements.
         sink: the srtsink.
     """
 
@@ -43,17 +44,17 @@ class Listener:
         self._read_fd, self._write_fd = os.pipe()
         # A full pipe, left behind by a listener that has stopped, must not block a thread of Python.
         os.set_blocking(self._write_fd, False)
-        self._pipeline = Gst.Pipeline.new("listener")
+        self.pipeline = Gst.Pipeline.new("listener")
         self._source = Gst.ElementFactory.make("fdsrc", "pipe_out")
         self.sink = Gst.ElementFactory.make("srtsink", "sink")
         self._source.set_property("fd", self._read_fd)
         self._source.set_property("blocksize", _LONGEST_READ)
         _listen(self.sink, plan)
-        self._pipeline.add(self._source)
-        self._pipeline.add(self.sink)
+        self.pipeline.add(self._source)
+        self.pipeline.add(self.sink)
         self._source.link(self.sink)
         self._limit = ViewerLimit(self.sink, plan.srt.max_viewers)
-        self._bus = self._pipeline.get_bus()
+        self._bus = self.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
 
     @property
@@ -73,7 +74,7 @@ class Listener:
         """
         self._loop.add_reader(self._bus_fd, self._read_bus)
         deadline_s = self._plan.settings.timeouts.start_s
-        pipeline = self._pipeline
+        pipeline = self.pipeline
         try:
             outcome = await in_thread(lambda: pipeline.set_state(Gst.State.PLAYING), deadline_s)
         except TimeoutError:
@@ -98,8 +99,8 @@ class Listener:
         """
         self._ended = True
         self._loop.remove_reader(self._bus_fd)
-        last = [self._pipeline]
-        del self._pipeline, self._source, self.sink, self._bus, self._limit
+        last = [self.pipeline]
+        del self.pipeline, self._source, self.sink, self._bus, self._limit
         try:
             await in_thread(lambda: stop(last[0]), self._plan.settings.timeouts.stop_s)
         except TimeoutError as error:

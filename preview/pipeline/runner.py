@@ -184,12 +184,14 @@ class Runner:
         return asyncio.create_task(work, name="stop the encoder")
 
     async def write_graph(self, path: Path) -> None:
-        """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
+        """Writes the pipeline and its listener as DOT graphs; logs a warning where that fails or takes long."""
+        pipelines = [self._parts.pipeline, *([self._listener.pipeline] if self._listener else [])]
 
         def write() -> None:
             make_own_directory(path.parent)
-            graph = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
-            path.write_text(graph, encoding="utf-8")
+            everything = Gst.DebugGraphDetails.ALL
+            graphs = [Gst.debug_bin_to_dot_data(each, everything) for each in pipelines]
+            path.write_text("".join(graphs), encoding="utf-8")
 
         try:
             await in_thread(write, _GRAPH_DEADLINE_S)
