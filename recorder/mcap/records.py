@@ -1,6 +1,10 @@
 """What the recorder's segments hold besides messages: their names, and gaps as metadata records."""
 
+from collections.abc import Iterable
 from typing import Final
+
+from mcap.data_stream import RecordBuilder
+from mcap.records import McapRecord
 
 from recorder.values import Gap, GapCause, Note
 
@@ -44,3 +48,11 @@ def gap_of_note(note: Note) -> Gap | None:
         )
     except (KeyError, ValueError):
         return None
+
+
+def bytes_of(records: Iterable[McapRecord]) -> bytes:
+    """Returns the records as they lie in a file."""
+    builder = RecordBuilder()
+    for each in records:
+        each.write(builder)
+    return bytes(builder.end())

@@ -1,6 +1,6 @@
 """One segment: messages become an MCAP file that stays readable whatever ends the program.
 
-A segment grows as NAME.mcap.part. `flush` ends the chunk and waits for the disk, so that a power failure costs
+A segment grows as NAME.mcap.part. `flush` ends the chunk and waits for the disk: a power failure costs
 at most what came later (`recorder.mcap.recovery` adds the missing index). `finish` renames it to NAME.mcap,
 which is complete and never changes again.
 """
