@@ -5,12 +5,12 @@ import secrets
 import time
 from typing import Final, Protocol
 
+from common.boot import boot_id
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
 from gateway.links.preview.control import PreviewLink
 from gateway.observer import Observer
-from gateway.platform.files import boot_id
 from gateway.rpc.interceptors.stats import Stats
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board

@@ -7,6 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from typing import Final
+
+VIDEO_TOPIC: Final = "/preview/video"
+"""Topic of the preview's video in recordings. No node publishes it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,7 @@ the end of the encapsulation header, a string has its final NUL in its length.
 """
 
 import struct
+from dataclasses import dataclass
 from typing import Final
 
 TYPE: Final = "foxglove_msgs/msg/CompressedVideo"
@@ -49,3 +50,38 @@ def _string(text: str) -> bytes:
 
 def _padding(size: int) -> bytes:
     return b"\0" * (-size % _ALIGNMENT)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A decoded message: capture time by the calendar clock, one access unit, "h264" or "h265"."""
+
+    captured_ns: int
+    unit: bytes
+    codec: str
+
+
+def decode(data: bytes) -> Frame | None:
+    """Returns a message that `encode` made; None for anything else."""
+    if data[: len(_LITTLE_ENDIAN)] != _LITTLE_ENDIAN:
+        return None
+    content = data[len(_LITTLE_ENDIAN) :]
+    try:
+        seconds, nanoseconds = _TIME.unpack_from(content)
+        _, at = _counted(content, _TIME.size)
+        unit, at = _counted(content, at + -at % _ALIGNMENT)
+        codec, _ = _counted(content, at + -at % _ALIGNMENT)
+    except (struct.error, ValueError):
+        return None
+    if codec not in (b"h264\0", b"h265\0"):
+        return None
+    return Frame(seconds * 1_000_000_000 + nanoseconds, unit, codec[:-1].decode())
+
+
+def _counted(content: bytes, at: int) -> tuple[bytes, int]:
+    """Returns the bytes that a length announces, and where they end."""
+    (size,) = _LENGTH.unpack_from(content, at)
+    begin = at + _LENGTH.size
+    if begin + size > len(content):
+        raise ValueError("it is shorter than its own lengths")
+    return content[begin : begin + size], begin + size
