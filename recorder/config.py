@@ -170,6 +170,10 @@ class RecorderSettings(Settings):
         """The one that is recorded when a caller names none."""
         return next(iter(self.presets))
 
+    def records_video(self, preset: str) -> bool:
+        """Returns whether a recording of a preset has the video unless a caller says otherwise."""
+        return self.presets[preset].video and self.video.socket is not None
+
     @property
     def ring_directory(self) -> Path:
         """Where the ring is."""

@@ -5,36 +5,24 @@ import errno
 import logging
 import time
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol, TypeVar
+from typing import Final, Protocol
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
-from common.errors import (
-    InvalidRequestError,
-    NotFoundError,
-    PreconditionError,
-    TooMuchError,
-)
+from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
-from recorder.incidents import SEVERITIES, Incidents, Rules
 from recorder.lifecycle import Event, Phase, State, step
+from recorder.requests import Live, Result, SnapshotOptions, StartOptions
+from recorder.ring_recorder import RingRecorder
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import DATA, new_id, segment_name
-from recorder.store.manifest import (
-    Copy,
-    CopyState,
-    Kind,
-    Manifest,
-    RecordingState,
-    StopReason,
-)
-from recorder.store.retention import Keepable, in_order
-from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
-from recorder.store.room import Disk, Limits, Reserve, disk_of, used_bytes
+from recorder.store.housekeeping import LEAST_ROOM, Housekeeping, Room, attempt
+from recorder.store.manifest import Copy, Kind, Manifest, RecordingState, StopReason
+from recorder.store.ring import Ring
+from recorder.store.room import Reserve
 from recorder.store.salvage import ended, salvage, whole, with_interruption
 from recorder.store.state_file import Answer, StateFile
 from recorder.values import Gap, GapCause
@@ -43,17 +31,13 @@ from recorder.writing.queue import SampleQueue
 from recorder.writing.writer import Latched, Writer
 
 _log = logging.getLogger(__name__)
-_T = TypeVar("_T")
 
-MAX_SNAPSHOTS: Final = 16
 NEWEST_ENDED: Final = 16
 _TICK_S: Final = 0.5
 _ROOM_EVERY_S: Final = 2.0
 _STOP_WAIT_S: Final = 10.0
 _AHEAD_S: Final = 5.0
 """Room is made for what the next seconds take, before it is gone."""
-_LEAST_ROOM: Final = 4 * 1024 * 1024
-"""Without so much room no recording begins, and one that runs is stopped."""
 _SHORT_S: Final = 3600.0
 _MEASURED_S: Final = 10.0
 """A shorter recording says little about what its preset takes."""
@@ -65,71 +49,15 @@ _NS_PER_MS: Final = 1_000_000
 class Sources(Protocol):
     """What takes messages and puts them into the queue."""
 
+    @property
+    def problem(self) -> str:
+        """What keeps something wanted from being recorded, for people; empty if nothing does."""
+
     def want(self, presets: frozenset[str], *, video: bool) -> None:
         """Takes the topics of these presets, and the video, from now on; everything else no longer."""
 
-
-@dataclass(frozen=True, slots=True)
-class StartOptions:
-    """What is to be recorded; see StartRecordingRequest."""
-
-    label: str = ""
-    notes: str = ""
-    preset: str = ""
-    with_video: bool | None = None
-    max_duration_s: int = 0
-    max_bytes: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class SnapshotOptions:
-    """What a snapshot is to contain; None: as configured."""
-
-    pre_s: int | None = None
-    post_s: int | None = None
-    label: str = ""
-    preset: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What came of a request: a sentence for people, and the recording."""
-
-    message: str
-    recording: Manifest | None
-
-
-@dataclass(frozen=True, slots=True)
-class Live:
-    """How far a recording has come. `lost` is None if unknown; `part` is the name of the unfinished file."""
-
-    duration_ms: int
-    messages: int
-    frames: int
-    lost: int | None
-    part: str = ""
-    part_bytes: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Room:
-    """The disk, as measured last.
-
-    Attributes:
-        bytes: that may still be written.
-    """
-
-    bytes: int = 0
-    disk: Disk = field(default=Disk(0, 0))
-
-
-@dataclass(slots=True)
-class _Snapshot:
-    """A snapshot that is being made; instants of CLOCK_MONOTONIC in ns."""
-
-    id: str
-    from_ns: int
-    until_ns: int
+    async def caught_up(self) -> None:
+        """Returns when everything that has come by now is in the queue, or after a bounded time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +100,21 @@ class Recorder:
         self._catalogue = Catalogue(settings.root)
         self._state_file = StateFile(settings.root)
         self._reserve = Reserve(settings.root)
-        self._limits = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
-        self._ring = (
-            Ring(settings.ring_directory, settings.ring.seconds) if settings.ring.preset is not None else None
-        )
         self._writer = Writer(queue, latched, self._on_failed)
+        kept = settings.ring
+        self._segments = Ring(settings.ring_directory, kept.seconds) if kept.preset else None
+        self._housekeeping = Housekeeping(settings, self._catalogue, self._segments)
+        self._ring: RingRecorder | None = None
+        if self._segments:
+            self._ring = RingRecorder(
+                settings,
+                self._segments,
+                self._catalogue,
+                self._housekeeping,
+                self._writer,
+                boot_id=boot_id,
+                run_id=run_id,
+            )
         self._loop = asyncio.get_running_loop()
         self._phase = Phase(State.RECOVERING, self._loop.time())
         self._backoff = Backoff(1.0, 30.0)
@@ -187,21 +125,9 @@ class Recorder:
         self._loaded = False
         self._running: Manifest | None = None
         self._output: Output | None = None
-        self._ring_output: Output | None = None
-        self._snapshots: list[_Snapshot] = []
-        incidents = settings.incidents
-        self._incidents = Incidents(
-            Rules(
-                incidents.enabled,
-                SEVERITIES[incidents.min_severity],
-                incidents.cooldown_s,
-                frozenset(incidents.ignore),
-            )
-        )
         self._newest = ""
         self._stopped_by_disk = False
-        self.last_error = ""
-        self.room = Room()
+        self._last_error = ""
         self._room_at_s = 0.0
         self.bytes_per_s = 0
         self._rate_from: tuple[float, int] = (0.0, 0)
@@ -212,6 +138,11 @@ class Recorder:
     def phase(self) -> Phase:
         """The lifecycle's state."""
         return self._phase
+
+    @property
+    def last_error(self) -> str:
+        """Why it can't record, or not all of what is wanted; empty when all is well."""
+        return self._last_error or self._sources.problem
 
     @property
     def running(self) -> Manifest | None:
@@ -235,6 +166,11 @@ class Recorder:
         return sorted(done, key=lambda each: each.ended_unix_ms, reverse=True)[:NEWEST_ENDED]
 
     @property
+    def room(self) -> Room:
+        """The disk, as measured last."""
+        return self._housekeeping.room
+
+    @property
     def bytes_per_minute(self) -> dict[str, int]:
         """What each preset took when it was last recorded."""
         return dict(self._state_file.bytes_per_minute)
@@ -242,17 +178,18 @@ class Recorder:
     @property
     def snapshots_pending(self) -> int:
         """Snapshots that are being made."""
-        return len(self._snapshots)
+        return self._ring.pending if self._ring else 0
 
     @property
     def ring_s(self) -> int:
         """Seconds that the ring holds."""
-        return int(self._ring.held_ns(time.monotonic_ns()) / _NS_PER_S) if self._ring else 0
+        return self._ring.held_s if self._ring else 0
 
     @property
     def ring_part_bytes(self) -> int:
         """Size of the ring's segment that is being written."""
-        return self._ring_output.progress.part_bytes if self._ring_output else 0
+        output = self._ring.output if self._ring else None
+        return output.progress.part_bytes if output else 0
 
     @property
     def dropped(self) -> int:
@@ -262,7 +199,7 @@ class Recorder:
     @property
     def lost(self) -> int | None:
         """Messages lost since the process started, where that is known."""
-        outputs = [each for each in (self._output, self._ring_output) if each]
+        outputs = self._outputs
         counts = [each.progress.lost if each.progress.numbered else None for each in outputs]
         known = [count for count in counts if count is not None]
         return None if len(known) < len(counts) else max(known, default=0)
@@ -303,7 +240,7 @@ class Recorder:
     @property
     def writes(self) -> bool:
         """Whether anything is written at present."""
-        return bool(self._output or self._ring_output)
+        return bool(self._outputs)
 
     def has(self, recording_id: str) -> bool:
         """Returns whether there is such a recording."""
@@ -366,7 +303,7 @@ class Recorder:
             return
         self._loaded = True
         self._move(event)
-        await self._measure()
+        await self._housekeeping.measure()
         await self._open_ring()
         if goes_on:
             await self._go_on(goes_on)
@@ -375,9 +312,10 @@ class Recorder:
         """Reads the disk; in a thread."""
         self._catalogue.load()
         self._state_file.load()
-        if self._ring:
-            self._ring.load()
-        goes_on = salvage(self._catalogue, self._ring.segments if self._ring else (), self._boot_id)
+        if self._segments:
+            self._segments.load()
+        ring = self._segments.segments if self._segments else ()
+        goes_on = salvage(self._catalogue, ring, self._boot_id)
         self._reserve.take()
         return goes_on
 
@@ -398,15 +336,12 @@ class Recorder:
         await self._take_happened()
         if self._phase.state is State.FAULTED and now_s >= self._retry_at_s:
             await self._retry()
-        elif self._ring and not self._ring_output and now_s >= self._retry_at_s:
+        elif now_s >= self._retry_at_s:
             await self._open_ring()
         await self._check_limits()
-        now_ns = time.monotonic_ns()
-        for snapshot in [each for each in self._snapshots if each.until_ns <= now_ns]:
-            await self._finish_snapshot(snapshot)
         if self._ring:
-            for segment in self._ring.outdated(now_ns):
-                await self._drop_from_ring(segment)
+            await self._finish_snapshots(self._ring.due())
+            await self._ring.drop_outdated()
         self._measure_rate(now_s)
         if now_s >= self._room_at_s:
             self._room_at_s = now_s + _ROOM_EVERY_S
@@ -414,19 +349,18 @@ class Recorder:
 
     async def _shut_down(self) -> None:
         await self._take_happened()
-        for snapshot in tuple(self._snapshots):
-            await self._finish_snapshot(snapshot, StopReason.SHUTDOWN)
+        if self._ring:
+            await self._finish_snapshots(self._ring.due(all_of_them=True), StopReason.SHUTDOWN)
         if self._phase.state is State.RECORDING:
             await self._end(StopReason.SHUTDOWN)
-        if self._ring_output:
-            output, self._ring_output = self._ring_output, None
-            await asyncio.wrap_future(self._writer.remove(output))
+        if self._ring:
+            await self._ring.close()
             await self._take_happened()
         self._sources.want(frozenset(), video=False)
 
     def _pause_s(self) -> float:
-        dues = [(each.until_ns - time.monotonic_ns()) / _NS_PER_S for each in self._snapshots]
-        return max(0.0, min([_TICK_S, *dues]))
+        due_s = self._ring.next_due_s if self._ring else None
+        return _TICK_S if due_s is None else max(0.0, min(_TICK_S, due_s))
 
     # --- requests ---
 
@@ -444,7 +378,7 @@ class Recorder:
             preset = options.preset or self._settings.first_preset
             with_video = self._with_video(self._known(preset), options.with_video)
             self._check_can_start()
-            await self._need_room()
+            await self._housekeeping.need_room()
             now_ns = time.time_ns()
             manifest = Manifest(
                 id=new_id(now_ns / _NS_PER_S),
@@ -464,7 +398,7 @@ class Recorder:
             self._move(Event.START)
             await self._open(manifest)
             if self._running is None:
-                raise PreconditionError(self.last_error, Reason.RECORDER_NOT_READY)
+                raise PreconditionError(self._last_error, Reason.RECORDER_NOT_READY)
             return await self._answer(
                 "StartRecording", request_id, f"recording {preset}, as {manifest.id}", self._running
             )
@@ -493,13 +427,13 @@ class Recorder:
                 raise NotFoundError("no recording runs", Reason.RECORDING_NOT_FOUND)
             manifest = self.get(recording_id) if recording_id else self._running
             assert manifest is not None, "one of both"  # noqa: S101  # for the type checker
-            snapshot = next((each for each in self._snapshots if each.id == manifest.id), None)
+            snapshots = self._ring.due(manifest.id) if self._ring else []
             message = f"{manifest.id} had ended already"
             if self._running and self._running.id == manifest.id:
                 await self._end(StopReason.REQUESTED)
                 message = f"{manifest.id} has ended"
-            elif snapshot:
-                await self._finish_snapshot(snapshot)
+            elif snapshots:
+                await self._finish_snapshots(snapshots)
                 message = f"{manifest.id} has ended"
             return await self._answer("StopRecording", request_id, message, self.get(manifest.id))
 
@@ -514,8 +448,16 @@ class Recorder:
         async with self._changing:
             if earlier := self._earlier("TriggerSnapshot", request_id):
                 return earlier
+            if options.preset:
+                self._known(options.preset)
+            if self._ring is None:
+                raise PreconditionError(
+                    "the robot keeps no ring; set ring.preset in the recorder's configuration",
+                    Reason.NO_RING,
+                )
+            await self._take_happened()
             configured = self._settings.snapshot
-            made = await self._make_snapshot(
+            made = await self._ring.snapshot(
                 Kind.SNAPSHOT,
                 configured.pre_s if options.pre_s is None else options.pre_s,
                 configured.post_s if options.post_s is None else options.post_s,
@@ -564,34 +506,12 @@ class Recorder:
     async def report_fault(self, fault_id: str, severity: int, message: str) -> str:
         """Makes an incident of a fault, if the rules want one; returns its ID, or ""."""
         async with self._changing:
-            if not self._ring or not self._incidents.wanted(fault_id, severity):
+            if self._ring is None:
                 return ""
-            now_s = self._loop.time()
-            pending = {each.id: each for each in self._snapshots}
-            if earlier := self._incidents.earlier(fault_id, now_s, pending):
-                return earlier
-            configured = self._settings.incidents
-            merged = self._pending_incident()
-            if merged:
-                merged.until_ns = time.monotonic_ns() + configured.post_s * _NS_PER_S
-                before = self.get(merged.id)
-                await self._keep(
-                    before.model_copy(update={"trigger": f"{before.trigger}; {fault_id}"[:1000]})
-                )
-                self._incidents.made(fault_id, merged.id, now_s)
-                return merged.id
-            try:
-                made = await self._make_snapshot(
-                    Kind.INCIDENT,
-                    configured.pre_s,
-                    configured.post_s,
-                    trigger=f"{fault_id}: {message}" if message else fault_id,
-                )
-            except (PreconditionError, TooMuchError) as error:
-                _log.warning("no incident of %s: %s", fault_id, error)
-                return ""
-            self._incidents.made(fault_id, made.id, now_s)
-            return made.id
+            await self._take_happened()
+            made = await self._ring.report_fault(fault_id, severity, message)
+            self._wake.set()
+            return made
 
     async def set_copy(self, recording_id: str, copy: Copy) -> None:
         """Records the state of the copy elsewhere.
@@ -617,7 +537,7 @@ class Recorder:
             at_s=time.time(),
         )
         self._state_file.remember(request_id, answer)
-        await self._try("the answer is forgotten at the next start", self._state_file.write)
+        await attempt("the answer is forgotten at the next start", self._state_file.write)
         self.changes.notify_all()
         return Result(message, recording)
 
@@ -628,13 +548,12 @@ class Recorder:
         return preset
 
     def _with_video(self, preset: str, wanted: bool | None) -> bool:
-        has_video = self._settings.video.socket is not None
-        if wanted and not has_video:
+        if wanted and self._settings.video.socket is None:
             raise PreconditionError(
                 "the robot records no video; record without it, or set video.socket in its configuration",
                 Reason.NO_VIDEO,
             )
-        return has_video and (self._settings.presets[preset].video if wanted is None else wanted)
+        return self._settings.records_video(preset) if wanted is None else wanted
 
     def _check_can_start(self) -> None:
         if self._running:
@@ -642,15 +561,10 @@ class Recorder:
                 f"recording {self._running.id} runs; stop it first", Reason.RECORDING_RUNS
             )
         if self._phase.state is not State.IDLE:
-            why = self.last_error or "recordings that were cut off are being recovered; try again in a moment"
-            raise PreconditionError(why, Reason.RECORDER_NOT_READY)
-
-    async def _need_room(self) -> None:
-        if not await self._make_room(_LEAST_ROOM):
-            raise TooMuchError(
-                "the disk has no room, and nothing on it may be deleted; copy recordings and delete some",
-                Reason.DISK_FULL,
+            why = (
+                self._last_error or "recordings that were cut off are being recovered; try again in a moment"
             )
+            raise PreconditionError(why, Reason.RECORDER_NOT_READY)
 
     # --- the running recording ---
 
@@ -690,6 +604,7 @@ class Recorder:
         if running is None or output is None:
             return
         self._move(Event.STOP)
+        await self._sources.caught_up()
         await self._keep(running.model_copy(update={"state": RecordingState.FINALISING}))
         closed = await asyncio.wrap_future(self._writer.remove(output))
         await self._take_happened()
@@ -708,7 +623,7 @@ class Recorder:
         self._running = None
         self._move(Event.CLOSED)
         self._backoff.reset()
-        self.last_error = ""
+        self._last_error = ""
         self._remember_rate(done)
         _log.info("%s has ended: %s, %d bytes", done.id, reason, done.size)
 
@@ -760,7 +675,7 @@ class Recorder:
             found = whole(folder, manifest)
             return ended(folder, found, found.state, found.stop_reason or StopReason.ERROR)
 
-        done = await self._try(f"{manifest.id} is made whole later", work)
+        done = await attempt(f"{manifest.id} is made whole later", work)
         await self._keep(done or manifest)
 
     async def _check_limits(self) -> None:
@@ -779,38 +694,18 @@ class Recorder:
     # --- the ring, snapshots ---
 
     async def _open_ring(self) -> None:
-        ring, preset = self._ring, self._settings.ring.preset
         faulted = self._phase.state in (State.FAULTED, State.RECOVERING)
-        if ring is None or preset is None or faulted or self._ring_output:
+        if self._ring is None or self._ring.output or faulted:
             return
         try:
-            for segment in await asyncio.to_thread(ring.recover):
-                await self._link_to_snapshots(segment)
+            await self._ring.open(self._on_closed)
         except OSError as error:
             self._ring_failed(error)
-            return
-        output = Output(
-            Shape(
-                ring.directory,
-                ring.name,
-                ring.next_number,
-                preset,
-                self._with_video(preset, None),
-                self._settings.segments.max_bytes,
-                SEGMENT_S,
-            ),
-            self._writer.head,
-            self._on_closed,
-        )
-        self._ring_output = output
         self._want()
-        try:
-            await asyncio.wrap_future(self._writer.add(output))
-        except OSError as error:
-            self._ring_failed(error)
 
     def _ring_failed(self, error: OSError) -> None:
-        self._ring_output = None
+        if self._ring:
+            self._ring.output = None
         self._want()
         what = f"the ring can't be written: {error.strerror}; it is tried again by itself"
         if self._phase.state is State.IDLE:
@@ -819,106 +714,15 @@ class Recorder:
             _log.error("%s", what)
             self._retry_at_s = self._loop.time() + self._backoff.next_s()
 
-    async def _drop_from_ring(self, segment: RingSegment) -> None:
-        if self._ring:
-            await self._try("a segment of the ring stays", lambda: self._drop(segment))
-
-    def _drop(self, segment: RingSegment) -> None:
-        assert self._ring, "it has the segment"  # noqa: S101  # for the type checker
-        self._ring.drop(segment)
-
-    async def _make_snapshot(
-        self, kind: Kind, pre_s: int, post_s: int, *, label: str = "", preset: str = "", trigger: str = ""
-    ) -> Manifest:
-        ring_preset = self._settings.ring.preset
-        if self._ring is None or ring_preset is None:
-            raise PreconditionError(
-                "the robot keeps no ring; set ring.preset in the recorder's configuration", Reason.NO_RING
-            )
-        if preset and self._known(preset) != ring_preset:
-            raise InvalidRequestError(f"the ring records '{ring_preset}', not '{preset}'")
-        if self._ring_output is None:
-            why = self.last_error or "the recorder is starting; try again in a moment"
-            raise PreconditionError(why, Reason.RECORDER_NOT_READY)
-        if len(self._snapshots) >= MAX_SNAPSHOTS:
-            raise TooMuchError(f"{MAX_SNAPSHOTS} snapshots are being made", Reason.TOO_MANY_SNAPSHOTS)
-        await self._need_room()
-        await self._take_happened()
-        now_ns, calendar_ns = time.monotonic_ns(), time.time_ns()
-        from_ns, until_ns = now_ns - pre_s * _NS_PER_S, now_ns + post_s * _NS_PER_S
-        manifest = Manifest(
-            id=new_id(calendar_ns / _NS_PER_S),
-            label=label,
-            kind=kind,
-            state=RecordingState.RECORDING,
-            preset=ring_preset,
-            with_video=self._with_video(ring_preset, None),
-            started_unix_ms=(calendar_ns - pre_s * _NS_PER_S) // _NS_PER_MS,
-            started_monotonic_ns=max(from_ns, 0),
-            boot_id=self._boot_id,
-            run_id=self.run_id,
-            trigger=trigger[:1000],
-            window_ns=(calendar_ns - pre_s * _NS_PER_S, calendar_ns + post_s * _NS_PER_S),
-        )
-        segments = self._ring.within(from_ns, until_ns)
-
-        def work() -> Manifest:
-            folder = self._catalogue.create(manifest)
-            linked = manifest
-            for segment in segments:
-                linked = link_next(folder, linked, segment)
-            self._catalogue.write(linked)
-            return linked
-
-        try:
-            made = await asyncio.to_thread(work)
-        except OSError as error:
-            await self._make_whole(manifest.model_copy(update={"state": RecordingState.FAULTED}))
-            raise TooMuchError(
-                f"the disk refuses the snapshot: {error.strerror}", Reason.DISK_FULL
-            ) from error
-        self._snapshots.append(_Snapshot(made.id, from_ns, until_ns))
-        self._wake.set()
-        _log.info("%s %s is being made: %s", kind, made.id, trigger or "requested")
-        return made
-
-    async def _finish_snapshot(self, snapshot: _Snapshot, reason: StopReason = StopReason.REQUESTED) -> None:
-        if self._ring_output:
-            await asyncio.wrap_future(self._writer.rotate(self._ring_output))
+    async def _finish_snapshots(
+        self, recording_ids: list[str], reason: StopReason = StopReason.REQUESTED
+    ) -> None:
+        if self._ring and recording_ids:
+            await self._sources.caught_up()
+            await self._ring.rotate()
             await self._take_happened()
-        manifest = self._catalogue.get(snapshot.id)
-        if manifest is None or snapshot not in self._snapshots:
-            return
-        firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
-        numbered = self._ring_output.progress.numbered if self._ring_output else manifest.numbered
-        update: dict[str, Any] = {
-            "ended_unix_ms": time.time_ns() // _NS_PER_MS,
-            "ended_monotonic_ns": time.monotonic_ns(),
-            "numbered": numbered,
-        }
-        if firsts:
-            began_ms = min(firsts) // _NS_PER_MS
-            update["started_unix_ms"] = began_ms
-            length_ns = (update["ended_unix_ms"] - began_ms) * _NS_PER_MS
-            update["started_monotonic_ns"] = max(update["ended_monotonic_ns"] - length_ns, 0)
-        done = manifest.model_copy(update=update)
-        folder = self._catalogue.folder_of(done)
-        complete = await self._try(
-            f"{done.id} is made whole later", lambda: ended(folder, done, RecordingState.COMPLETE, reason)
-        )
-        await self._keep(
-            complete
-            or done.model_copy(update={"state": RecordingState.FAULTED, "stop_reason": StopReason.DISK})
-        )
-        self._snapshots.remove(snapshot)
-        _log.info("%s is complete: %d segments", done.id, len(done.segments))
-
-    def _pending_incident(self) -> _Snapshot | None:
-        for snapshot in self._snapshots:
-            manifest = self._catalogue.get(snapshot.id)
-            if manifest and manifest.kind is Kind.INCIDENT:
-                return snapshot
-        return None
+            for each in recording_ids:
+                await self._ring.finish(each, reason)
 
     # --- what the writer's thread reports ---
 
@@ -937,36 +741,19 @@ class Recorder:
             match self._happened.popleft():
                 case _Failed(output, error) if output is self._output:
                     await self._recording_failed(error)
-                case _Failed(output, error) if output is self._ring_output:
+                case _Failed(output, error) if self._ring and output is self._ring.output:
                     self._ring_failed(error)
                 case (output, closed) if output is self._output and self._running:
                     name = segment_name(closed.number)
                     await self._keep(self._running.with_segment(name, closed.summary))
-                case (_, closed) if self._ring and closed.path.parent == self._ring.directory:
-                    await self._add_to_ring(self._ring, closed)
-
-    async def _add_to_ring(self, ring: Ring, closed: Closed) -> None:
-        segment = RingSegment(closed.number, closed.began_ns, closed.ended_ns, closed.summary)
-        ring.add(segment)
-        await self._link_to_snapshots(segment)
-
-    async def _link_to_snapshots(self, segment: RingSegment) -> None:
-        for snapshot in self._snapshots:
-            manifest = self._catalogue.get(snapshot.id)
-            if manifest and segment.overlaps(snapshot.from_ns, snapshot.until_ns):
-                folder = self._catalogue.folder_of(manifest)
-                linked = await self._try(
-                    f"{manifest.id} lacks a segment",
-                    lambda folder=folder, manifest=manifest: link_next(folder, manifest, segment),  # type: ignore[misc]
-                )
-                if linked:
-                    await self._keep(linked)
+                case (_, closed) if self._ring and closed.path.parent == self._settings.ring_directory:
+                    await self._ring.take(closed)
 
     # --- faults, room, rates ---
 
     def _fault(self, text: str) -> None:
         _log.error("%s", text)
-        self.last_error = text
+        self._last_error = text
         self._move(Event.FAILURE)
         self._retry_at_s = self._loop.time() + self._backoff.next_s()
 
@@ -976,7 +763,7 @@ class Recorder:
             await self._begin()
             return
         try:
-            await self._make_room(_LEAST_ROOM)
+            await self._housekeeping.make_room(LEAST_ROOM)
             await asyncio.to_thread(self._reserve.take)
         except OSError as error:
             self._fault(f"the disk can't be written: {error.strerror}; make room or check it")
@@ -985,73 +772,24 @@ class Recorder:
             if manifest.state is RecordingState.FAULTED and manifest.metadata is None:
                 await self._make_whole(manifest)
         self._move(Event.CLEARED)
-        self.last_error = ""
+        self._last_error = ""
         self._stopped_by_disk = False
         _log.info("the disk takes data again")
         await self._open_ring()
 
     async def _keep_room(self) -> None:
-        await self._measure()
-        need = max(_LEAST_ROOM, int(self.bytes_per_s * _AHEAD_S))
-        writes = self._output or self._ring_output
-        if not writes or self.room.bytes >= need or await self._make_room(need):
+        await self._housekeeping.measure()
+        need = max(LEAST_ROOM, int(self.bytes_per_s * _AHEAD_S))
+        if not self.writes or self.room.bytes >= need or await self._housekeeping.make_room(need):
             return
         if self._phase.state is State.RECORDING:
             await self._end(StopReason.DISK)
             self._stopped_by_disk = True
-            self.last_error = "recording was stopped: the disk has no room, and nothing on it may be deleted"
-            _log.error("%s", self.last_error)
-
-    async def _make_room(self, need: int) -> bool:
-        """Deletes in the order of retention until there is room; returns whether there is."""
-        await self._measure()
-        for each in in_order(self._keepables()):
-            if self.room.bytes >= need:
-                break
-            await self._try(f"{each.name} stays", lambda name=each.name: self._let_go(name))  # type: ignore[misc]
-            await self._measure()
-        return self.room.bytes >= need
-
-    def _keepables(self) -> list[Keepable]:
-        found = [
-            Keepable(each.path.name, each.ended_ns, ring=True)
-            for each in (self._ring.segments if self._ring else ())
-        ]
-        recordings = [
-            Keepable(
-                manifest.id,
-                manifest.ended_unix_ms,
-                open=manifest.state.open,
-                pinned=manifest.pinned,
-                to_copy=manifest.copied.outstanding,
-                copied=manifest.copied.state is CopyState.VERIFIED,
-            )
-            for manifest in self._catalogue.all.values()
-        ]
-        return found + recordings
-
-    def _let_go(self, name: str) -> None:
-        """Deletes a recording or a segment of the ring; in a thread."""
-        if manifest := self._catalogue.get(name):
-            _log.warning("deleted %s to make room", name)
-            self._catalogue.delete(manifest)
-        elif self._ring:
-            for segment in [each for each in self._ring.segments if each.path.name == name]:
-                self._ring.drop(segment)
-
-    async def _measure(self) -> None:
-        def work() -> Room:
-            disk = disk_of(self._settings.root)
-            folders = [self._settings.root]
-            if self._ring and self._settings.ring.directory:
-                folders.append(self._ring.directory)
-            used = used_bytes(folders) if self._limits.quota_bytes else 0
-            return Room(self._limits.room_bytes(used, disk), disk)
-
-        self.room = await self._try("the room on the disk is unknown", work) or self.room
+            self._last_error = "recording was stopped: the disk has no room, and nothing on it may be deleted"
+            _log.error("%s", self._last_error)
 
     def _measure_rate(self, now_s: float) -> None:
-        written = sum(each.progress.bytes for each in (self._output, self._ring_output) if each)
+        written = sum(each.progress.bytes for each in self._outputs)
         since_s, before = self._rate_from
         if written < before or now_s - since_s >= _ROOM_EVERY_S:
             if written >= before and since_s:
@@ -1060,9 +798,14 @@ class Recorder:
 
     # --- small ones ---
 
+    @property
+    def _outputs(self) -> list[Output]:
+        ring = self._ring.output if self._ring else None
+        return [each for each in (self._output, ring) if each]
+
     def _want(self) -> None:
         """Has the sources take what is recorded at present."""
-        shapes = [each.shape for each in (self._output, self._ring_output) if each]
+        shapes = [each.shape for each in self._outputs]
         presets = frozenset(shape.preset for shape in shapes)
         self._sources.want(presets, video=any(shape.with_video for shape in shapes))
 
@@ -1070,20 +813,12 @@ class Recorder:
         """Writes a manifest; where the disk refuses, the memory has it until the next change."""
         if self._running and self._running.id == manifest.id:
             self._running = manifest
-        await self._try(
+        await attempt(
             f"the manifest of {manifest.id} is not on the disk", lambda: self._catalogue.write(manifest)
         )
 
     async def _write(self, manifest: Manifest) -> None:
         await asyncio.to_thread(self._catalogue.write, manifest)
-
-    async def _try(self, otherwise: str, work: Callable[[], _T]) -> _T | None:
-        """Runs work on the disk in a thread; an error of the disk is logged with what follows from it."""
-        try:
-            return await asyncio.to_thread(work)
-        except OSError as error:
-            _log.error("%s: %s", otherwise, error)  # the text says it
-            return None
 
     def _move(self, event: Event) -> None:
         before = self._phase

@@ -18,7 +18,8 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.config import RecorderSettings
-from recorder.recorder import Recorder, Result, SnapshotOptions, StartOptions
+from recorder.recorder import Recorder
+from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
 from recorder.store.export import Content, Pace, UnreadableError, chunks
 from recorder.store.run_bundles import Bundle, RunBundles

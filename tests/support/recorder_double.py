@@ -42,12 +42,17 @@ class Source:
 
 
 class _NoSources:
+    problem = ""
+
     def __init__(self) -> None:
         self.presets: frozenset[str] = frozenset()
         self.video = False
 
     def want(self, presets: frozenset[str], *, video: bool) -> None:
         self.presets, self.video = presets, video
+
+    async def caught_up(self) -> None:
+        """Everything is in the queue as soon as it is sent."""
 
 
 class LatchedMessages:

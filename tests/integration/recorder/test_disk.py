@@ -8,7 +8,7 @@ import pytest
 
 from common.errors import PreconditionError, TooMuchError, UserError
 from recorder.lifecycle import State
-from recorder.recorder import StartOptions
+from recorder.requests import StartOptions
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Manifest, RecordingState, StopReason
 from tests.support.recorder_double import Running, Source, running_recorder
@@ -154,7 +154,7 @@ async def test_what_is_not_ours_is_neither_listed_nor_deleted(tmp_path: Path) ->
 async def test_a_second_recorder_on_the_folder_is_refused(tmp_path: Path) -> None:
     with (
         folder_lock(tmp_path),
-        pytest.raises(UserError, match="another recorder .process [0-9]+. uses the folder"),
+        pytest.raises(UserError, match=r"another recorder .process [0-9]+. uses the folder"),
         folder_lock(tmp_path),
     ):
         pass

@@ -9,7 +9,8 @@ from rosbags.rosbag2 import Reader
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.mcap.reading import messages
-from recorder.recorder import Recorder, SnapshotOptions, StartOptions
+from recorder.recorder import Recorder
+from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
 from tests.support.recorder_double import Source, channel, running_recorder
 
