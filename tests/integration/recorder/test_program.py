@@ -1,0 +1,103 @@
+"""The real program between real publishers and a real disk; other programs judge what it leaves."""
+
+import random
+import time
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.rosbag2 import Reader
+
+from omniseer.gateway.v1 import recording_pb2 as pb
+from tests.support.ros import ros_domain as ros_domain
+from tests.support.running_recorder import RecorderProgram, recorder_program
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.ros
+
+TOPIC = "/odom"
+
+
+def told(program: RecorderProgram, made: pb.Recording) -> list[int]:
+    """The numbers in the messages of a recording, by an independent reader of its final files."""
+    folder = program.root / "recordings" / made.id
+    numbers = []
+    for file in made.files:
+        if file.name.endswith(".mcap"):
+            with (folder / file.name).open("rb") as content:
+                reader = make_reader(content, decoder_factories=[DecoderFactory()])
+                for decoded in reader.iter_decoded_messages(topics=[TOPIC]):
+                    numbers.append(decoded.decoded_message.data)
+    return numbers
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> None:
+    from std_msgs.msg import Int64  # noqa: PLC0415
+
+    from tests.support.publishing import publishing  # noqa: PLC0415
+
+    with recorder_program(tmp_path) as program, publishing(TOPIC, Int64) as talker:
+        started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1", label="drive"))
+        wait_until(lambda: talker.heard, "the recorder has subscribed")
+        talker.publish(200)
+        stopped = program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
+        made = program.recording(started.recording.id)
+        assert stopped.recording.state == made.state == pb.RECORDING_STATE_COMPLETE
+        assert told(program, made) == list(range(1, 201))
+        assert made.messages_lost == 0
+        folder = program.root / "recordings" / made.id / "data"
+        assert program.stop() == 0
+    with Reader(folder) as bag:
+        assert bag.topics[TOPIC].msgtype == "std_msgs/msg/Int64"
+        assert bag.topics[TOPIC].msgcount == 200
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_killed_at_any_instant_it_goes_on_and_says_what_is_missing(tmp_path: Path) -> None:
+    from std_msgs.msg import Int64  # noqa: PLC0415
+
+    from tests.support.publishing import publishing  # noqa: PLC0415
+
+    with recorder_program(tmp_path) as program, publishing(TOPIC, Int64) as talker:
+        started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1"))
+        recording_id = started.recording.id
+        killed_s = []
+        for _ in range(2):
+            wait_until(lambda: talker.heard, "the recorder has subscribed")
+            talker.publish_for(random.uniform(0.2, 1.5))
+            program.kill()
+            killed_s.append(time.time())
+            program.start()
+            assert program.state.status.recording_id == recording_id
+        wait_until(lambda: talker.heard, "the recorder has subscribed")
+        talker.publish(10)
+        program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
+        made = program.recording(recording_id)
+        assert made.state == pb.RECORDING_STATE_COMPLETE
+        interrupted = [gap for gap in made.gaps if gap.cause == pb.RECORDING_GAP_CAUSE_INTERRUPTED]
+        assert len(interrupted) >= len(killed_s)
+        found = told(program, made)
+        assert found == sorted(set(found))
+        # What is missing was published in a gap, and no gap begins more than a second before its kill.
+        for number in set(range(1, talker.sent + 1)) - set(found):
+            at_ms = talker.sent_at_s[number] * 1000
+            assert any(gap.began_unix_ms - 1 <= at_ms <= gap.ended_unix_ms + 1000 for gap in interrupted)
+        for at_s in killed_s:
+            began_s = max(
+                gap.began_unix_ms / 1000 for gap in interrupted if gap.began_unix_ms / 1000 <= at_s
+            )
+            assert at_s - began_s <= 1.0
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_second_recorder_on_the_folder_ends_with_one_sentence(tmp_path: Path) -> None:
+    with recorder_program(tmp_path) as program:
+        other = RecorderProgram(tmp_path / "other", {"root": str(program.root)})
+        other.directory.mkdir()
+        with pytest.raises(AssertionError, match="another recorder"):
+            other.start()
+        assert other.process
+        assert other.process.wait(5) == 1
+        assert other.log.read_text(encoding="utf-8").count("\n") == 1
