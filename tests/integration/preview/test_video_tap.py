@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from bench.video import stamp
 from bench.video.camera import camera
 from bench.video.foreign import environment
-from common.video_tap import Kind, decode_object
+from common.video_tap import Header, Kind, decode_object
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.tap import MAX_READERS, MAX_WAITING_BYTES
 from recorder.values import GapCause, Sample
@@ -143,8 +143,10 @@ def test_viewers_stay_when_the_recording_ends(preview: Tapped) -> None:
 def test_every_encoded_frame_is_received_and_stamped_with_its_capture(tmp_path: Path) -> None:
     (tmp_path / "camera").mkdir()
     with camera(tmp_path / "camera") as stamping:
-        settings = {"source": {"kind": "gst", "description": stamping.source}}
-        settings["profiles"] = {"balanced": {"width_px": 1280, "height_px": 720, "bitrate_kbps": 2500}}
+        settings = {
+            "source": {"kind": "gst", "description": stamping.source},
+            "profiles": {"balanced": {"width_px": 1280, "height_px": 720, "bitrate_kbps": 2500}},
+        }
         with Tapped(tmp_path, settings) as preview, TapRecording(preview.tap) as recording:
             recording.wait_for_frames(60)
         samples, offset_ns = recording.samples, time.time_ns() - time.monotonic_ns()
@@ -183,7 +185,7 @@ def test_a_reader_that_lags_loses_frames_up_to_a_key_frame_and_the_preview_none(
         with TapRecording(preview.tap) as recording:
             while sum(len(each.data) for each in recording.samples) < 3 * MAX_WAITING_BYTES:
                 recording.wait_for_frames(5)
-        records = []
+        records = list[tuple[Header, bytes]]()
         while not records or records[-1][0].kind is not Kind.GAP:
             records.append(lagging.record())
         header, payload = lagging.record()
