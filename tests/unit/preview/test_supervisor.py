@@ -707,7 +707,7 @@ async def test_viewers_come_and_go_beside_a_recording(tmp_path: Path) -> None:
             assert state.stream
         assert preview.supervisor.apply(DesiredState(3, False)).state is State.STOPPING
         await preview.reaches(State.DISABLED)
-        (pipeline,) = preview.pipelines.built
+        assert len(preview.pipelines.built) == 1
         assert recording.interruptions == 0
 
 
