@@ -1,5 +1,6 @@
 """The video tap of the real service, read by the recorder's own client, and judged by ffmpeg."""
 
+import os
 import signal
 import socket
 import statistics
@@ -30,6 +31,7 @@ from tests.support.watcher import Watcher
 pytestmark = pytest.mark.gst
 
 FRAME_MS = 1000 / 30
+_CPU_WINDOW_S = 2.0
 LISTENING = pb.LIFECYCLE_STATE_RUNNING
 OFF = pb.LIFECYCLE_STATE_DISABLED
 TYPES = get_typestore(Stores.ROS2_JAZZY)
@@ -296,3 +298,40 @@ def test_readers_are_limited_and_have_nothing_to_say(preview: Tapped) -> None:
         with reader:
             pass
     preview.idle()
+
+
+@pytest.mark.timed
+def test_the_tap_adds_a_tenth_of_the_previews_cpu_time_at_most(tmp_path: Path) -> None:
+    settings = {
+        "source": {"kind": "gst", "description": "videotestsrc is-live=true pattern=ball"},
+        "timeouts": {"without_gateway_s": 0},
+    }
+    with Tapped(tmp_path, settings, small=False) as preview:
+        preview.enable()
+        preview.running()
+        with Watcher(preview.port) as watcher:
+            watcher.wait_for_frames(30)
+
+            def ratio() -> float:
+                ratios = []
+                for _ in range(3):
+                    without = _cpu_s(preview.process.pid)
+                    with TapRecording(preview.tap) as recording:
+                        recording.wait_for_frames(5)
+                        ratios.append(_cpu_s(preview.process.pid) / without)
+                print(f"CPU with the tap against without: {ratios}")
+                return statistics.median(ratios)
+
+            keeps(1.1, "CPU time with the tap against without", ratio)
+
+
+def _cpu_s(pid: int) -> float:
+    """The CPU time that a process takes in two seconds."""
+
+    def taken_s() -> float:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    before_s = taken_s()
+    time.sleep(_CPU_WINDOW_S)
+    return taken_s() - before_s
