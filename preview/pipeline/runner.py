@@ -128,12 +128,12 @@ class Runner:
         Raises:
             HungError: the old one hangs.
         """
-        self.plan = replace(self.plan, passphrase=None)
         free = await self._close_listener()
         try:
             await in_thread(free, self._timeouts.stop_s)
         except TimeoutError as error:
             raise HungError("the SRT listener hung when it was freed") from error
+        self.plan = replace(self.plan, passphrase=None)
         if passphrase is not None and not self._ended.done():
             plan = replace(self.plan, passphrase=passphrase)
             await self._open_listener(plan)
@@ -184,7 +184,7 @@ class Runner:
         return asyncio.create_task(work, name="stop the encoder")
 
     async def write_graph(self, path: Path) -> None:
-        """Writes the pipeline and its listener as DOT graphs; logs a warning where that fails or takes long."""
+        """Writes pipeline and listener as DOT graphs; logs a warning where that fails or takes too long."""
         pipelines = [self._parts.pipeline, *([self._listener.pipeline] if self._listener else [])]
 
         def write() -> None:

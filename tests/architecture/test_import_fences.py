@@ -67,6 +67,11 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("recorder/values.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap", "recorder")),
         ("recorder/intake/", (*WIRE, "omniseer", "asyncio", "mcap", "recorder.mcap", "recorder.config")),
         ("recorder/mcap/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.config")),
+        ("recorder/video/", (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.mcap")),
+        *(
+            (f"recorder/video/{name}.py", ("asyncio", "time", "recorder.video.tap"))
+            for name in ("access_unit", "message", "stream")
+        ),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -93,6 +98,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/pipeline/", ("preview.rpc", "preview.supervisor", "preview.app")),
         ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
         ("preview/rpc/", ("common.gst",)),
+        ("preview/tap.py", (*HEAVY, *WIRE, "common.gst", "omniseer", "preview.rpc", "preview.config")),
+        ("common/video_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time")),
         *(
             (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))
             for name in (

@@ -115,6 +115,8 @@ class PipelineDouble:
             asyncio.get_running_loop().call_later(script.fault_after_s, self._fail, script.fault)
         while True:
             await asyncio.sleep(WINDOW_S)
+            if self.take:
+                self.take(AccessUnit(b"a frame", captured_ns=1, key_frame=True))
             self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
             self._events.measured(self._script.viewers_refused)
 
