@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,7 @@ from recorder.mcap.records import PART
 from recorder.mcap.recovery import recover
 from recorder.mcap.rosbag2 import metadata
 from recorder.store.catalogue import Catalogue, segments_in
-from recorder.store.folder import DATA, METADATA, replace_file
+from recorder.store.folder import DATA, METADATA, replace_file, segment_name
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
 from recorder.store.ring import RingSegment, link_next
 from recorder.values import Gap, GapCause
@@ -120,6 +121,21 @@ def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
     ended_ns = began_ns if until_ns is None else max(began_ns, until_ns)
     gap = Gap("", GapCause.INTERRUPTED, began_ns, ended_ns, None)
     return manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})
+
+
+def until_first_message(manifest: Manifest, number: int) -> Manifest:
+    """Returns the manifest with its last interruption lasting until the first message after it.
+
+    Args:
+        manifest: of a recording that went on.
+        number: of the segment that it went on with.
+    """
+    segment = next((each for each in manifest.segments if each.name == segment_name(number)), None)
+    *others, last = manifest.gaps or (None,)
+    if last is None or last.cause is not GapCause.INTERRUPTED or segment is None or segment.first_ns is None:
+        return manifest
+    longer = replace(last, ended_ns=max(last.ended_ns, segment.first_ns))
+    return manifest.model_copy(update={"gaps": (*others, longer)})
 
 
 def _with_ring(folder: Path, manifest: Manifest, ring: list[RingSegment]) -> Manifest:
