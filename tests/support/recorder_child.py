@@ -12,7 +12,7 @@ from typing import Final
 
 from recorder.lifecycle import State
 from recorder.requests import StartOptions
-from tests.support.recorder_double import Source, running_recorder
+from tests.support.recorder_in_process import Source, running_recorder
 
 _PERIOD_S: Final = 0.002
 

@@ -11,7 +11,7 @@ from recorder.lifecycle import State
 from recorder.requests import StartOptions
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Manifest, RecordingState, StopReason
-from tests.support.recorder_double import Running, Source, running_recorder
+from tests.support.recorder_in_process import Running, Source, running_recorder
 
 MIB = 1024 * 1024
 

@@ -16,7 +16,7 @@ from recorder.lifecycle import State
 from recorder.mcap.reading import messages
 from recorder.store.manifest import RecordingState
 from recorder.values import GapCause
-from tests.support.recorder_double import running_recorder
+from tests.support.recorder_in_process import running_recorder
 from tests.support.waiting import wait_until
 
 _ROOT: Final = Path(__file__).parents[3]

@@ -12,7 +12,7 @@ from recorder.mcap.reading import messages
 from recorder.recorder import Recorder
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
-from tests.support.recorder_double import Source, channel, running_recorder
+from tests.support.recorder_in_process import Source, channel, running_recorder
 
 
 def numbers(recorder: Recorder, manifest: Manifest, topic: str = "/odom") -> list[int]:

@@ -20,7 +20,7 @@ from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.servicer import RecorderServicer
 from recorder.store.run_bundles import RunBundles
-from tests.support.recorder_double import Running, Source, running_recorder
+from tests.support.recorder_in_process import Running, Source, running_recorder
 
 KIB = 1024
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from gateway.links.link import LinkLostError
 from gateway.links.preview import wire
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
+from gateway.links.watch import LinkLostError
 from gateway.status.preview import (
     Codec,
     Counters,
