@@ -23,7 +23,7 @@ from recorder.store.housekeeping import LEAST_ROOM, Housekeeping, Room, attempt
 from recorder.store.manifest import Copy, Kind, Manifest, RecordingState, StopReason
 from recorder.store.ring import Ring
 from recorder.store.room import Reserve
-from recorder.store.salvage import ended, salvage, until_first_message, whole, with_interruption
+from recorder.store.salvage import ended, salvage, whole, with_interruption
 from recorder.store.state_file import Answer, StateFile
 from recorder.values import Gap, GapCause
 from recorder.writing.output import Closed, Output, Progress, Shape
@@ -744,10 +744,8 @@ class Recorder:
                 case _Failed(output, error) if self._ring and output is self._ring.output:
                     self._ring_failed(error)
                 case (output, closed) if output is self._output and self._running:
-                    manifest = self._running.with_segment(segment_name(closed.number), closed.summary)
-                    if closed.number == output.shape.first:
-                        manifest = until_first_message(manifest, closed.number)
-                    await self._keep(manifest)
+                    name = segment_name(closed.number)
+                    await self._keep(self._running.with_segment(name, closed.summary))
                 case (_, closed) if self._ring and closed.path.parent == self._settings.ring_directory:
                     await self._ring.take(closed)
 

@@ -12,7 +12,7 @@ from recorder.mcap.records import PART
 from recorder.mcap.recovery import recover
 from recorder.mcap.rosbag2 import metadata
 from recorder.store.catalogue import Catalogue, segments_in
-from recorder.store.folder import DATA, METADATA, replace_file, segment_name
+from recorder.store.folder import DATA, METADATA, replace_file
 from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
 from recorder.store.ring import RingSegment, link_next
 from recorder.values import Gap, GapCause
@@ -64,7 +64,7 @@ def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopR
     text = metadata(manifest.summaries(folder)).encode()
     replace_file(folder / METADATA, text)
     update = {"state": state, "stop_reason": reason, "metadata": file_of(METADATA, text)}
-    return manifest.model_copy(update=update).spanning()
+    return _until_next_messages(manifest.model_copy(update=update)).spanning()
 
 
 def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> Manifest | None:
@@ -123,19 +123,18 @@ def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
     return manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})
 
 
-def until_first_message(manifest: Manifest, number: int) -> Manifest:
-    """Returns the manifest with its last interruption lasting until the first message after it.
+def _until_next_messages(manifest: Manifest) -> Manifest:
+    """Returns the manifest with each interruption lasting until the first message after it.
 
-    Args:
-        manifest: of a recording that went on.
-        number: of the segment that it went on with.
+    What is published while the recorder opens its files, and before it has subscribed, is missing, too.
     """
-    segment = next((each for each in manifest.segments if each.name == segment_name(number)), None)
-    *others, last = manifest.gaps or (None,)
-    if last is None or last.cause is not GapCause.INTERRUPTED or segment is None or segment.first_ns is None:
-        return manifest
-    longer = replace(last, ended_ns=max(last.ended_ns, segment.first_ns))
-    return manifest.model_copy(update={"gaps": (*others, longer)})
+    firsts = sorted(each.first_ns for each in manifest.segments if each.first_ns is not None)
+    gaps = []
+    for gap in manifest.gaps:
+        next_ns = next((first_ns for first_ns in firsts if first_ns > gap.began_ns), 0)
+        longer = gap.cause is GapCause.INTERRUPTED and next_ns > gap.ended_ns
+        gaps.append(replace(gap, ended_ns=next_ns) if longer else gap)
+    return manifest.model_copy(update={"gaps": tuple(gaps)})
 
 
 def _with_ring(folder: Path, manifest: Manifest, ring: list[RingSegment]) -> Manifest:

@@ -12,8 +12,10 @@ from typing import Any, Final
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.recorder import Recorder
+from recorder.store.folder import make_directory
 from recorder.values import Channel, Sample
 from recorder.writing.queue import SampleQueue
+from tests.support.eventually import eventually
 
 _WITHIN_S: Final = 20.0
 PRESETS: Final = {"all": {"topics": ["*"]}, "odometry": {"topics": ["/odom"]}}
@@ -86,9 +88,11 @@ class Running:
 
     async def until(self, condition: Any) -> None:
         """Returns when a condition holds; fails after 20 s."""
-        async with asyncio.timeout(_WITHIN_S):
-            while not condition():
-                await asyncio.sleep(0.01)
+
+        async def ask() -> Any:
+            return condition()
+
+        await eventually(ask, bool, "the recorder gets there", _WITHIN_S)
 
 
 def settings_for(root: Path, **values: Any) -> RecorderSettings:
@@ -100,7 +104,7 @@ def settings_for(root: Path, **values: Any) -> RecorderSettings:
 async def running_recorder(root: Path, boot_id: str = "boot", **values: Any) -> AsyncIterator[Running]:
     """Recovered and idle, or recording, when the block begins; closed in order when it ends."""
     settings = settings_for(root, **values)
-    root.mkdir(parents=True, exist_ok=True)
+    make_directory(root)
     queue, sources = SampleQueue(settings.queue_bytes), _NoSources()
     recorder = Recorder(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
     stop = asyncio.Event()

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,7 +31,6 @@ class RecorderProgram:
     directory: Path
     settings: dict[str, Any]
     process: subprocess.Popen[bytes] | None = None
-    _channels: list[Any] = field(default_factory=list)
 
     @property
     def root(self) -> Path:

@@ -10,7 +10,6 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 
 from omniseer.gateway.v1 import recording_pb2 as pb
-from tests.support.ros import ros_domain as ros_domain
 from tests.support.running_recorder import RecorderProgram, recorder_program
 from tests.support.waiting import wait_until
 
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.ros
 TOPIC = "/odom"
 
 
-def told(program: RecorderProgram, made: pb.Recording) -> list[int]:
+def read(program: RecorderProgram, made: pb.Recording) -> list[int]:
     """The numbers in the messages of a recording, by an independent reader of its final files."""
     folder = program.root / "recordings" / made.id
     numbers = []
@@ -27,8 +26,8 @@ def told(program: RecorderProgram, made: pb.Recording) -> list[int]:
         if file.name.endswith(".mcap"):
             with (folder / file.name).open("rb") as content:
                 reader = make_reader(content, decoder_factories=[DecoderFactory()])
-                for decoded in reader.iter_decoded_messages(topics=[TOPIC]):
-                    numbers.append(decoded.decoded_message.data)
+                decoded = reader.iter_decoded_messages(topics=[TOPIC])
+                numbers += [each.decoded_message.data for each in decoded]
     return numbers
 
 
@@ -45,7 +44,7 @@ def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> N
         stopped = program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
         made = program.recording(started.recording.id)
         assert stopped.recording.state == made.state == pb.RECORDING_STATE_COMPLETE
-        assert told(program, made) == list(range(1, 201))
+        assert read(program, made) == list(range(1, 201))
         assert made.messages_lost == 0
         folder = program.root / "recordings" / made.id / "data"
         assert program.stop() == 0
@@ -78,7 +77,7 @@ def test_killed_at_any_instant_it_goes_on_and_says_what_is_missing(tmp_path: Pat
         assert made.state == pb.RECORDING_STATE_COMPLETE
         interrupted = [gap for gap in made.gaps if gap.cause == pb.RECORDING_GAP_CAUSE_INTERRUPTED]
         assert len(interrupted) >= len(killed_s)
-        found = told(program, made)
+        found = read(program, made)
         assert found == sorted(set(found))
         # What is missing was published in a gap, and no gap begins more than a second before its kill.
         for number in set(range(1, talker.sent + 1)) - set(found):

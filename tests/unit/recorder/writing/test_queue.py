@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.values import Channel, GapCause, Loss, Note, Sample
-from recorder.writing.queue import SampleQueue
+from recorder.writing.queue import Item, SampleQueue
 
 ODOM, SCAN = (
     Channel(topic, "std_msgs/msg/String", b"", "", "", latched=False, presets=frozenset())
@@ -21,7 +21,7 @@ def sample(of: Channel = ODOM, at_ns: int = 0, size: int = 100) -> Sample:
 
 def test_what_was_put_comes_out_in_order() -> None:
     queue = SampleQueue(10_000)
-    items = [sample(at_ns=1), Note("a", {}), Loss(ODOM, GapCause.MIDDLEWARE, 1, 2, 3), sample(SCAN, 4)]
+    items: list[Item] = [sample(at_ns=1), Note("a", {}), Loss(ODOM, GapCause.MIDDLEWARE, 1, 2, 3), sample(SCAN, 4)]
     queue.put(items)
     assert queue.take(0) == items
     assert queue.take(0) == []
