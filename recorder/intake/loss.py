@@ -2,8 +2,8 @@
 
 DDS numbers the messages of each publisher (DDSI-RTPS 8.3.5.4). rclpy hands the number over, but not the
 publisher. Of one publisher the count is exact. Of several, each number is taken for the next of the sequence
-that it fits best: exact while their numbers are apart, close while they are not, and 0 where nothing was lost.
-Where publishers come or go, numbers prove nothing for a moment: what seems to be missing then is not counted.
+that it fits best: exact while their numbers are apart, close otherwise, and 0 where nothing was lost. Where
+publishers come or go, numbers prove nothing for a moment: what seems to be missing then is not counted.
 """
 
 from collections.abc import Hashable

@@ -24,6 +24,7 @@ from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 from recorder.video.stream import STREAM_NOTE
 from tests.support.judges import complaints, decoded_frames
+from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.tap_reader import BareReader, TapRecording
 from tests.support.watcher import Watcher
