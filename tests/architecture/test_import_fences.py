@@ -72,6 +72,18 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             (f"recorder/video/{name}.py", ("asyncio", "time", "recorder.video.tap"))
             for name in ("access_unit", "message", "stream")
         ),
+        (
+            "recorder/store/",
+            (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.rpc", "recorder.recorder"),
+        ),
+        ("recorder/store/retention.py", ("asyncio", "time", "os", "pathlib", "recorder")),
+        ("recorder/writing/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.store")),
+        *(
+            (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "recorder"))
+            for name in ("lifecycle", "incidents")
+        ),
+        ("recorder/config.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
+        ("recorder/recorder.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -160,7 +172,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("cryptography", ("gateway/access/ca.py",)),
         ("yaml", ("common/config.py", "recorder/intake/qos.py", "recorder/mcap/rosbag2.py")),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
-        ("google_crc32c", ("console/client/exporting.py",)),
+        ("google_crc32c", ("console/client/exporting.py", "recorder/store/export.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
         (
             "google.protobuf",
@@ -174,7 +186,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "console/client/",
             ),
         ),
-        ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
+        ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
     ],

@@ -1,7 +1,7 @@
 """A recorder to be killed: `python -m tests.support.recorder_child ROOT FIRST`.
 
 Records numbered messages from FIRST on, 500 a second, into the recording that runs in ROOT, or a new one.
-Each line of standard output is the number of a message and when it was handed over, by the calendar clock in ns.
+Each line of standard output is the number of a message and when it was handed over, in calendar ns.
 """
 
 import asyncio

@@ -21,7 +21,8 @@ def sample(of: Channel = ODOM, at_ns: int = 0, size: int = 100) -> Sample:
 
 def test_what_was_put_comes_out_in_order() -> None:
     queue = SampleQueue(10_000)
-    items: list[Item] = [sample(at_ns=1), Note("a", {}), Loss(ODOM, GapCause.MIDDLEWARE, 1, 2, 3), sample(SCAN, 4)]
+    loss = Loss(ODOM, GapCause.MIDDLEWARE, 1, 2, 3)
+    items: list[Item] = [sample(at_ns=1), Note("a", {}), loss, sample(SCAN, 4)]
     queue.put(items)
     assert queue.take(0) == items
     assert queue.take(0) == []
