@@ -1,7 +1,5 @@
 """The real program between real publishers and a real disk; other programs judge what it leaves."""
 
-import random
-import time
 from functools import partial
 from pathlib import Path
 
@@ -55,7 +53,8 @@ def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("ros_domain")
-def test_killed_at_any_instant_it_goes_on_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_killed_while_it_records_it_goes_on_with_the_same_recording(tmp_path: Path) -> None:
+    """What is lost by it is measured in test_kill.py."""
     from std_msgs.msg import Int64  # noqa: PLC0415
 
     from tests.support.publishing import publishing  # noqa: PLC0415
@@ -63,35 +62,26 @@ def test_killed_at_any_instant_it_goes_on_and_says_what_is_missing(tmp_path: Pat
     with recorder_program(tmp_path) as program, publishing(TOPIC, Int64) as talker:
         started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1"))
         recording_id = started.recording.id
-        killed_s = []
 
         def arrives(before: int) -> bool:
-            """Not by the subscriptions: those of the killed ones are announced for some seconds still."""
+            """Not by the subscriptions: those of the killed one are announced for some seconds still."""
             talker.publish(1)
             return program.state.status.messages_written > before
 
-        for _ in range(2):
-            wait_until(partial(arrives, program.state.status.messages_written), "messages arrive")
-            talker.publish_for(random.uniform(0.2, 1.5))
-            program.kill()
-            killed_s.append(time.time())
-            program.start()
-            assert program.state.status.recording_id == recording_id
-        wait_until(partial(arrives, program.state.status.messages_written), "messages arrive again")
+        wait_until(partial(arrives, 0), "messages arrive")
+        program.kill()
+        program.start()
+        wait_until(lambda: program.state.status.recording_id == recording_id, "it goes on")
+        before = program.state.status.messages_written
+        wait_until(partial(arrives, before), "messages arrive again", 60)
         program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
         made = program.recording(recording_id)
         assert made.state == pb.RECORDING_STATE_COMPLETE
-        interrupted = [gap for gap in made.gaps if gap.cause == pb.RECORDING_GAP_CAUSE_INTERRUPTED]
-        assert len(interrupted) >= len(killed_s)
+        causes = {gap.cause for gap in made.gaps}
+        assert pb.RECORDING_GAP_CAUSE_INTERRUPTED in causes
         found = read(program, made)
         assert found == sorted(set(found))
-        # What is missing was published in a gap, and no gap begins more than a second before its kill.
-        for number in set(range(1, talker.sent + 1)) - set(found):
-            at_ms = talker.sent_at_s[number] * 1000
-            assert any(gap.began_unix_ms - 1 <= at_ms <= gap.ended_unix_ms + 1 for gap in interrupted)
-        for at_s in killed_s:
-            began_s = max(gap.began_unix_ms / 1000 for gap in interrupted if gap.began_unix_ms / 1000 <= at_s)
-            assert at_s - began_s <= 1.0
+        assert len([file for file in made.files if file.name.endswith(".mcap")]) >= 2
 
 
 @pytest.mark.usefixtures("ros_domain")
