@@ -12,7 +12,7 @@ from recorder.values import Channel, GapCause, Loss, Sample
 OVERLAP_S: Final = 1.0
 """The old and the new subscription run side by side for so long: discovery takes some tenths of a second."""
 _MEASURED_S: Final = 1.0
-_TOLERANCE: Final = 2.0
+_TOLERANCE: Final = 1.25
 """A queue too short by this factor, or beyond its bound in bytes, is replaced."""
 _REMEMBERED: Final = 50_000
 """Messages by which repetitions are recognised: those of the overlap, at up to 50 kHz."""
