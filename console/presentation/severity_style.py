@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Final
 
-from console.client.results import FaultSeverity, Freshness, HealthState, PreviewState
+from console.client.results import FaultSeverity, Freshness, HealthState, PreviewState, RecorderState
 
 
 class SeverityStyle(Enum):
@@ -39,4 +39,14 @@ PREVIEW_STYLES: Final[Mapping[PreviewState, SeverityStyle]] = {
     PreviewState.FAULTED: SeverityStyle.BAD,
     PreviewState.DISABLED: SeverityStyle.QUIET,
     PreviewState.UNKNOWN: SeverityStyle.QUIET,
+}
+RECORDER_STYLES: Final[Mapping[RecorderState, SeverityStyle]] = {
+    RecorderState.RECORDING: SeverityStyle.GOOD,
+    RecorderState.STARTING: SeverityStyle.WARNING,
+    RecorderState.FINALISING: SeverityStyle.WARNING,
+    RecorderState.RECOVERING: SeverityStyle.WARNING,
+    RecorderState.FAULTED: SeverityStyle.BAD,
+    RecorderState.UNREACHABLE: SeverityStyle.WARNING,
+    RecorderState.IDLE: SeverityStyle.QUIET,
+    RecorderState.UNKNOWN: SeverityStyle.QUIET,
 }

@@ -1,8 +1,9 @@
-"""Checks of the gateway's two endpoints: its own, and that of the preview service."""
+"""Checks of endpoints: the gateway's own, and those of the programs that it speaks to."""
 
 import grp
 import os
 import socket
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -36,23 +37,52 @@ def operator_endpoint(host: str, port: int) -> Finding:
 
 def preview_endpoint(path: Path) -> Finding:
     """Checks whether the preview service accepts connections on its socket."""
-    try:
-        with socket.socket(socket.AF_UNIX) as probe:
-            probe.settimeout(_TIMEOUT_S)
-            probe.connect(str(path))
-    except FileNotFoundError:
-        what, remedy = f"{path} does not exist", "Start the preview service: robot-preview serve"
-        if not path.parent.is_dir():
-            remedy = f"Create the directory {path.parent}, or share it with the preview's container"
-    except ConnectionRefusedError:
-        what, remedy = f"{path} is left over from a service that ended", "Start the preview service again"
-    except PermissionError:
-        what, remedy = f"this user may not use {path}", _permission_remedy(path)
-    except OSError as error:
-        what, remedy = f"{path} can't be used: {error}", "Set preview.socket to the service's own socket"
-    else:
-        return good("preview", f"the preview service listens on {path}")
-    return wrong("preview", what, "Without it there is a status, but no video", remedy)
+    service = _Service("preview", "the preview service", "robot-preview", "preview.socket")
+    return service.endpoint(path, "Without it there is a status, but no video")
+
+
+def recorder_endpoint(path: Path) -> Finding:
+    """Checks whether the recorder accepts connections on its socket."""
+    service = _Service("recording", "the recorder", "robot-recorder", "recording.socket")
+    return service.endpoint(path, "Without it recordings can't be started, stopped or copied")
+
+
+@dataclass(frozen=True, slots=True)
+class _Service:
+    """A program that the gateway reaches by a Unix socket.
+
+    Attributes:
+        finding: name of the finding.
+        name: of the service, for people.
+        program: its command.
+        key: of the configuration.
+    """
+
+    finding: str
+    name: str
+    program: str
+    key: str
+
+    def endpoint(self, path: Path, why: str) -> Finding:
+        """Checks whether it accepts connections."""
+        try:
+            with socket.socket(socket.AF_UNIX) as probe:
+                probe.settimeout(_TIMEOUT_S)
+                probe.connect(str(path))
+        except FileNotFoundError:
+            what, remedy = f"{path} does not exist", f"Start {self.name}: {self.program} serve"
+            if not path.parent.is_dir():
+                own = self.name.removeprefix("the ").removesuffix(" service")
+                remedy = f"Create the directory {path.parent}, or share it with the {own}'s container"
+        except ConnectionRefusedError:
+            what, remedy = f"{path} is left over from a service that ended", f"Start {self.name} again"
+        except PermissionError:
+            what, remedy = f"this user may not use {path}", _permission_remedy(path)
+        except OSError as error:
+            what, remedy = f"{path} can't be used: {error}", f"Set {self.key} to the service's own socket"
+        else:
+            return good(self.finding, f"{self.name} listens on {path}")
+        return wrong(self.finding, what, why, remedy)
 
 
 def _permission_remedy(path: Path) -> str:

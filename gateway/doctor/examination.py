@@ -13,7 +13,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import TlsFiles, load_access
 from gateway.config import SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import operator_endpoint, preview_endpoint
+from gateway.doctor.endpoints import operator_endpoint, preview_endpoint, recorder_endpoint
 from gateway.doctor.video import video_finding
 
 
@@ -38,6 +38,8 @@ def examine(config: Path | None) -> Iterator[Finding]:
     yield preview
     if preview.verdict is Verdict.GOOD:
         yield video_finding(settings)
+    if settings.recording.socket:
+        yield recorder_endpoint(settings.recording.socket)
     yield from device_findings()
     yield from _ros(settings.sources)
 

@@ -76,6 +76,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
         ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
         ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
+        ("gateway/links/watch.py", (*WIRE, "gateway.links")),
+        ("gateway/links/recorder/", ("gateway.links.preview", "gateway.links.drive", "gateway.links.link")),
         ("gateway/links/drive/", ("gateway.teleop", "gateway.links.preview")),
         ("gateway/teleop/", (*HEAVY, *WIRE, "omniseer", "gateway.ros", "gateway.rpc", "gateway.config")),
         *(
@@ -135,11 +137,13 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("cryptography", ("gateway/access/ca.py",)),
         ("yaml", ("common/config.py",)),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
+        ("google_crc32c", ("console/client/exporting.py",)),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
         (
             "google.protobuf",
             (
                 "common/interceptors.py",
+                "common/refusal.py",
                 "gateway/rpc/",
                 "gateway/links/",
                 "preview/rpc/",

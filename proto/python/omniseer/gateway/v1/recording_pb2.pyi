@@ -1037,7 +1037,7 @@ class ExportChunk(_message.Message):
     offset: _builtins.int
     """Where they belong."""
     data: _builtins.bytes
-    """The bytes: at most 256 KiB."""
+    """The bytes: 1 to 256 KiB. Fewer where max_bytes_per_s is low, so that a chunk leaves at least every 5 s."""
     crc32c: _builtins.int
     """CRC-32C (RFC 3720 B.4) of data."""
     def __init__(

@@ -26,7 +26,7 @@ from omniseer.gateway.v1 import fault_pb2 as omniseer_dot_gateway_dot_v1_dot_fau
 from omniseer.gateway.v1 import recording_pb2 as omniseer_dot_gateway_dot_v1_dot_recording__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n+omniseer/recorder/v1/recorder_service.proto\x12\x14omniseer.recorder.v1\x1a\x1fomniseer/gateway/v1/fault.proto\x1a#omniseer/gateway/v1/recording.proto\"\x13\n\x11WatchStateRequest\"\x9d\x02\n\x12WatchStateResponse\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x34\n\x06status\x18\x02 \x01(\x0b\x32$.omniseer.gateway.v1.RecordingStatus\x12.\n\x06newest\x18\x03 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x1a\n\rmessages_lost\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12\x18\n\x10messages_dropped\x18\x05 \x01(\x04\x12\x17\n\x0f\x64isk_free_bytes\x18\x06 \x01(\x04\x12\x17\n\x0f\x64isk_size_bytes\x18\x07 \x01(\x04\x12\x12\n\ndisk_short\x18\x08 \x01(\x08\x42\x10\n\x0e_messages_lost\"m\n\x12ReportFaultRequest\x12\x10\n\x08\x66\x61ult_id\x18\x01 \x01(\t\x12\x34\n\x08severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverity\x12\x0f\n\x07message\x18\x03 \x01(\t\"+\n\x13ReportFaultResponse\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"X\n\x0eSetCopyRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x63opy\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"\x11\n\x0fSetCopyResponse2\x84\n\n\x0fRecorderService\x12\x61\n\nWatchState\x12\'.omniseer.recorder.v1.WatchStateRequest\x1a(.omniseer.recorder.v1.WatchStateResponse0\x01\x12i\n\x0eStartRecording\x12*.omniseer.gateway.v1.StartRecordingRequest\x1a+.omniseer.gateway.v1.StartRecordingResponse\x12\x66\n\rStopRecording\x12).omniseer.gateway.v1.StopRecordingRequest\x1a*.omniseer.gateway.v1.StopRecordingResponse\x12l\n\x0fTriggerSnapshot\x12+.omniseer.gateway.v1.TriggerSnapshotRequest\x1a,.omniseer.gateway.v1.TriggerSnapshotResponse\x12i\n\x0eListRecordings\x12*.omniseer.gateway.v1.ListRecordingsRequest\x1a+.omniseer.gateway.v1.ListRecordingsResponse\x12\x63\n\x0cGetRecording\x12(.omniseer.gateway.v1.GetRecordingRequest\x1a).omniseer.gateway.v1.GetRecordingResponse\x12n\n\x0f\x45xportRecording\x12+.omniseer.gateway.v1.ExportRecordingRequest\x1a,.omniseer.gateway.v1.ExportRecordingResponse0\x01\x12~\n\x15GetRecordingThumbnail\x12\x31.omniseer.gateway.v1.GetRecordingThumbnailRequest\x1a\x32.omniseer.gateway.v1.GetRecordingThumbnailResponse\x12\x63\n\x0cPinRecording\x12(.omniseer.gateway.v1.PinRecordingRequest\x1a).omniseer.gateway.v1.PinRecordingResponse\x12l\n\x0f\x44\x65leteRecording\x12+.omniseer.gateway.v1.DeleteRecordingRequest\x1a,.omniseer.gateway.v1.DeleteRecordingResponse\x12\x62\n\x0bReportFault\x12(.omniseer.recorder.v1.ReportFaultRequest\x1a).omniseer.recorder.v1.ReportFaultResponse\x12V\n\x07SetCopy\x12$.omniseer.recorder.v1.SetCopyRequest\x1a%.omniseer.recorder.v1.SetCopyResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n+omniseer/recorder/v1/recorder_service.proto\x12\x14omniseer.recorder.v1\x1a\x1fomniseer/gateway/v1/fault.proto\x1a#omniseer/gateway/v1/recording.proto\"\x13\n\x11WatchStateRequest\"\xcc\x02\n\x12WatchStateResponse\x12\x13\n\x0binstance_id\x18\x01 \x01(\t\x12\x34\n\x06status\x18\x02 \x01(\x0b\x32$.omniseer.gateway.v1.RecordingStatus\x12.\n\x06newest\x18\x03 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x1a\n\rmessages_lost\x18\x04 \x01(\x04H\x00\x88\x01\x01\x12\x18\n\x10messages_dropped\x18\x05 \x01(\x04\x12\x17\n\x0f\x64isk_free_bytes\x18\x06 \x01(\x04\x12\x17\n\x0f\x64isk_size_bytes\x18\x07 \x01(\x04\x12\x12\n\ndisk_short\x18\x08 \x01(\x08\x12-\n\x05\x65nded\x18\t \x03(\x0b\x32\x1e.omniseer.gateway.v1.RecordingB\x10\n\x0e_messages_lost\"m\n\x12ReportFaultRequest\x12\x10\n\x08\x66\x61ult_id\x18\x01 \x01(\t\x12\x34\n\x08severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverity\x12\x0f\n\x07message\x18\x03 \x01(\t\"+\n\x13ReportFaultResponse\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\"X\n\x0eSetCopyRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x63opy\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\"\x11\n\x0fSetCopyResponse2\x84\n\n\x0fRecorderService\x12\x61\n\nWatchState\x12\'.omniseer.recorder.v1.WatchStateRequest\x1a(.omniseer.recorder.v1.WatchStateResponse0\x01\x12i\n\x0eStartRecording\x12*.omniseer.gateway.v1.StartRecordingRequest\x1a+.omniseer.gateway.v1.StartRecordingResponse\x12\x66\n\rStopRecording\x12).omniseer.gateway.v1.StopRecordingRequest\x1a*.omniseer.gateway.v1.StopRecordingResponse\x12l\n\x0fTriggerSnapshot\x12+.omniseer.gateway.v1.TriggerSnapshotRequest\x1a,.omniseer.gateway.v1.TriggerSnapshotResponse\x12i\n\x0eListRecordings\x12*.omniseer.gateway.v1.ListRecordingsRequest\x1a+.omniseer.gateway.v1.ListRecordingsResponse\x12\x63\n\x0cGetRecording\x12(.omniseer.gateway.v1.GetRecordingRequest\x1a).omniseer.gateway.v1.GetRecordingResponse\x12n\n\x0f\x45xportRecording\x12+.omniseer.gateway.v1.ExportRecordingRequest\x1a,.omniseer.gateway.v1.ExportRecordingResponse0\x01\x12~\n\x15GetRecordingThumbnail\x12\x31.omniseer.gateway.v1.GetRecordingThumbnailRequest\x1a\x32.omniseer.gateway.v1.GetRecordingThumbnailResponse\x12\x63\n\x0cPinRecording\x12(.omniseer.gateway.v1.PinRecordingRequest\x1a).omniseer.gateway.v1.PinRecordingResponse\x12l\n\x0f\x44\x65leteRecording\x12+.omniseer.gateway.v1.DeleteRecordingRequest\x1a,.omniseer.gateway.v1.DeleteRecordingResponse\x12\x62\n\x0bReportFault\x12(.omniseer.recorder.v1.ReportFaultRequest\x1a).omniseer.recorder.v1.ReportFaultResponse\x12V\n\x07SetCopy\x12$.omniseer.recorder.v1.SetCopyRequest\x1a%.omniseer.recorder.v1.SetCopyResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -36,15 +36,15 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_WATCHSTATEREQUEST']._serialized_start=139
   _globals['_WATCHSTATEREQUEST']._serialized_end=158
   _globals['_WATCHSTATERESPONSE']._serialized_start=161
-  _globals['_WATCHSTATERESPONSE']._serialized_end=446
-  _globals['_REPORTFAULTREQUEST']._serialized_start=448
-  _globals['_REPORTFAULTREQUEST']._serialized_end=557
-  _globals['_REPORTFAULTRESPONSE']._serialized_start=559
-  _globals['_REPORTFAULTRESPONSE']._serialized_end=602
-  _globals['_SETCOPYREQUEST']._serialized_start=604
-  _globals['_SETCOPYREQUEST']._serialized_end=692
-  _globals['_SETCOPYRESPONSE']._serialized_start=694
-  _globals['_SETCOPYRESPONSE']._serialized_end=711
-  _globals['_RECORDERSERVICE']._serialized_start=714
-  _globals['_RECORDERSERVICE']._serialized_end=1998
+  _globals['_WATCHSTATERESPONSE']._serialized_end=493
+  _globals['_REPORTFAULTREQUEST']._serialized_start=495
+  _globals['_REPORTFAULTREQUEST']._serialized_end=604
+  _globals['_REPORTFAULTRESPONSE']._serialized_start=606
+  _globals['_REPORTFAULTRESPONSE']._serialized_end=649
+  _globals['_SETCOPYREQUEST']._serialized_start=651
+  _globals['_SETCOPYREQUEST']._serialized_end=739
+  _globals['_SETCOPYRESPONSE']._serialized_start=741
+  _globals['_SETCOPYRESPONSE']._serialized_end=758
+  _globals['_RECORDERSERVICE']._serialized_start=761
+  _globals['_RECORDERSERVICE']._serialized_end=2045
 # @@protoc_insertion_point(module_scope)

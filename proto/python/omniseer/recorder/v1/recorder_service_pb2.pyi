@@ -3,8 +3,10 @@
 isort:skip_file
 """
 
+from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
+from google.protobuf.internal import containers as _containers
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 import builtins as _builtins
@@ -49,6 +51,7 @@ class WatchStateResponse(_message.Message):
     DISK_FREE_BYTES_FIELD_NUMBER: _builtins.int
     DISK_SIZE_BYTES_FIELD_NUMBER: _builtins.int
     DISK_SHORT_FIELD_NUMBER: _builtins.int
+    ENDED_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process."""
     messages_lost: _builtins.int
@@ -73,6 +76,12 @@ class WatchStateResponse(_message.Message):
     def newest(self) -> _recording_pb2.Recording:
         """The recording that runs or has ended last, without files and gaps; for events. Unset before the first."""
 
+    @_builtins.property
+    def ended(self) -> _containers.RepeatedCompositeFieldContainer[_recording_pb2.Recording]:
+        """The recordings that ended last, of any kind, the newest first, at most 16, without files and gaps; for events. A
+        gateway that was not there when one ended still reports it.
+        """
+
     def __init__(
         self,
         *,
@@ -84,10 +93,11 @@ class WatchStateResponse(_message.Message):
         disk_free_bytes: _builtins.int = ...,
         disk_size_bytes: _builtins.int = ...,
         disk_short: _builtins.bool = ...,
+        ended: _abc.Iterable[_recording_pb2.Recording] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "messages_lost", b"messages_lost", "newest", b"newest", "status", b"status"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "disk_free_bytes", b"disk_free_bytes", "disk_short", b"disk_short", "disk_size_bytes", b"disk_size_bytes", "instance_id", b"instance_id", "messages_dropped", b"messages_dropped", "messages_lost", b"messages_lost", "newest", b"newest", "status", b"status"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "disk_free_bytes", b"disk_free_bytes", "disk_short", b"disk_short", "disk_size_bytes", b"disk_size_bytes", "ended", b"ended", "instance_id", b"instance_id", "messages_dropped", b"messages_dropped", "messages_lost", b"messages_lost", "newest", b"newest", "status", b"status"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
     _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015

@@ -33,7 +33,9 @@ class RecorderServiceStub:
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     def __init__(self, channel):
@@ -111,7 +113,9 @@ class RecorderServiceServicer:
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     def WatchState(self, request, context):
@@ -137,7 +141,8 @@ class RecorderServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def TriggerSnapshot(self, request, context):
-        """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for Recording.trigger.
+        """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for
+        Recording.trigger.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -279,7 +284,9 @@ class RecorderService:
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     @staticmethod

@@ -34,7 +34,9 @@ class RecorderServiceStub:
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     @_typing.overload
@@ -50,7 +52,9 @@ class RecorderServiceStub:
     StopRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.StopRecordingRequest, _recording_pb2.StopRecordingResponse]
     """As RecordingService.StopRecording."""
     TriggerSnapshot: _grpc.UnaryUnaryMultiCallable[_recording_pb2.TriggerSnapshotRequest, _recording_pb2.TriggerSnapshotResponse]
-    """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for Recording.trigger."""
+    """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for
+    Recording.trigger.
+    """
     ListRecordings: _grpc.UnaryUnaryMultiCallable[_recording_pb2.ListRecordingsRequest, _recording_pb2.ListRecordingsResponse]
     """As RecordingService.ListRecordings."""
     GetRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]
@@ -80,7 +84,9 @@ class RecorderServiceAsyncStub(RecorderServiceStub):
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
@@ -93,7 +99,9 @@ class RecorderServiceAsyncStub(RecorderServiceStub):
     StopRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.StopRecordingRequest, _recording_pb2.StopRecordingResponse]  # type: ignore[assignment]
     """As RecordingService.StopRecording."""
     TriggerSnapshot: _aio.UnaryUnaryMultiCallable[_recording_pb2.TriggerSnapshotRequest, _recording_pb2.TriggerSnapshotResponse]  # type: ignore[assignment]
-    """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for Recording.trigger."""
+    """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for
+    Recording.trigger.
+    """
     ListRecordings: _aio.UnaryUnaryMultiCallable[_recording_pb2.ListRecordingsRequest, _recording_pb2.ListRecordingsResponse]  # type: ignore[assignment]
     """As RecordingService.ListRecordings."""
     GetRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]  # type: ignore[assignment]
@@ -122,7 +130,9 @@ class RecorderServiceServicer(metaclass=_abc_1.ABCMeta):
     The recorder owns what is recorded: it goes on while the gateway is not running, and the gateway keeps nothing of
     it. The gateway passes calls on, after it has checked who calls, and reports faults; it reads the actual state from
     one long-lived stream. Messages are those of the operator's contract, with the same meaning and the same errors;
-    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does.
+    what the recorder refuses, it refuses with a reason in the details (google.rpc.ErrorInfo) as the gateway does, of the
+    same domain. Every call carries the caller's request ID as the metadata "x-request-id". Repeated calls are recognised
+    here, by their request_id, and the numbers of exports limited by the gateway.
     """
 
     @_abc_1.abstractmethod
@@ -157,7 +167,9 @@ class RecorderServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.TriggerSnapshotRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_recording_pb2.TriggerSnapshotResponse, _abc.Awaitable[_recording_pb2.TriggerSnapshotResponse]]:
-        """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for Recording.trigger."""
+        """As RecordingService.TriggerSnapshot. The caller's name is the metadata "x-caller", for
+        Recording.trigger.
+        """
 
     @_abc_1.abstractmethod
     def ListRecordings(
