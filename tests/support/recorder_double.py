@@ -12,6 +12,7 @@ import time
 import uuid
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from functools import lru_cache
 from pathlib import Path
 from subprocess import PIPE, Popen
 from typing import Any, Final
@@ -42,8 +43,9 @@ _REPORT_EVERY_S: Final = 0.5
 _HOUR_MS: Final = 3_600_000
 
 
+@lru_cache(maxsize=64)
 def sha256(data: bytes) -> bytes:
-    """The digest of a file."""
+    """The digest of a file; computed once, so that an export of a large one keeps no report waiting."""
     return hashlib.sha256(data).digest()
 
 

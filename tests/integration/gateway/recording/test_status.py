@@ -4,6 +4,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from omniseer.gateway.v1 import event_pb2
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.gateway.v1.robot_gateway_pb2 import (
@@ -51,6 +53,7 @@ async def test_a_recording_begins_loses_and_ends_in_events(tmp_path: Path) -> No
         )
 
 
+@pytest.mark.timed
 async def test_a_recording_that_only_grows_wakes_no_watcher(tmp_path: Path) -> None:
     async with recording_robot(tmp_path) as robot:
         await robot.start()
