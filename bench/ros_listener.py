@@ -21,9 +21,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from bench.ros_talker import TOPICS
 from common.ros_node import ros_node
+from common.sampler import SAMPLING_HZ, Sampler
 from gateway.config import SourceSettings
 from gateway.ros.readers import reader_for
-from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
 from gateway.ros.subscription import subscribe
 from gateway.status.board import Board

@@ -61,8 +61,17 @@ def packet_socket(path: Path) -> socket.socket:
     Raises:
         UserError: another program serves at this path, or the path can't be used.
     """
-    _try_unix(path, socket.SOCK_SEQPACKET)
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+    return _unix_socket(path, socket.SOCK_SEQPACKET)
+
+
+def stream_socket(path: Path) -> socket.socket:
+    """As `packet_socket`, a stream of bytes (SOCK_STREAM)."""
+    return _unix_socket(path, socket.SOCK_STREAM)
+
+
+def _unix_socket(path: Path, kind: int) -> socket.socket:
+    _try_unix(path, kind)
+    listener = socket.socket(socket.AF_UNIX, kind | socket.SOCK_NONBLOCK)
     try:
         listener.bind(str(path))
         path.chmod(_SOCKET_MODE)

@@ -140,6 +140,31 @@ class DriveUnreachableError(DomainError):
     reason = Reason.DRIVE_UNREACHABLE
 
 
+class NotFoundError(DomainError):
+    """What the request names does not exist.
+
+    Args:
+        text: what, and what to do.
+        reason: what, for programs.
+    """
+
+    def __init__(self, text: str, reason: Reason) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+class DamagedError(DomainError):
+    """A file of a recording can't be read, or has other bytes than were written."""
+
+    reason = Reason.RECORDING_DAMAGED
+
+
+class RecorderUnreachableError(DomainError):
+    """The recorder does not answer."""
+
+    reason = Reason.RECORDER_UNREACHABLE
+
+
 class NotAuthenticatedError(DomainError):
     """The caller is not authenticated: no credential, or one that is not valid.
 

@@ -12,23 +12,25 @@ from grpc_status.rpc_status import to_status
 
 from common.errors import (
     ConflictError,
+    DamagedError,
     DefectError,
     DomainError,
     DriveUnreachableError,
     InvalidRequestError,
     NotAllowedError,
     NotAuthenticatedError,
+    NotFoundError,
     NotRunningError,
     PreconditionError,
+    RecorderUnreachableError,
     TooMuchError,
     UnknownServiceError,
 )
 from common.interceptors import Call, Interceptor
+from common.refusal import DOMAIN
 
 _log = logging.getLogger(__name__)
 
-DOMAIN: Final = "omniseer.gateway.v1"
-"""The `domain` of google.rpc.ErrorInfo: who defines the reasons."""
 STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     InvalidRequestError: grpc.StatusCode.INVALID_ARGUMENT,
     NotAuthenticatedError: grpc.StatusCode.UNAUTHENTICATED,
@@ -37,8 +39,11 @@ STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     PreconditionError: grpc.StatusCode.FAILED_PRECONDITION,
     ConflictError: grpc.StatusCode.ABORTED,
     DriveUnreachableError: grpc.StatusCode.UNAVAILABLE,
+    RecorderUnreachableError: grpc.StatusCode.UNAVAILABLE,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
+    NotFoundError: grpc.StatusCode.NOT_FOUND,
+    DamagedError: grpc.StatusCode.DATA_LOSS,
     DefectError: grpc.StatusCode.INTERNAL,
 }
 """Total: a test walks the subclasses of DomainError. Every other exception is a defect, so INTERNAL."""

@@ -8,6 +8,8 @@ handlers, no log files, none of the services of an ordinary node.
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from common.errors import UserError
@@ -16,6 +18,7 @@ from common.ros_environment import check_domain
 # Programs import this module before others that need rclpy, so that its absence ends in this error.
 try:
     from rclpy.context import Context
+    from rclpy.event_handler import SubscriptionEventCallbacks
     from rclpy.node import Node
     from rclpy.parameter import Parameter
     from rclpy.utilities import get_rmw_implementation_identifier
@@ -45,6 +48,44 @@ def message_class(type_name: str) -> Any:
         ) from error
     except AttributeError as error:
         raise TypeMissingError(f"the installed package {package} has no message {name}") from error
+
+
+def share_directory(package: str) -> Path | None:
+    """Returns where an installed package of messages keeps its files; None if there is no such package.
+
+    Nothing is imported: the name may come from the graph.
+    """
+    try:
+        spec = find_spec(package)
+    except (ImportError, ValueError):
+        return None
+    # PREFIX/lib/pythonX.Y/site-packages/PACKAGE/__init__.py, as colcon and the wheels install it.
+    file = Path(spec.origin) if spec and spec.origin else Path()
+    share = file.parents[4] / "share" / package if len(file.parents) > 4 else None
+    return share if share and share.is_dir() else None
+
+
+def subscribe_raw(node: Any, message_type: Any, topic: str, qos: Any) -> Any:
+    """Returns a subscription for serialised messages. No executor spins it: its owner takes the messages.
+
+    Raises:
+        TypeMissingError: the type support of the middleware can't be loaded.
+    """
+    try:
+        return node.create_subscription(
+            message_type,
+            topic,
+            _never_called,
+            qos,
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+    except (RuntimeError, ImportError) as error:
+        raise TypeMissingError(f"{topic} can't be subscribed: {error}") from error
+
+
+def _never_called(_message: Any) -> None:
+    raise AssertionError("no executor spins these subscriptions")
 
 
 def middleware_name() -> str:

@@ -1,4 +1,4 @@
-# The gateway, and as the target "drive" the drive program. One switch, ROS: where rclpy comes from.
+# The gateway, and as the targets "drive" and "recorder" the drive program and the recorder. One switch, ROS: where rclpy comes from.
 #   packages  the official ROS 2 image, arm64 and amd64: the robot
 #   wheels    Debian 12 and the Python index's wheels, amd64: tests, and machines without a ROS image
 # Everything above rclpy is the same.
@@ -35,11 +35,11 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && .cache/tools/bin/pip install --quiet --no-cache-dir --require-hashes -r requirements/tools.txt
 
 FROM tools AS rclpy-wheels
-COPY requirements/gateway.txt requirements/ros-wheels.txt requirements/interfaces-build.txt requirements/
+COPY requirements/gateway.txt requirements/recorder.txt requirements/ros-wheels.txt requirements/interfaces-build.txt requirements/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && python3 -m venv --without-pip .venv \
  && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
-      -r requirements/gateway.txt -r requirements/ros-wheels.txt
+      -r requirements/gateway.txt -r requirements/recorder.txt -r requirements/ros-wheels.txt
 COPY interfaces interfaces
 COPY scripts/build-interfaces scripts/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
@@ -51,11 +51,11 @@ FROM tools AS rclpy-packages
 RUN apt-get update \
  && apt-get install -y --no-install-recommends ca-certificates git \
  && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
-COPY requirements/gateway.txt requirements/
+COPY requirements/gateway.txt requirements/recorder.txt requirements/
 RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
  && python3 -m venv --without-pip --system-site-packages .venv \
  && .cache/tools/bin/uv pip install --quiet --require-hashes --compile-bytecode --python .venv/bin/python \
-      -r requirements/gateway.txt
+      -r requirements/gateway.txt -r requirements/recorder.txt
 COPY interfaces/omniseer_msgs interfaces/omniseer_msgs
 COPY docker/build-interfaces-ros docker/refuse-stand-ins docker/
 # Release 4.6.1. A commit names its content, as a checksum does.
@@ -71,6 +71,7 @@ COPY console console
 COPY drive drive
 COPY gateway gateway
 COPY preview preview
+COPY recorder recorder
 COPY simrobot simrobot
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \
@@ -105,6 +106,28 @@ ARG VERSION=0.0.0
 ARG REVISION=unknown
 LABEL org.opencontainers.image.title="robot-drive" \
       org.opencontainers.image.description="Moves a robot for an operator, and stops it on any doubt" \
+      org.opencontainers.image.licenses="Apache-2.0" \
+      org.opencontainers.image.version="${VERSION}" \
+      org.opencontainers.image.revision="${REVISION}"
+
+# The recorder: the same layers, another user and another command.
+FROM installed AS recorder
+RUN install -d -m 0700 -o 10004 -g 10000 /tmp \
+ && install -d -m 0750 -o 10004 -g 10000 /var/lib/robot-recorder
+ENV ROBOT_RECORDER_CONFIG=/etc/robot-gateway/recorder.yaml \
+    RECORDER__LOG_FORMAT=json \
+    RECORDER__SOCKET=/run/robot-recorder/recorder.sock \
+    RECORDER__ROOT=/var/lib/robot-recorder \
+    GRPC_VERBOSITY=ERROR
+# The group is shared with the gateway, which connects to the socket, and with the preview, whose video it records.
+USER 10004:10000
+HEALTHCHECK --interval=30s --timeout=5s --start-period=60s --retries=3 \
+  CMD ["python", "-m", "recorder.health"]
+CMD ["python", "-m", "common.guard", "robot-recorder", "serve", "--config", "/etc/robot-gateway/recorder.yaml"]
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.title="robot-recorder" \
+      org.opencontainers.image.description="Records a robot's topics and video, and keeps room on its disk" \
       org.opencontainers.image.licenses="Apache-2.0" \
       org.opencontainers.image.version="${VERSION}" \
       org.opencontainers.image.revision="${REVISION}"

@@ -36,6 +36,7 @@ COPY console console
 COPY drive drive
 COPY gateway gateway
 COPY preview preview
+COPY recorder recorder
 COPY simrobot simrobot
 COPY proto/python proto/python
 RUN .cache/tools/bin/python -m hatchling build -t wheel \

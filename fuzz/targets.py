@@ -31,8 +31,8 @@ from gateway.access.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
-from gateway.links.link import LinkLostError
 from gateway.links.preview.wire import from_wire
+from gateway.links.watch import LinkLostError
 from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method

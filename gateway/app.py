@@ -27,6 +27,8 @@ PREVIEW_HEALTH: Final = "preview"
 """The preview service's name in the health service. The gateway serves without it."""
 DRIVE_HEALTH: Final = "drive"
 """The drive program's name there, where the robot is set up for driving."""
+RECORDER_HEALTH: Final = "recorder"
+"""The recorder's name there, where the robot is set up for recording."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often faults and events are looked for; a change of the preview causes a look at once."""
 
@@ -86,6 +88,11 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                     tasks.create_task(teleop.follow(), name="drive-reports"),
                     tasks.create_task(teleop.run(), name="teleop"),
                 ]
+            if recording := gateway.recording:
+                background += [
+                    tasks.create_task(recording.link.run(), name="recorder-link"),
+                    tasks.create_task(recording.incidents.run(), name="incidents"),
+                ]
             try:
                 yield port
             finally:
@@ -125,6 +132,9 @@ async def _observe(gateway: Gateway) -> None:
         health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
         if seen.teleop:
             health.set_serving(DRIVE_HEALTH, serving=seen.teleop.drive.reachable)
+        if gateway.recording and seen.recorder:
+            health.set_serving(RECORDER_HEALTH, serving=seen.recorder.reachable)
+            gateway.recording.incidents.take(seen.faults)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()
         if seen.preview.listener and seen.preview.listener != listener:

@@ -27,7 +27,11 @@ from gateway.links.preview.feedback import Feedback, PreviewServiceConnector
 from gateway.links.preview.model import PreviewModel
 from gateway.links.preview.wire import PreviewConnector
 from gateway.links.reconciler import Reconciler
-from gateway.metrics.collector import GatewayCollector
+from gateway.links.recorder.calls import RecorderCalls
+from gateway.links.recorder.incidents import Incidents
+from gateway.links.recorder.link import RecorderLink
+from gateway.links.recorder.wire import RecorderConnector
+from gateway.metrics.collector import GatewayCollector, RecorderMetrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
 from gateway.rpc.calls.methods import SERVICES
@@ -41,12 +45,14 @@ from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.export_stream import ExportStream
 from gateway.rpc.responses.response_cache import ResponseCache
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.rpc.server import SERVICE, Interceptors, Services
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
+from gateway.rpc.services.recording import RecordingService
 from gateway.rpc.services.status import StatusService
 from gateway.rpc.services.teleop import TeleopService
 from gateway.shown_settings import shown_settings
@@ -76,6 +82,15 @@ class Outside(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Recording:
+    """What watches the recorder and passes calls on."""
+
+    link: RecorderLink
+    calls: RecorderCalls
+    incidents: Incidents
+
+
+@dataclass(frozen=True, slots=True)
 class Gateway:
     """All parts that run; app.py starts and stops them."""
 
@@ -85,6 +100,7 @@ class Gateway:
     state: State
     preview_link: PreviewLink
     teleop: Teleop | None
+    recording: Recording | None
     access: AccessControl
     status_stream: StatusStream
     services: Services
@@ -117,6 +133,9 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     access = AccessControl(settings.security, state, control, admission, refusals)
     recipients = Recipients(settings.preview.advertised_host)
     teleop = state.teleop = _teleop(settings, link, access.audit, first_revision)
+    recording = _recording(settings)
+    state.recorder = recording.link if recording else None
+    exports = ExportStream()
     status_stream = StatusStream(state, time.monotonic)
     event_stream = EventStream(state.events, state.event_added)
     services = Services(
@@ -125,6 +144,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
         teleop=TeleopService(teleop, state, legacy_clients=settings.teleop.legacy_clients),
+        recording=RecordingService(recording.calls if recording else None, exports),
     )
     interceptors = Interceptors(
         stats=stats,
@@ -142,6 +162,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         state=state,
         preview_link=link,
         teleop=teleop,
+        recording=recording,
         access=access,
         status_stream=status_stream,
         services=services,
@@ -158,6 +179,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
             event_stream=event_stream,
             preview_link=link,
             drive_link=teleop.link if teleop else None,
+            recorder=RecorderMetrics(recording.link, recording.incidents, exports) if recording else None,
         ),
     )
 
@@ -186,6 +208,15 @@ def _teleop(
         line_of_sight=driving.line_of_sight,
         episodes=episodes,
     )
+
+
+def _recording(settings: GatewaySettings) -> Recording | None:
+    """Returns what speaks to the recorder; None where the robot is not set up for recording."""
+    socket = settings.recording.socket
+    if socket is None:
+        return None
+    calls = RecorderCalls(RecorderConnector(socket))
+    return Recording(RecorderLink(f"recorder at {socket}", calls), calls, Incidents(calls))
 
 
 @dataclass(frozen=True, slots=True)

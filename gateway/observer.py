@@ -15,6 +15,7 @@ from gateway.status.fault import Fault, Severity
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.tracker import Changes, FaultTracker
 from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
+from gateway.status.recording_events import RecordingEvents
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import MODE
 
@@ -40,6 +41,7 @@ class Observer:
         self._preview: tuple[PreviewState, Profile | None] | None = None
         self._encoder: Encoder | None = None
         self._mode = ""
+        self._recordings = RecordingEvents()
 
     def observe(self, snapshot: Snapshot) -> list[Event]:
         """Returns the events that this snapshot brings, in order."""
@@ -49,7 +51,11 @@ class Observer:
         up_s = snapshot.at_s - self._started_s
         present = conditions(snapshot, self._rules, self._tracker.active_ids, up_s)
         faults = list(_fault_events(self._tracker.update(present, snapshot.at_s)))
-        others = [*self._preview_events(snapshot.preview), *self._mode_events(snapshot)]
+        others = [
+            *self._preview_events(snapshot.preview),
+            *self._mode_events(snapshot),
+            *(self._recordings.take(snapshot.recorder) if snapshot.recorder else ()),
+        ]
         return faults if first else [*faults, *others]
 
     def _preview_events(self, preview: PreviewView) -> Iterator[Event]:

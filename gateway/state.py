@@ -5,12 +5,12 @@ import secrets
 import time
 from typing import Final, Protocol
 
+from common.boot import boot_id
 from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
 from gateway.links.preview.control import PreviewLink
 from gateway.observer import Observer
-from gateway.platform.files import boot_id
 from gateway.rpc.interceptors.stats import Stats
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
@@ -20,6 +20,7 @@ from gateway.status.faults.rules import FaultRules
 from gateway.status.faults.tracker import FaultTracker
 from gateway.status.pictures import NO_PICTURES, PictureReport, PictureReports, Pictures
 from gateway.status.preview import PreviewView
+from gateway.status.recording import RecorderView
 from gateway.status.snapshot import Identity, Runtime, Snapshot, take
 from gateway.status.teleop import TeleopView
 
@@ -35,6 +36,14 @@ class TeleopSource(Protocol):
         """Returns driving at this instant, from memory."""
 
 
+class RecorderSource(Protocol):
+    """What has the view of the recorder."""
+
+    @property
+    def view(self) -> RecorderView:
+        """The recorder at this instant, from memory."""
+
+
 class State:
     """The board, the events and the faults. Used on the event loop; other threads write to the board only.
 
@@ -47,6 +56,7 @@ class State:
         event_added: notified after each event.
         access: of the newest look at it.
         teleop: has the view of driving; None where the robot is not set up for it.
+        recorder: the same of recording.
     """
 
     def __init__(self, settings: GatewaySettings, preview_link: PreviewLink, stats: Stats) -> None:
@@ -69,6 +79,7 @@ class State:
         self._pictures = PictureReports()
         self.access: AccessView = UNGUARDED
         self.teleop: TeleopSource | None = None
+        self.recorder: RecorderSource | None = None
 
     @property
     def preview(self) -> PreviewView:
@@ -90,6 +101,7 @@ class State:
             now_s=now_s,
             access=self.access,
             teleop=self.teleop.view() if self.teleop else None,
+            recorder=self.recorder.view if self.recorder else None,
         )
 
     def observe(self, access: AccessView) -> Snapshot:

@@ -3,7 +3,9 @@
 import asyncio
 import logging
 import os
+from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
+from pathlib import Path
 from typing import Final, NoReturn
 
 from common import bind, rpc
@@ -17,6 +19,7 @@ from preview.pipeline.events import HungError
 from preview.pipeline.runner import Runner
 from preview.rpc.servicer import SERVICE, PreviewServicer
 from preview.supervisor import Supervisor
+from preview.tap import VideoTap
 
 _log = logging.getLogger(__name__)
 
@@ -50,7 +53,8 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     )
     trials = asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials")
     try:
-        await supervisor.run(stop)
+        async with _video_tap(settings.video_tap.socket, supervisor):
+            await supervisor.run(stop)
     except HungError as error:
         _end_process(error)
     finally:
@@ -59,6 +63,11 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
         await asyncio.gather(trials, return_exceptions=True)
         await prober.close()
         settings.socket.unlink(missing_ok=True)
+
+
+def _video_tap(path: Path | None, supervisor: Supervisor) -> AbstractAsyncContextManager[None]:
+    """Serves the video tap for as long as the block lasts, if there is to be one."""
+    return VideoTap(supervisor).serving(path) if path else nullcontext()
 
 
 def _end_process(error: HungError) -> NoReturn:

@@ -171,6 +171,15 @@ class AdaptiveSettings(Section):
     enabled: bool = True
 
 
+class VideoTapSettings(Section):
+    """Video tap: the encoder's output for the recorder, over a Unix socket."""
+
+    socket: Path | None = None
+    """Where the recorder connects. None: no tap."""
+    floor_kbps: int = Field(default=1500, ge=50, le=MAX_BITRATE_KBPS)
+    """Lower limit of the adaptive bit rate while a recorder is connected; at most the profile's bit rate."""
+
+
 class TimeoutSettings(Section):
     """Deadlines in seconds."""
 
@@ -210,6 +219,7 @@ class PreviewSettings(Settings):
     srt: SrtSettings = SrtSettings()
     encoders: EncoderSettings = EncoderSettings()
     adaptive: AdaptiveSettings = AdaptiveSettings()
+    video_tap: VideoTapSettings = VideoTapSettings()
     timeouts: TimeoutSettings = TimeoutSettings()
     runtime_dir: Path = Field(default_factory=_default_runtime_dir)
     """Directory for the graph of the last failed pipeline, the crash report and the crash marker; made this

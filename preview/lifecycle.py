@@ -18,7 +18,7 @@ class State(Enum):
     """State of the preview."""
 
     DISABLED = "disabled"
-    """No pipeline, no bound port, no CPU time."""
+    """No pipeline, no bound port, no CPU time; for viewers: no bound port."""
     STARTING = "starting"
     """A pipeline is being built or started; no encoded frame yet."""
     RUNNING = "running"
@@ -33,9 +33,9 @@ class Event(Enum):
     """Event that may change the state."""
 
     ENABLE = "enable"
-    """The preview was enabled, or enabled again by a new request."""
+    """A pipeline is wanted, or wanted again by a new request."""
     DISABLE = "disable"
-    """The preview was disabled."""
+    """No pipeline is wanted any more."""
     FIRST_FRAME = "first frame"
     """The first encoded frame reached the listener."""
     FAILURE = "failure"
@@ -44,6 +44,24 @@ class Event(Enum):
     """The retry delay has expired."""
     STOPPED = "stopped"
     """The teardown that STOPPING waits for has finished."""
+
+
+class Reason(Enum):
+    """Reason for which a pipeline is to run. It runs while there is at least one."""
+
+    VIEWERS = "viewers"
+    """The preview is enabled: viewers may connect to the listener."""
+    RECORDING = "recording"
+    """A recorder is connected to the video tap. It needs no listener."""
+
+
+class Listening(Enum):
+    """Whether viewers can connect to a running pipeline."""
+
+    NO = "no"
+    YES = "yes"
+    FAILED = "failed"
+    """Its listener has failed, while the pipeline goes on for a recording; a retry is scheduled."""
 
 
 _D, _S, _R, _X, _F = State.DISABLED, State.STARTING, State.RUNNING, State.STOPPING, State.FAULTED
@@ -66,6 +84,34 @@ TRANSITIONS: Final[Mapping[State, Mapping[Event, State]]] = MappingProxyType(
         _F: {Event.ENABLE: _S, Event.DISABLE: _D, Event.RETRY: _S},
     }
 )
+
+_FOR_VIEWERS: Final[Mapping[Listening, State]] = MappingProxyType(
+    {Listening.NO: _S, Listening.YES: _R, Listening.FAILED: _F}
+)
+
+
+def state_for_viewers(state: State, *, enabled: bool, listening: Listening) -> State:
+    """Returns the state of the preview as operators see it: a recording alone is none of theirs.
+
+    | pipeline | enabled | listening | for viewers |
+    |---|---|---|---|
+    | RUNNING | yes | yes, no, failed | RUNNING, STARTING, FAULTED |
+    | any other | yes | any | that of the pipeline |
+    | FAULTED | no | yes | FAULTED, until it is torn down |
+    | any other | no | yes | STOPPING, until the listener is closed |
+    | any | no | no, failed | DISABLED |
+
+    Args:
+        state: of the pipeline.
+        enabled: whether the preview is to run for viewers.
+        listening: whether the pipeline has a listener.
+    """
+    if enabled:
+        return _FOR_VIEWERS[listening] if state is State.RUNNING else state
+    if listening is not Listening.YES or state is State.DISABLED:
+        return State.DISABLED
+    return State.FAULTED if state is State.FAULTED else State.STOPPING
+
 
 FIRST_RETRY_S: Final = 1.0
 LONGEST_RETRY_S: Final = 30.0

@@ -27,11 +27,16 @@ What can fail, how it is noticed, and what follows:
 | hardware preferred, only x264 works | selection | runs, and last_error says so |
 | more viewers than srt.max_viewers | asked in SRT's handshake | refused, counted and logged |
 | gateway is gone | no watcher for without_gateway_s | disabled until the next request |
+| listener fails while recording | ERROR, deadline of its start | closed, retried with backoff |
 
 HungError ends the process with code 70 (app.py), to be restarted: only that frees the driver. A slow, frozen
 or vanished viewer is no failure: the listener drops it, and the others notice nothing. When another encoder
 takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some tenths of a
 second and must reconnect, to a stream of possibly another codec.
+
+One pipeline serves two reasons: viewers (the desired state) and a recording (a reader of the video tap). It
+runs while there is one. The listener exists only for viewers, and comes and goes without a gap in the
+recording; state_for_viewers says what operators see.
 """
 
 import asyncio
@@ -43,14 +48,24 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
 
+from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.errors import NotRunningError, UserError
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.selection import Selection
-from preview.lifecycle import Event, Lifecycle, State
-from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.lifecycle import (
+    FIRST_RETRY_S,
+    LONGEST_RETRY_S,
+    Event,
+    Lifecycle,
+    Listening,
+    Reason,
+    State,
+    state_for_viewers,
+)
+from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.values import (
     CAPTURE_OFFSET_NS,
@@ -59,6 +74,7 @@ from preview.values import (
     EncoderChoice,
     Measurement,
     Profile,
+    RecordedStream,
     StreamState,
 )
 
@@ -93,6 +109,16 @@ class Pipeline(Protocol):
     async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
 
+    async def listen(self, passphrase: str | None) -> None:
+        """Replaces the listener by one with another passphrase, None: by none; the encoder goes on.
+
+        Raises:
+            HungError: the old one hangs.
+        """
+
+    def record(self, take: Callable[[AccessUnit], None] | None) -> None:
+        """Hands each access unit to a recording from now on; None: to none."""
+
     def request_key_frame(self, newest_pts: int | None) -> bool:
         """Requests a key frame for a viewer that lost a picture; see `KeyframeGate.request_after_loss`."""
 
@@ -108,6 +134,16 @@ class Pipeline(Protocol):
 
     async def write_graph(self, path: Path) -> None:
         """Writes its graph, for finding the cause of a fault."""
+
+
+class Recording(Protocol):
+    """What the video tap wants of the pipelines; both are called on the loop."""
+
+    def take(self, unit: AccessUnit) -> None:
+        """Takes an access unit."""
+
+    def interrupted(self) -> None:
+        """The pipeline ends; what follows is another one's."""
 
 
 class Supervisor:
@@ -146,6 +182,10 @@ class Supervisor:
         self._retry_timer: asyncio.TimerHandle | None = None
         self._watchers = 0
         self._unwatched_timer: asyncio.TimerHandle | None = None
+        self._recording: Recording | None = None
+        self._listener_backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
+        self._listener_retry: asyncio.TimerHandle | None = None
+        """Runs while a listener that failed during a recording waits for its retry."""
         self._trials: asyncio.Task[bool] | None = None
         self._closed = False
         self._wake = asyncio.Event()
@@ -161,6 +201,10 @@ class Supervisor:
             return self.actual()
         if desired.revision != self._desired.revision or desired.revision == 0:
             profile = desired.profile if desired.enabled else self._desired.profile
+            if desired.enabled and not self._desired.enabled and self._lifecycle.state is State.RUNNING:
+                self._last_error = ""  # A new session, beside a recording.
+            self._forget_listener_retry()
+            self._listener_backoff.reset()
             self._desired = replace(desired, profile=profile)
             mode = f"on, {profile.value}" if desired.enabled else "off"
             _log.info("desired state %d: %s", desired.revision, mode)
@@ -170,11 +214,12 @@ class Supervisor:
 
     def actual(self) -> ActualState:
         """Returns the actual state."""
-        pipeline = self._pipeline
+        state = self._state_for_viewers
+        pipeline = self._pipeline if state is not State.DISABLED else None
         return ActualState(
             instance_id=self._instance_id,
             applied_revision=self._desired.revision,
-            state=self._lifecycle.state,
+            state=state,
             profile=self._desired.profile,
             last_error=self._last_error,
             counters=self._lifecycle.counters,
@@ -185,7 +230,25 @@ class Supervisor:
             stream=pipeline.stream if pipeline else None,
             encoder=pipeline.plan.choice if pipeline else None,
             measurement=pipeline.measurement if pipeline else None,
+            pipeline_state=self._lifecycle.state,
+            reasons=self._reasons,
         )
+
+    @property
+    def _reasons(self) -> tuple[Reason, ...]:
+        """Why a pipeline is to run."""
+        holds = {Reason.VIEWERS: self._desired.enabled, Reason.RECORDING: self._recording is not None}
+        return tuple(reason for reason in Reason if holds[reason])
+
+    @property
+    def _state_for_viewers(self) -> State:
+        enabled, session = self._desired.enabled, self._pipeline.plan.passphrase if self._pipeline else None
+        listening = Listening.NO
+        if self._listener_retry:
+            listening = Listening.FAILED
+        elif session is not None and (session == self._desired.passphrase or not enabled):
+            listening = Listening.YES
+        return state_for_viewers(self._lifecycle.state, enabled=enabled, listening=listening)
 
     def request_key_frame(self, newest_pts: int | None) -> bool:
         """Requests a key frame for a viewer that lost a picture; see `Pipeline.request_key_frame`.
@@ -193,8 +256,9 @@ class Supervisor:
         Raises:
             NotRunningError: no frames leave.
         """
-        if self._pipeline is None or self._lifecycle.state is not State.RUNNING:
-            raise NotRunningError(f"the preview is {self._lifecycle.state.value}")
+        state = self._state_for_viewers
+        if self._pipeline is None or state is not State.RUNNING:
+            raise NotRunningError(f"the preview is {state.value}")
         return self._pipeline.request_key_frame(newest_pts)
 
     def take_picture_age(self, age_ms: int) -> None:
@@ -212,6 +276,33 @@ class Supervisor:
         finally:
             self._watchers -= 1
             self._restart_unwatched_timer()
+
+    # --- for the video tap ---
+
+    def record(self, recording: Recording | None) -> None:
+        """Has a pipeline run for a recording, which gets every access unit from now on; None: for none."""
+        if self._closed and recording:
+            return
+        self._recording = recording
+        if self._pipeline:
+            self._pipeline.record(recording.take if recording else None)
+        self._follow_desired(new_request=recording is not None)
+
+    def recorded_stream(self) -> RecordedStream:
+        """Returns what a recording notes of the present stream."""
+        pipeline = self._pipeline
+        return RecordedStream(
+            state=self._lifecycle.state,
+            profile=self._desired.profile,
+            error=self._last_error,
+            stream=pipeline.stream if pipeline else None,
+            encoder=pipeline.plan.choice if pipeline else None,
+        )
+
+    def request_recorded_key_frame(self) -> None:
+        """Requests a key frame for a recording that begins; a pipeline that starts begins with one."""
+        if self._pipeline and self._lifecycle.state is State.RUNNING:
+            self._pipeline.request_key_frame(None)
 
     # --- reconciling: the pipeline follows the lifecycle; only the task of run() does this ---
 
@@ -232,7 +323,8 @@ class Supervisor:
     def _close(self) -> None:
         self._closed = True
         self._desired = replace(self._desired, enabled=False)
-        self._follow_desired(new_request=False)
+        self._forget_listener_retry()
+        self.record(None)
 
     async def _step(self) -> bool:
         """Does one thing that the lifecycle's state requires; False when there is none."""
@@ -249,9 +341,17 @@ class Supervisor:
             case State.STARTING | State.RUNNING if pipeline and pipeline.plan.profile is not profile:
                 _log.info("profile %s -> %s", pipeline.plan.profile.value, profile.value)
                 await pipeline.switch(profile)
+            case State.RUNNING if pipeline and pipeline.plan.passphrase != self._session:
+                _log.info("listener: %s", "closed" if self._session is None else "opened")
+                await pipeline.listen(self._session)
             case _:
                 return False
         return True
+
+    @property
+    def _session(self) -> str | None:
+        """The passphrase that the listener is to have at present; None: there is to be none."""
+        return None if self._listener_retry else self._desired.session
 
     async def _find_encoder(self) -> bool:
         """Runs trials until an encoder works that has not failed; False when none does, or when disabled."""
@@ -276,6 +376,9 @@ class Supervisor:
             return
         self._retry_now = False
         self._marker.set(encoder.name, proven=self._encoders.proven)
+        self._forget_listener_retry()
+        if self._recording:
+            pipeline.record(self._recording.take)
         await pipeline.start()
 
     def _report_software_fallback(self, choice: EncoderChoice) -> None:
@@ -298,7 +401,7 @@ class Supervisor:
                 self._retry_now = True
             if self._lifecycle.state is not State.FAULTED:
                 return True  # A request came during the trials.
-        if not self._desired.enabled:
+        if not self._reasons:
             self._move(Event.DISABLE)
         elif self._retry_now:
             self._retry_now = False
@@ -314,16 +417,18 @@ class Supervisor:
     async def _finish_stopping(self) -> None:
         if self._pipeline:
             await self._tear_down(self._pipeline, wait_s=None)
-        if not self._desired.enabled:
+        if not self._reasons:
             await self._join_teardowns()
         self._move(Event.STOPPED)
-        if self._desired.enabled:
+        if self._reasons:
             # Another passphrase, or enabled again in the meantime.
             self._last_error = ""
             self._move(Event.ENABLE)
 
     async def _tear_down(self, pipeline: Pipeline, wait_s: float | None) -> None:
         """Stops a pipeline; waits for its encoder for `wait_s`, None: until its own deadline."""
+        if self._recording:
+            self._recording.interrupted()
         teardown = await pipeline.stop()
         self._teardowns[teardown] = pipeline.plan.encoder.name
         await asyncio.wait({teardown}, timeout=wait_s)
@@ -365,6 +470,26 @@ class Supervisor:
             self._lifecycle.reset_backoff()
         self.changes.notify_all()
 
+    def listener_failed(self, fault: Fault) -> bool:
+        """Handles the fault of a listener; a recording goes on without it."""
+        if self._recording is None:
+            return False
+        _log.error("%s; the recording goes on", fault.text)
+        self._last_error = fault.text
+        delay_s = self._listener_backoff.next_s()
+        loop = asyncio.get_running_loop()
+        self._listener_retry = loop.call_later(delay_s, self._forget_listener_retry)
+        self._wake.set()
+        self.changes.notify_all()
+        return True
+
+    def _forget_listener_retry(self) -> None:
+        """Has the listener tried again now, if it waits for that."""
+        if self._listener_retry:
+            self._listener_retry.cancel()
+            self._listener_retry = None
+            self._wake.set()
+
     def failed(self, fault: Fault) -> None:
         """Handles the fault of a pipeline, or of the attempt to build one."""
         _log.error("%s", fault.text)
@@ -383,7 +508,7 @@ class Supervisor:
     def _follow_desired(self, *, new_request: bool) -> None:
         """Moves the lifecycle towards the desired state, as far as no pipeline must be stopped first."""
         state, torn_down = self._lifecycle.state, self._pipeline is None
-        if not self._desired.enabled:
+        if not self._reasons:
             if state is not State.DISABLED and (state is not State.FAULTED or torn_down):
                 self._move(Event.DISABLE)
         elif state is State.DISABLED or (state is State.FAULTED and torn_down and new_request):
@@ -392,7 +517,11 @@ class Supervisor:
             self._move(Event.ENABLE)
         elif state is State.FAULTED:
             self._retry_now = self._retry_now or new_request
-        elif self._pipeline and self._pipeline.plan.passphrase != self._desired.passphrase:
+        elif (
+            self._recording is None
+            and self._pipeline
+            and self._pipeline.plan.passphrase not in (None, self._desired.passphrase)
+        ):
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         self._wake.set()

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
-from preview.lifecycle import Counters, State
+from preview.lifecycle import Counters, Reason, State
 
 CAPTURE_OFFSET_NS: Final = -3_600 * 1_000_000_000
 """Capture time on CLOCK_MONOTONIC minus PTS: mpegtsmux adds an hour (TS_MUX_CLOCK_BASE), so that no DTS is
@@ -41,6 +41,11 @@ class DesiredState:
     enabled: bool = False
     profile: Profile = Profile.BALANCED
     passphrase: str = field(default="", repr=False)
+
+    @property
+    def session(self) -> str | None:
+        """The passphrase of the listener; None: there is to be no listener."""
+        return self.passphrase if self.enabled else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +126,32 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordedStream:
+    """What a recording notes of the stream, whenever it changes.
+
+    Args:
+        state: of the pipeline.
+        profile: in effect, or about to be.
+        error: last error; empty for none.
+        stream: None while no pipeline exists.
+        encoder: None while no pipeline exists.
+    """
+
+    state: State
+    profile: Profile
+    error: str
+    stream: StreamState | None
+    encoder: EncoderChoice | None
+
+
+@dataclass(frozen=True, slots=True)
 class ActualState:
     """State of the service at one moment.
 
     Args:
         instance_id: random per process.
         applied_revision: newest desired state applied; 0 for none.
-        state: state of the lifecycle.
+        state: of the preview for viewers; DISABLED where a pipeline runs for a recording alone.
         profile: of the newest desired state; a running pipeline follows at once.
         last_error: last error since the preview was enabled; empty for none.
         counters: counts since the process started.
@@ -135,9 +159,11 @@ class ActualState:
         port: UDP port of the listener.
         latency_ms: SRT latency of the listener (SRTO_LATENCY).
         capture_offset_ns: capture time minus PTS, of every stream.
-        stream: None while no pipeline exists.
-        encoder: None while no pipeline exists.
+        stream: None while no pipeline exists for viewers.
+        encoder: None while no pipeline exists for viewers.
         measurement: None before the end of the first window.
+        pipeline_state: of the one pipeline that serves all reasons.
+        reasons: for which it is to run, in the order of their definition.
     """
 
     instance_id: str
@@ -153,3 +179,5 @@ class ActualState:
     stream: StreamState | None = None
     encoder: EncoderChoice | None = None
     measurement: Measurement | None = None
+    pipeline_state: State = State.DISABLED
+    reasons: tuple[Reason, ...] = ()

@@ -51,6 +51,10 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
         "console.cli.drive:drive",
         "Drive the robot by keyboard or gamepad, with your own eyes on it, where the robot permits that.",
     ),
+    "record": (
+        "console.cli.record:record_app",
+        "Record on the robot, keep its last minutes, copy recordings to this computer.",
+    ),
     "robots": ("console.cli.robots:robots_app", "List the robots known by name, or change the list."),
 }
 """Each command's function (or group of commands), and the first line of its own help."""

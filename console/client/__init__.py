@@ -27,6 +27,7 @@ from console.client.errors import (
     Unreachable,
     Unsupported,
 )
+from console.client.exporting import ExportedRecording, ExportOptions, ExportProgress
 from console.client.mapping.methods import DesiredPreview
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
@@ -47,6 +48,8 @@ from console.client.results import (
     PreviewProfile,
     PreviewState,
     PreviewStatus,
+    Recording,
+    RecordingStatus,
     RobotStopped,
     StopLatch,
     Supervision,

@@ -1,14 +1,18 @@
 """The asyncio client. The blocking one (blocking.py) is a facade over it."""
 
 import asyncio
+import uuid
 from collections.abc import AsyncGenerator
-from typing import Self
+from pathlib import Path
+from typing import Self, TypeVar
 
 from console.client import results
 from console.client.clock import Clock, Offset
 from console.client.driving import DriveOptions, DriveSession
 from console.client.errors import DeadlineExceeded, Unreachable
 from console.client.event_feed import EventFeed
+from console.client.exporting import Export, ExportedRecording, ExportOptions
+from console.client.mapping import recording
 from console.client.mapping.driving import (
     enabled_request,
     reset_request,
@@ -16,16 +20,25 @@ from console.client.mapping.driving import (
     velocity_request,
 )
 from console.client.mapping.methods import (
+    DELETE_RECORDING,
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
+    GET_RECORDING,
     GET_SYSTEM_STATUS,
+    GET_THUMBNAIL,
+    LIST_RECORDINGS,
+    PIN_RECORDING,
     REPORT_PICTURE,
     REQUEST_KEY_FRAME,
     RESET_STOP,
     SEND_TELEOP_COMMAND,
     SET_TELEOP_ENABLED,
+    START_RECORDING,
+    STOP_RECORDING,
     STOP_ROBOT,
+    TRIGGER_SNAPSHOT,
     DesiredPreview,
+    Method,
     key_frame_request,
     picture_request,
 )
@@ -35,6 +48,8 @@ from console.client.transport import GrpcTransport
 from console.client.unary import UnaryCalls
 from console.credentials import Credentials
 from console.target import DEFAULT_TARGET, parse_target
+
+ResultT = TypeVar("ResultT")
 
 
 class AsyncGatewayClient:
@@ -240,6 +255,136 @@ class AsyncGatewayClient:
         request = velocity_request(vx_mps, vy_mps, wz_rad_s)
         return await self._calls.call(SEND_TELEOP_COMMAND, request, self._within_s)
 
+    async def start_recording(
+        self,
+        label: str = "",
+        *,
+        notes: str = "",
+        preset: str = "",
+        with_video: bool | None = None,
+        max_duration_s: int = 0,
+        max_bytes: int = 0,
+    ) -> results.RecordingAnswer:
+        """Starts a recording on the robot's disk; returns when its first file is open.
+
+        Args:
+            label: Its name for people.
+            notes: For people.
+            preset: What to record, one of `RecordingStatus.presets`; empty is the robot's first.
+            with_video: None as the preset says.
+            max_duration_s: It stops by itself then; 0 for no limit.
+            max_bytes: The same.
+
+        Raises:
+            Refused: Another one runs, or the disk has no room, for example.
+        """
+        request = recording.start_request(
+            _request_id(),
+            label=label,
+            notes=notes,
+            preset=preset,
+            with_video=with_video,
+            max_duration_s=max_duration_s,
+            max_bytes=max_bytes,
+        )
+        return await self._change_recording(START_RECORDING, request)
+
+    async def stop_recording(self, recording_id: str = "") -> results.RecordingAnswer:
+        """Stops a recording, by default the one that runs; waits for its files, but 10 s at the most."""
+        request = recording.stop_request(_request_id(), recording_id)
+        return await self._change_recording(STOP_RECORDING, request)
+
+    async def trigger_snapshot(
+        self,
+        label: str = "",
+        *,
+        pre_s: int | None = None,
+        post_s: int | None = None,
+        preset: str = "",
+    ) -> results.RecordingAnswer:
+        """Keeps the last seconds and the next ones; returns at once, with the recording that it becomes.
+
+        Args:
+            label: Its name for people.
+            pre_s: Seconds before this call; None as configured on the robot.
+            post_s: Seconds after it; the same.
+            preset: What to keep of the ring; empty is all of it.
+        """
+        request = recording.snapshot_request(
+            _request_id(), pre_s=pre_s, post_s=post_s, label=label, preset=preset
+        )
+        return await self._change_recording(TRIGGER_SNAPSHOT, request)
+
+    async def list_recordings(self, page_size: int = 50, page_token: str = "") -> results.RecordingPage:
+        """Returns a page of the list, the newest recording first, and the state of the recorder."""
+        request = recording.list_request(page_size, page_token)
+        return await self._calls.call(LIST_RECORDINGS, request, self._options.recording_within_s)
+
+    async def recordings(self) -> AsyncGenerator[results.Recording]:
+        """Yields all recordings, the newest first; requests page after page."""
+        token, seen = "", set[str]()
+        while True:
+            page = await self.list_recordings(page_token=token)
+            for each in page.recordings:
+                yield each
+            token = page.next_page_token
+            # A robot that repeats a token would be asked without an end.
+            if not token or token in seen:
+                return
+            seen.add(token)
+
+    async def recording(self, recording_id: str) -> results.Recording:
+        """Returns a recording with its files and gaps."""
+        request, within_s = recording.get_request(recording_id), self._options.recording_within_s
+        return (await self._calls.call(GET_RECORDING, request, within_s)).recording
+
+    async def recording_thumbnail(self, recording_id: str) -> results.RecordingThumbnail:
+        """Returns a coded key frame of a recording's video."""
+        request = recording.thumbnail_request(recording_id)
+        return await self._calls.call(GET_THUMBNAIL, request, self._options.recording_within_s)
+
+    async def pin_recording(self, recording_id: str, pinned: bool = True) -> results.RecordingAnswer:
+        """Pins a recording, so that making room never deletes it; or ends that."""
+        request = recording.pin_request(_request_id(), recording_id, pinned=pinned)
+        return await self._change_recording(PIN_RECORDING, request)
+
+    async def delete_recording(
+        self, recording_id: str, *, expected_sha256: bytes = b"", force: bool = False
+    ) -> results.RecordingDeleted:
+        """Deletes a recording and its files.
+
+        Args:
+            recording_id: Which.
+            expected_sha256: `Recording.sha256` as the caller has seen it; empty for any.
+            force: Although it is pinned or not copied yet; for administrators.
+        """
+        request = recording.delete_request(
+            _request_id(), recording_id, expected_sha256=expected_sha256, force=force
+        )
+        return await self._change_recording(DELETE_RECORDING, request)
+
+    async def export_recording(
+        self, recording_id: str, folder: Path, options: ExportOptions | None = None
+    ) -> ExportedRecording:
+        """Copies a recording to this computer; of one that is still written, what is final so far.
+
+        It goes on by itself after a cut connection, and verifies every byte. Cancelled, it leaves NAME.part
+        files, from which another export goes on.
+
+        Args:
+            recording_id: Which.
+            folder: Gets the recording's files; made if it is not there.
+            options: How to copy it.
+
+        Raises:
+            UserError: The folder can't be written, or has other files of the same names.
+        """
+        found = await self.recording(recording_id)
+        return await Export(self._transport, found, folder, options or ExportOptions()).run()
+
+    async def _change_recording(self, method: Method[ResultT], request: bytes) -> ResultT:
+        return await self._calls.call(method, request, self._options.recording_within_s)
+
     def _connect(self) -> GrpcTransport:
         """Returns a connection of its own."""
         return GrpcTransport(self.target, self._options, self._credentials)
@@ -255,6 +400,11 @@ class AsyncGatewayClient:
 
     async def __aexit__(self, *_: object) -> None:
         await self.close()
+
+
+def _request_id() -> str:
+    """Returns an ID by which the robot recognises a call that is repeated after a lost connection."""
+    return uuid.uuid4().hex
 
 
 async def _first_answer(attempts: "list[asyncio.Task[results.RobotStopped]]") -> results.RobotStopped:

@@ -41,7 +41,11 @@ def _iterating(
         items = method(self._client, *args, **kwargs)
         try:
             while True:
-                yield self._loop.run(_next(items))
+                try:
+                    item = self._loop.run(_next(items))
+                except StopAsyncIteration:
+                    return
+                yield item
         finally:
             # Not waited for: the garbage collector may close this iterator in the loop's own thread.
             with suppress(Cancelled):
@@ -136,6 +140,16 @@ class GatewayClient:
     reset_stop = _blocking(AsyncGatewayClient.reset_stop)
     set_driving_enabled = _blocking(AsyncGatewayClient.set_driving_enabled)
     send_velocity = _blocking(AsyncGatewayClient.send_velocity)
+    start_recording = _blocking(AsyncGatewayClient.start_recording)
+    stop_recording = _blocking(AsyncGatewayClient.stop_recording)
+    trigger_snapshot = _blocking(AsyncGatewayClient.trigger_snapshot)
+    list_recordings = _blocking(AsyncGatewayClient.list_recordings)
+    recording = _blocking(AsyncGatewayClient.recording)
+    recording_thumbnail = _blocking(AsyncGatewayClient.recording_thumbnail)
+    pin_recording = _blocking(AsyncGatewayClient.pin_recording)
+    delete_recording = _blocking(AsyncGatewayClient.delete_recording)
+    export_recording = _blocking(AsyncGatewayClient.export_recording)
+    recordings = _iterating(AsyncGatewayClient.recordings)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 

@@ -6,8 +6,8 @@ from typing import Any, Final
 import grpc
 
 from common.reasons import Reason
+from common.refusal import refusal_in
 from console.client import errors
-from console.client.refusal import refusal_in
 from console.printable import printable
 
 ERRORS: Final[Mapping[grpc.StatusCode, type[errors.GatewayError]]] = {
@@ -41,6 +41,23 @@ REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
     Reason.LEASE_LOST: errors.Refused,
     Reason.DRIVE_UNREACHABLE: errors.Refused,
     Reason.STOP_NOT_RESET: errors.Refused,
+    Reason.RECORDING_NOT_CONFIGURED: errors.Refused,
+    Reason.RECORDER_UNREACHABLE: errors.Refused,
+    Reason.RECORDER_NOT_READY: errors.Refused,
+    Reason.RECORDING_NOT_FOUND: errors.Refused,
+    Reason.RECORDING_RUNS: errors.Refused,
+    Reason.NO_VIDEO: errors.Refused,
+    Reason.NO_RING: errors.Refused,
+    Reason.DISK_FULL: errors.Refused,
+    Reason.TOO_MANY_SNAPSHOTS: errors.Overloaded,
+    Reason.TOO_MANY_EXPORTS: errors.Overloaded,
+    Reason.FILE_NOT_FINAL: errors.Refused,
+    Reason.RECORDING_CHANGED: errors.Refused,
+    Reason.RECORDING_DELETED: errors.Refused,
+    Reason.RECORDING_DAMAGED: errors.Refused,
+    Reason.RECORDING_READ_ONLY: errors.Refused,
+    Reason.RECORDING_PINNED: errors.Refused,
+    Reason.RECORDING_NOT_COPIED: errors.Refused,
     Reason.MESSAGE_TOO_LARGE: errors.InvalidRequest,
     Reason.UNKNOWN_SERVICE: errors.Refused,
     Reason.TOO_MANY_CONNECTIONS: errors.Overloaded,
@@ -69,6 +86,27 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.CREDENTIAL_EXPIRED: _NEW_LOGIN,
     Reason.TELEOP_DISABLED: "Type: robotctl drive --enable",
     Reason.LEASE_HELD: "Type: robotctl drive --take-over",
+    Reason.RECORDING_NOT_CONFIGURED: "Ask this robot's administrator to set it up; see docs/recording.md",
+    Reason.RECORDER_UNREACHABLE: "Start or restart robot-recorder on the robot; what it records goes on",
+    Reason.RECORDER_NOT_READY: "Type: robotctl status",
+    Reason.RECORDING_NOT_FOUND: "Type: robotctl record list",
+    Reason.RECORDING_RUNS: "Wait until it ends, or type: robotctl record stop",
+    Reason.NO_VIDEO: "Type: robotctl record start --no-video",
+    Reason.NO_RING: "Set `ring` in the recorder's configuration",
+    Reason.DISK_FULL: "Copy recordings to this computer and delete them: robotctl record list",
+    Reason.TOO_MANY_SNAPSHOTS: "Wait until they are complete: robotctl record list",
+    Reason.TOO_MANY_EXPORTS: "Wait until another export has ended",
+    Reason.FILE_NOT_FINAL: "Wait until the recorder has begun its next file, or type: robotctl record stop",
+    Reason.RECORDING_CHANGED: "Type: robotctl record show ID",
+    Reason.RECORDING_DELETED: "Type: robotctl record list",
+    Reason.RECORDING_DAMAGED: "Check the robot's disk; the recording's other files may be intact",
+    Reason.RECORDING_READ_ONLY: "Change it on the robot itself",
+    Reason.RECORDING_PINNED: (
+        "Type: robotctl record unpin ID; an administrator may type: robotctl record delete ID --force"
+    ),
+    Reason.RECORDING_NOT_COPIED: (
+        "Wait until it is copied, or as an administrator type: robotctl record delete ID --force"
+    ),
     Reason.CREDENTIALS_UNREADABLE: (
         "Ask this robot's administrator to repair its list of credentials; no new login is needed"
     ),

@@ -77,6 +77,16 @@ class GrpcTransport:
         call = stream(request, metadata=self._metadata)
         return Responses(call, method, self, newest_only=newest_only)
 
+    def pull(self, method: Method[ResultT], request: bytes) -> "Pull[ResultT]":
+        """Starts a server-streaming call whose responses are received one at a time.
+
+        Raises:
+            Cancelled: The client is closed.
+        """
+        self.check_open()
+        stream: Any = self._channel.unary_stream(method.path)
+        return Pull(stream(request, metadata=self._metadata), method, self)
+
     def open_both_ways(self, method: Method[ResultT]) -> "Duplex[ResultT]":
         """Starts a call whose requests and responses are streams.
 
@@ -188,45 +198,39 @@ class Responses:
         await self._queue.put(error)
 
 
-class Duplex(Generic[ResultT]):
-    """A call whose requests and responses are streams. One task may write while another reads."""
+class Pull(Generic[ResultT]):
+    """A call whose responses are received one at a time, each when it is read: none waits in memory."""
 
     def __init__(self, call: Any, method: Method[ResultT], transport: GrpcTransport) -> None:
         self._call = call
         self._method = method
         self._transport = transport
 
-    async def write(self, request: bytes) -> None:
-        """Sends a request; returns when gRPC has taken it.
-
-        Raises:
-            GatewayError: The call has ended.
-        """
-        try:
-            await self._call.write(request)
-        except (grpc.RpcError, asyncio.InvalidStateError):
-            raise await self._end() from None
-
-    async def read(self) -> ResultT:
+    async def read(self, within_s: float | None = None) -> ResultT:
         """Returns the next response.
 
+        Args:
+            within_s: How long to wait for it; None waits for as long as the call lasts.
+
         Raises:
-            GatewayError: The call has ended.
+            GatewayError: The call has ended, or nothing came in time.
         """
         try:
-            answer = await self._call.read()
+            async with asyncio.timeout(within_s):
+                answer = await self._call.read()
+        except TimeoutError:
+            raise DeadlineExceeded(f"the robot gateway sent nothing for {within_s:.1f} s") from None
         except grpc.RpcError as failure:
             raise self._transport.end_of_stream(failure) from None
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            # gRPC raises it, too, when the channel was closed under the call.
+            if task and task.cancelling():
+                raise
+            raise Cancelled("this client was closed") from None
         if answer is grpc.aio.EOF:
             raise await self._end()
         return self._transport.decode(self._method, answer)
-
-    async def finish(self) -> None:
-        """Ends the requests; the gateway then ends the call."""
-        try:
-            await self._call.done_writing()
-        except (grpc.RpcError, asyncio.InvalidStateError):
-            return  # It has ended already.
 
     def cancel(self) -> None:
         """Ends the call at once."""
@@ -244,6 +248,28 @@ class Duplex(Generic[ResultT]):
                 await self._call.details(),
             )
         )
+
+
+class Duplex(Pull[ResultT]):
+    """A call whose requests and responses are streams. One task may write while another reads."""
+
+    async def write(self, request: bytes) -> None:
+        """Sends a request; returns when gRPC has taken it.
+
+        Raises:
+            GatewayError: The call has ended.
+        """
+        try:
+            await self._call.write(request)
+        except (grpc.RpcError, asyncio.InvalidStateError):
+            raise await self._end() from None
+
+    async def finish(self) -> None:
+        """Ends the requests; the gateway then ends the call."""
+        try:
+            await self._call.done_writing()
+        except (grpc.RpcError, asyncio.InvalidStateError):
+            return  # It has ended already.
 
 
 def _tls(credentials: Credentials) -> grpc.ChannelCredentials:

@@ -12,6 +12,7 @@ _CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S"
 _MINUTE_S: Final = 60
 _HOUR_S: Final = 3600
 _GIB: Final = 1 << 30
+_KILO: Final = 1000
 
 
 def quantity(value: float | None, unit: str, digits: int = 1) -> str:
@@ -53,6 +54,16 @@ def wall_clock(unix_ms: int, zone: tzinfo | None = None, form: str = _CLOCK_FORM
 def gibibytes(count: int | None) -> str:
     """Returns a size of memory: 1.2 GiB."""
     return quantity(None if count is None else count / _GIB, "GiB")
+
+
+def size(count: int) -> str:
+    """Returns a size of a file, in decimal units as disks and networks have them: 640 B, 12.3 MB, 4.1 GB."""
+    value = float(count)
+    for unit in ("B", "kB", "MB", "GB"):
+        if value < _KILO:
+            return f"{value:.0f} B" if unit == "B" else f"{value:.1f} {unit}"
+        value /= _KILO
+    return f"{value:.1f} TB"
 
 
 def bit_rate(kbps: float | None) -> str:

@@ -4,7 +4,14 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Final
 
-from console.client.results import DrivePhase, FaultSeverity, Freshness, HealthState, PreviewState
+from console.client.results import (
+    DrivePhase,
+    FaultSeverity,
+    Freshness,
+    HealthState,
+    PreviewState,
+    RecorderState,
+)
 
 
 class SeverityStyle(Enum):
@@ -49,4 +56,14 @@ DRIVE_STYLES: Final[Mapping[DrivePhase, SeverityStyle]] = {
     DrivePhase.INHIBITED: SeverityStyle.WARNING,
     DrivePhase.STOPPED: SeverityStyle.BAD,
     DrivePhase.UNKNOWN: SeverityStyle.QUIET,
+}
+RECORDER_STYLES: Final[Mapping[RecorderState, SeverityStyle]] = {
+    RecorderState.RECORDING: SeverityStyle.GOOD,
+    RecorderState.STARTING: SeverityStyle.WARNING,
+    RecorderState.FINALISING: SeverityStyle.WARNING,
+    RecorderState.RECOVERING: SeverityStyle.WARNING,
+    RecorderState.FAULTED: SeverityStyle.BAD,
+    RecorderState.UNREACHABLE: SeverityStyle.WARNING,
+    RecorderState.IDLE: SeverityStyle.QUIET,
+    RecorderState.UNKNOWN: SeverityStyle.QUIET,
 }

@@ -28,11 +28,13 @@ from console.presentation.formatting import (
     quantity,
     signed,
 )
+from console.presentation.recording import recording_summary
 from console.presentation.severity_style import (
     FAULT_STYLES,
     FRESHNESS_STYLES,
     HEALTH_STYLES,
     PREVIEW_STYLES,
+    RECORDER_STYLES,
     SeverityStyle,
 )
 from console.presentation.value_style import (
@@ -259,6 +261,14 @@ def _teleop(view: View) -> Iterator[Row]:
     yield row if view.compact else replace(row, age=view.age(teleop.last_command.age_ms))
 
 
+def _recording(view: View) -> Iterator[Row]:
+    recording = view.status.recording
+    if recording is not None:
+        text = recording_summary(recording, compact=view.compact)
+        style = RECORDER_STYLES[recording.state]
+        yield view.state(view.label("recording"), recording.state.value, style, text)
+
+
 def _motion(odometry: results.Odometry, compact: bool) -> str:
     return joined(
         quantity(odometry.linear_speed_mps, "m/s", 2),
@@ -413,6 +423,7 @@ TABLE: Final[tuple[Rows, ...]] = (
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
+    _recording,
     _access,
     _gateway,
     _sources,

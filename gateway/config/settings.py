@@ -9,6 +9,7 @@ from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, SettingsConflictError, load
 from gateway.config.faults import FaultSettings
+from gateway.config.recording import RecordingSettings
 from gateway.config.security import SecuritySettings
 from gateway.config.serving import (
     DiscoverySettings,
@@ -64,6 +65,7 @@ class GatewaySettings(Settings):
     limits: LimitSettings = LimitSettings()
     preview: PreviewSettings = PreviewSettings()
     teleop: TeleopSettings = TeleopSettings()
+    recording: RecordingSettings = RecordingSettings()
     platform: PlatformSettings = PlatformSettings()
     faults: FaultSettings = FaultSettings()
     metrics: MetricsSettings = MetricsSettings()

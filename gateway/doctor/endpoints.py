@@ -50,6 +50,14 @@ DRIVE: Final = Service(
     command="robot-drive serve",
     without_it="Without it no one can drive",
 )
+RECORDER: Final = Service(
+    check="recording",
+    name="the recorder",
+    kind=socket.SOCK_STREAM,
+    key="recording.socket",
+    command="robot-recorder serve",
+    without_it="Without it recordings can't be started, stopped or copied",
+)
 
 
 def operator_endpoint(host: str, port: int) -> Finding:

@@ -13,7 +13,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import TlsFiles, load_access
 from gateway.config import SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import DRIVE, PREVIEW, operator_endpoint, service_endpoint
+from gateway.doctor.endpoints import DRIVE, PREVIEW, RECORDER, operator_endpoint, service_endpoint
 from gateway.doctor.video import video_finding
 
 
@@ -40,6 +40,8 @@ def examine(config: Path | None) -> Iterator[Finding]:
         yield video_finding(settings)
     if settings.teleop.socket:
         yield service_endpoint(DRIVE, settings.teleop.socket)
+    if settings.recording.socket:
+        yield service_endpoint(RECORDER, settings.recording.socket)
     yield from device_findings()
     yield from _ros(settings.sources)
 

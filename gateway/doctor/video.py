@@ -5,9 +5,9 @@ from typing import Final
 
 from common.findings import Finding, note
 from gateway.config import GatewaySettings
-from gateway.links.link import LinkLostError
 from gateway.links.preview.exposure import video_exposure
 from gateway.links.preview.wire import PreviewConnector
+from gateway.links.watch import LinkLostError
 from gateway.status.preview import Listener
 
 _TIMEOUT_S: Final = 3.0

@@ -5,31 +5,39 @@ from typing import Final
 
 import grpc
 
-from gateway.links.link import LinkLostError, RefusedError
+from gateway.links.link import RefusedError
+from gateway.links.watch import LinkLostError
 
 _OPTIONS: Final = (
     # A new attempt is a new connection; gRPC's own backoff (1 s to 120 s), which it shares between the
     # channels of a process, must not add to the link's.
     ("grpc.use_local_subchannel_pool", 1),
     ("grpc.enable_retries", 0),
-    ("grpc.max_receive_message_length", 256 * 1024),
 )
-_GONE: Final = frozenset(
+_MAX_MESSAGE_BYTES: Final = 256 * 1024
+GONE: Final = frozenset(
     {grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED}
 )
+"""The codes of a service that does not answer."""
 
 
-def unix_channel(socket: Path) -> grpc.aio.Channel:
-    """Returns a channel that closes with its `async with` block."""
-    return grpc.aio.insecure_channel(f"unix:{socket}", options=_OPTIONS)
+def unix_channel(socket: Path, max_message_bytes: int = _MAX_MESSAGE_BYTES) -> grpc.aio.Channel:
+    """Returns a channel that closes with its `async with` block.
+
+    Args:
+        socket: where the service listens, or will.
+        max_message_bytes: a longer response fails.
+    """
+    options = (*_OPTIONS, ("grpc.max_receive_message_length", max_message_bytes))
+    return grpc.aio.insecure_channel(f"unix:{socket}", options=options)
 
 
 def lost(error: grpc.aio.AioRpcError) -> LinkLostError:
     """Returns the error of a broken stream of reports."""
     detail = f"{error.code().name} {error.details()}"
-    return LinkLostError("nothing answers on its socket" if error.code() in _GONE else detail, detail)
+    return LinkLostError("nothing answers on its socket" if error.code() in GONE else detail, detail)
 
 
 def failed(error: grpc.aio.AioRpcError) -> LinkLostError | RefusedError:
     """Returns the error of a request that failed: a refusal, unless the service is gone."""
-    return lost(error) if error.code() in _GONE else RefusedError(error.details() or error.code().name)
+    return lost(error) if error.code() in GONE else RefusedError(error.details() or error.code().name)

@@ -14,18 +14,31 @@ from prometheus_client.registry import Collector
 
 from gateway.links.drive.state import DriveLink
 from gateway.links.preview.control import PreviewLink
+from gateway.links.recorder.incidents import Incidents
+from gateway.links.recorder.link import RecorderLink
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.ports import SnapshotSource
 from gateway.rpc.connections.guard import ConnectionGuard
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.responses.event_stream import EventStream
+from gateway.rpc.responses.export_stream import ExportStream
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
+from gateway.status.recording import RecorderState, RecorderView
 from gateway.status.snapshot import Snapshot
 from gateway.status.teleop import DrivePhase, TeleopView
 
 _PREFIX: Final = "robot_gateway"
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderMetrics:
+    """What counts recording."""
+
+    link: RecorderLink
+    incidents: Incidents
+    exports: ExportStream
 
 
 @dataclass(eq=False)
@@ -41,6 +54,7 @@ class GatewayCollector(Collector):
         connection_guard: counts connections.
         preview_link: counts failures to connect.
         drive_link: the same; None where the robot is not set up for driving.
+        recorder: counts recording; None where the robot is not set up for it.
     """
 
     state: SnapshotSource
@@ -51,6 +65,7 @@ class GatewayCollector(Collector):
     event_stream: EventStream
     preview_link: PreviewLink
     drive_link: DriveLink | None = None
+    recorder: RecorderMetrics | None = None
 
     def text(self) -> bytes:
         """Returns them in Prometheus' text format."""
@@ -78,6 +93,8 @@ class GatewayCollector(Collector):
         yield from _stream(now)
         if now.teleop and self.drive_link:
             yield from _driving(now.teleop, self.drive_link.failures)
+        if now.recorder and self.recorder:
+            yield from _recording(now.recorder, self.recorder)
 
     def _calls(self) -> Iterator[Metric]:
         methods = sorted(self.stats.methods.items())
@@ -231,3 +248,29 @@ def _stream(now: Snapshot) -> Iterator[Metric]:
         yield _gauge("preview_worst_rtt_seconds", "Of all viewers.", measured.worst_rtt_ms / 1000)
     if measured.worst_loss_percent is not None:
         yield _gauge("preview_worst_loss_percent", "Of all viewers.", measured.worst_loss_percent)
+
+
+def _recording(view: RecorderView, recorder: RecorderMetrics) -> Iterator[Metric]:
+    states = {each.value: float(view.status.state is each) for each in RecorderState}
+    yield _gauges("recorder_state", "1 for the state it is in.", "state", states)
+    failures = recorder.link.failures
+    yield _gauge("recorder_link_failures", "Failures in a row to connect to the recorder.", failures)
+    yield _gauge("exports", "Exports of recordings that run.", recorder.exports.open)
+    yield _counter("exported_bytes", "Bytes sent by exports.", recorder.exports.sent_bytes)
+    unreported = "Faults that the recorder could not be given."
+    yield _counter("faults_unreported", unreported, recorder.incidents.expired)
+    if view.report is None:
+        return
+    # Of the present process of the recorder, as far as they are counts.
+    report = view.report.value
+    status = report.status
+    yield _gauge("recording_bytes_per_second", "Written at present.", status.bytes_per_s)
+    yield _gauge("recording_room_bytes", "May still be written.", status.room_bytes)
+    yield _gauge("recordings", "Recordings on the disk.", status.recordings)
+    if report.messages_lost is not None:
+        lost = "Messages that the middleware lost before the recorder took them."
+        yield _counter("recording_messages_lost", lost, report.messages_lost)
+    dropped = "Messages dropped because the disk was too slow."
+    yield _counter("recording_messages_dropped", dropped, report.messages_dropped)
+    yield _gauge("recording_disk_free_bytes", "Free on its file system.", report.disk_free_bytes)
+    yield _gauge("recording_disk_size_bytes", "Size of its file system.", report.disk_size_bytes)

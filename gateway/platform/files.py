@@ -17,8 +17,3 @@ def number(path: Path) -> int | None:
         return int(text(path) or "")
     except ValueError:
         return None
-
-
-def boot_id(proc: Path = Path("/proc")) -> str:
-    """Returns the kernel's random boot ID (random(4)); empty if unavailable."""
-    return text(proc / "sys/kernel/random/boot_id") or ""

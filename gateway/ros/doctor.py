@@ -1,16 +1,14 @@
 """Examines ROS 2 on this machine: middleware, domain, message types, publishers."""
 
 import os
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
-from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node
+from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node, share_directory
 from gateway.config import SourceSettings
 from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
@@ -98,10 +96,8 @@ def _type_finding(source: SourceSettings) -> Finding:
 
 def _is_stand_in(message_type: Any) -> bool:
     """Returns whether the class comes from a package of interfaces/stand_ins."""
-    package = message_type.__module__.partition(".")[0]
-    # PREFIX/lib/pythonX.Y/site-packages/PACKAGE/__init__.py, as colcon and the wheels install it.
-    file = Path(sys.modules[package].__file__ or "")
-    return len(file.parents) > 4 and (file.parents[4] / "share" / package / _STAND_IN).exists()
+    share = share_directory(message_type.__module__.partition(".")[0])
+    return share is not None and (share / _STAND_IN).exists()
 
 
 def _discover(node: Any, sources: Sequence[SourceSettings]) -> list[tuple[SourceSettings, _Announced]]:

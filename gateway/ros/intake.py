@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from common.ros_node import TypeMissingError, ros_node
+from common.sampler import SAMPLING_HZ, Sampler
 from gateway.config import SourceSettings
 from gateway.ros.publishers import PublisherMonitor
 from gateway.ros.readers import reader_for
-from gateway.ros.sampler import SAMPLING_HZ, Sampler
 from gateway.ros.source import Source
 from gateway.ros.subscription import subscribe
 from gateway.status.board import Board

@@ -8,10 +8,10 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 
+from common.receive_time import Instant, present_instant, received_at
 from gateway.config import SourceSettings
 from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import is_header_and_list, reader_for
-from gateway.ros.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.values import Received
 
@@ -21,9 +21,6 @@ log = logging.getLogger(__name__)
 # pauses, so that a flood of them starves neither the other sources nor the clients.
 _MAX_SHARE = 0.2
 _WARN_EVERY_S = 10.0
-_MAX_CLOCK_GAP_S = 50e-6
-"""Between reading the two clocks; a larger gap means that the thread was preempted in between."""
-_CLOCK_TRIES = 3
 
 
 @dataclass(slots=True)
@@ -73,7 +70,7 @@ class Source:
 
     def take(self) -> None:
         """Puts the value of the newest message on the board, if there is a new one. Never raises."""
-        now = _now()
+        now = present_instant()
         if now.monotonic_s < self._paused_until_s:
             return
         cpu_before_s = time.thread_time()
@@ -122,15 +119,6 @@ class Source:
             type(error).__name__,
             error,
         )
-
-
-def _now() -> Instant:
-    """Reads both clocks as closely together as the scheduler allows: the gap between them is an error."""
-    for _ in range(_CLOCK_TRIES):
-        now = Instant(time.monotonic(), time.time_ns())
-        if time.monotonic() - now.monotonic_s < _MAX_CLOCK_GAP_S:
-            break
-    return now
 
 
 def _decoder_of(source: SourceSettings, message_type: Any) -> Callable[[bytes], Any]:

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from common.ros_node import TypeMissingError, message_class
+from common.ros_node import message_class, subscribe_raw
 from gateway.config import SourceSettings
 
 
@@ -13,20 +12,9 @@ def subscribe(node: Any, source: SourceSettings) -> Any:
     """Returns a subscription for serialised messages. No executor spins it: `Source` takes the messages.
 
     Raises:
-        TypeMissingError: see `message_class`; also if the type support of the middleware can't be loaded.
+        TypeMissingError: see `message_class` and `subscribe_raw`.
     """
-    message_type = message_class(source.type)
-    try:
-        return node.create_subscription(
-            message_type,
-            source.topic,
-            _never_called,
-            qos_of(source),
-            raw=True,
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-        )
-    except (RuntimeError, ImportError) as error:
-        raise TypeMissingError(f"{source.topic} can't be subscribed as {source.type}: {error}") from error
+    return subscribe_raw(node, message_class(source.type), source.topic, qos_of(source))
 
 
 def qos_of(source: SourceSettings) -> Any:
@@ -37,7 +25,3 @@ def qos_of(source: SourceSettings) -> Any:
         reliability=ReliabilityPolicy[source.reliability.upper()],
         durability=DurabilityPolicy[source.durability.upper()],
     )
-
-
-def _never_called(_message: Any) -> None:
-    raise AssertionError("no executor spins these subscriptions")

@@ -28,6 +28,7 @@ from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
 from gateway.rpc.services.preview import PreviewService
+from gateway.rpc.services.recording import RecordingService
 from gateway.rpc.services.status import StatusService
 from gateway.rpc.services.teleop import TeleopService
 
@@ -45,6 +46,7 @@ class Services:
     events: EventsService
     info: InfoService
     teleop: TeleopService
+    recording: RecordingService
 
     def methods(self) -> Mapping[str, Behavior]:
         """Returns the contract's methods by name. Total: a test compares them with the schema."""
@@ -63,6 +65,15 @@ class Services:
             "Drive": self.teleop.drive,
             "StopRobot": self.teleop.stop_robot,
             "ResetStop": self.teleop.reset_stop,
+            "StartRecording": self.recording.start_recording,
+            "StopRecording": self.recording.stop_recording,
+            "TriggerSnapshot": self.recording.trigger_snapshot,
+            "ListRecordings": self.recording.list_recordings,
+            "GetRecording": self.recording.get_recording,
+            "ExportRecording": self.recording.export_recording,
+            "GetRecordingThumbnail": self.recording.get_recording_thumbnail,
+            "PinRecording": self.recording.pin_recording,
+            "DeleteRecording": self.recording.delete_recording,
         }
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 from gateway.status.fault import Fault
 from gateway.status.freshness import Sample
 from gateway.status.preview import PreviewView
+from gateway.status.recording import RecorderView
 from gateway.status.snapshot import Snapshot
 from gateway.status.source_view import SourceView
 from gateway.status.sources import SourceSpec
@@ -54,6 +55,26 @@ def _teleop(view: TeleopView | None) -> object:
     return drive.enabled, drive.error, drive.phase, drive.stop, view.inhibits, view.holder, view.last_error
 
 
+def _recorder(view: RecorderView | None) -> object:
+    """Without what grows while it records: elapsed time, sizes, counts of messages, room."""
+    if view is None:
+        return None
+    status = view.status
+    return (
+        status.state,
+        status.recording_id,
+        status.label,
+        status.preset,
+        status.messages_lost,
+        status.video,
+        status.snapshots_pending,
+        status.recordings,
+        status.to_copy,
+        status.last_error,
+        [(each.name, each.in_ring) for each in status.presets],
+    )
+
+
 def _faults(faults: tuple[Fault, ...]) -> object:
     return [(each.condition, each.onset_s, each.cleared_s) for each in faults]
 
@@ -70,5 +91,6 @@ PROJECTIONS: Final[Mapping[str, Callable[[Any], object]]] = {
     "pictures": attrgetter("viewer_count"),
     "sources": _sources,
     "teleop": _teleop,
+    "recorder": _recorder,
     "faults": _faults,
 }

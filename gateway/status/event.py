@@ -7,6 +7,12 @@ from typing import TypeAlias
 
 from gateway.status.fault import Fault, Severity
 from gateway.status.preview import PreviewState, Profile
+from gateway.status.recording import (
+    RecordingChange,
+    RecordingKind,
+    RecordingState,
+    RecordingStopReason,
+)
 
 
 class ControlResult(Enum):
@@ -105,6 +111,24 @@ class ModeChanged:
     mode: str
 
 
+@dataclass(frozen=True, slots=True)
+class RecordingChanged:
+    """A recording began or ended, a snapshot is complete, or messages were lost.
+
+    Attributes:
+        kind, state, stop_reason: None where they are not known, and before the end.
+        messages_lost: so far; None if unknown.
+    """
+
+    change: RecordingChange
+    recording_id: str
+    label: str
+    kind: RecordingKind | None = None
+    state: RecordingState | None = None
+    stop_reason: RecordingStopReason | None = None
+    messages_lost: int | None = None
+
+
 Detail: TypeAlias = (
     FaultRaised
     | FaultCleared
@@ -114,6 +138,7 @@ Detail: TypeAlias = (
     | ClientLeft
     | ControlAction
     | ModeChanged
+    | RecordingChanged
 )
 
 

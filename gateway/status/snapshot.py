@@ -13,6 +13,7 @@ from gateway.status.freshness import ABSENT, Sample, sample
 from gateway.status.health import NOT_READ, RobotHealth, assess
 from gateway.status.pictures import NO_PICTURES, Pictures
 from gateway.status.preview import Measurement, PreviewView
+from gateway.status.recording import RecorderView
 from gateway.status.source_view import SourceView, source_view
 from gateway.status.sources import (
     EFFECTIVE_COMMAND,
@@ -94,6 +95,7 @@ class Snapshot:
         events: the overlay's short list, oldest first.
         pictures: what viewers report of the pictures that they show.
         teleop: driving; None where the robot is not set up for it.
+        recorder: recording; None where the robot is not set up for it.
         ros_stalled: whether the ROS sampler makes no progress, so that the sources' ages accuse no publisher.
     """
 
@@ -112,6 +114,7 @@ class Snapshot:
     access: AccessView
     ros_stalled: bool
     teleop: TeleopView | None = None
+    recorder: RecorderView | None = None
 
     def __getitem__(self, spec: SourceSpec[ValueT]) -> Sample[ValueT]:
         """Returns the sample of a source; an absent one if the source is not configured."""
@@ -134,6 +137,7 @@ def take(
     access: AccessView = UNGUARDED,
     pictures: Pictures = NO_PICTURES,
     teleop: TeleopView | None = None,
+    recorder: RecorderView | None = None,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
     configured = rules.sources
@@ -178,6 +182,7 @@ def take(
         access=access,
         ros_stalled=ros_stalled,
         teleop=teleop,
+        recorder=recorder,
     )
 
 

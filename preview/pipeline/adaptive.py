@@ -149,6 +149,10 @@ class BitrateController:
         self._forget_congestion()
         self._decision = Decision(target_kbps)
 
+    def set_floor(self, floor_kbps: int) -> None:
+        """Sets another lower limit; a bit rate below it rises to it with the next decision."""
+        self._floor_kbps = min(floor_kbps, self._target_kbps)
+
     def decide(self, sample: Sample, now: float) -> Decision:
         """Returns the bit rate after a window.
 
@@ -175,6 +179,10 @@ class BitrateController:
             self._calm_since = now if self._calm_since is None else self._calm_since
             if self._may_increase(now):
                 self._increase(now)
+        if self._decision.bitrate_kbps < self._floor_kbps:
+            self._decision = Decision(
+                self._floor_kbps, f"a recording holds it at {bit_rate(self._floor_kbps)} at least"
+            )
         return self._decision
 
     def is_overwhelmed(self, rtts_ms: Mapping[str, float], now: float) -> bool:

@@ -1,6 +1,6 @@
 """Builds the pipeline of a plan, not yet started.
 
-    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! pipe ! listener
+    source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! pipe (listener.py)
 
 - Frames are dropped to the profile's rate before any work is done on them. A source that generates any rate
   is negotiated to that rate instead.
@@ -25,12 +25,8 @@ _TABLES_EVERY: Final = 4500
 """In ticks of 90 kHz: 50 ms. At 10 frames per second and more, tables are at most 100 ms apart."""
 _CLOCK_REFERENCE_EVERY: Final = 900
 """In ticks of 90 kHz: 10 ms, so that every frame has a PCR, up to 100 frames per second."""
-_LONGEST_READ: Final = 50 * 7 * 188
-"""Bytes: a full pipe, in whole datagrams of seven packets."""
 _SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
-_SRT_POLL_MS: Final = 1000
-"""Wake-up interval of the listener's thread; the default, no time-out, can block its stop forever."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +37,14 @@ class Parts:
     source: Any
     rate: Any
     apply_target: Callable[[Plan], None]
-    """Sets what changes with the profile, also while playing.
-
-    It does not refer to the listener: a driver that never returns keeps references to what it was passed, and
-    a listener that is still referenced keeps its port.
-    """
+    """Sets what changes with the profile, also while playing."""
     encoder: Any
+    encoded_pad: Any
+    """All access units pass it, ..."""
     parser_pad: Any
+    """... and those that viewers are to get also this one."""
     muxer_pad: Any
     pipe_in: Any
-    pipe_out: Any
-    sink: Any
 
 
 def build(plan: Plan) -> Parts:
@@ -74,23 +67,22 @@ def build(plan: Plan) -> Parts:
     if not source.link(body):
         raise UserError(f"{plan.source.label} does not end in raw video", plan.source.remedy)
     find = body.get_by_name
-    encoder, sink = find("encoder"), find("sink")
+    encoder = find("encoder")
     apply_target = partial(_apply_target, find("rate_caps"), find("size"), encoder)
     highest_kbps = max(target.bitrate_kbps for target in plan.settings.profiles.targets.values())
     properties.configure(encoder, plan.encoder, plan.target.bitrate_kbps, plan.gop_frames, highest_kbps)
     apply_target(plan)
-    _listen(sink, plan)
+    parser_pad = find("parser").get_static_pad("src")
     return Parts(
         pipeline=pipeline,
         source=source,
         rate=find("rate"),
         apply_target=apply_target,
         encoder=encoder,
-        parser_pad=find("parser").get_static_pad("src"),
+        encoded_pad=parser_pad,
+        parser_pad=parser_pad.get_peer().get_parent_element().get_static_pad("src"),
         muxer_pad=find("muxer").get_static_pad("src"),
         pipe_in=find("pipe_in"),
-        pipe_out=find("pipe_out"),
-        sink=sink,
     )
 
 
@@ -165,9 +157,7 @@ def _body(plan: Plan) -> str:
             properties.chain(plan.encoder),
             f"mpegtsmux name=muxer alignment=0 pat-interval={_TABLES_EVERY} pmt-interval={_TABLES_EVERY}"
             f" pcr-interval={_CLOCK_REFERENCE_EVERY}",
-            # framing.py connects them by a pipe.
-            f"fdsink name=pipe_in sync=false async=false fdsrc name=pipe_out blocksize={_LONGEST_READ}",
-            "srtsink name=sink",
+            "fdsink name=pipe_in sync=false async=false",
         ]
     )
 
@@ -184,22 +174,3 @@ def _parsed(description: str, border: str, pad: str, remedy: str) -> Any:
         raise UserError(f"the pipeline can't be built: {error.message}", remedy) from error
     made.add_pad(Gst.GhostPad.new(pad, made.get_by_name(border).get_static_pad(pad)))
     return made
-
-
-def _listen(sink: Any, plan: Plan) -> None:
-    srt = plan.srt
-    # The URI first: setting it resets other properties.
-    host = f"[{srt.bind}]" if ":" in srt.bind else srt.bind
-    sink.set_property("uri", f"srt://{host}:{srt.port}?mode=listener")
-    sink.set_property("latency", srt.latency_ms)
-    for name, value in (
-        ("wait-for-connection", False),
-        ("sync", False),
-        ("async", False),
-        ("poll-timeout", _SRT_POLL_MS),
-        ("enable-last-sample", False),
-    ):
-        sink.set_property(name, value)
-    if plan.passphrase:
-        Gst.util_set_object_arg(sink, "pbkeylen", str(srt.key_length_bytes))
-        sink.set_property("passphrase", plan.passphrase)

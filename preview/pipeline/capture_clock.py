@@ -55,16 +55,20 @@ def play(pipeline: Any, source: Any) -> Any:
     return pipeline.set_state(Gst.State.PLAYING)
 
 
-def pts_of(buffer: Any, pad: Any) -> int:
-    """Returns the PTS that the muxer writes for an access unit, in ticks of 90 kHz.
+def captured_ns(buffer: Any, pad: Any) -> int:
+    """Returns the capture time of an access unit on CLOCK_MONOTONIC, in ns.
 
     Args:
         buffer: the access unit.
         pad: where it passes, behind the encoder.
     """
     segment = pad.get_sticky_event(Gst.EventType.SEGMENT, 0).parse_segment()
-    captured_ns: int = segment.to_running_time(Gst.Format.TIME, buffer.pts)
-    return (captured_ns - CAPTURE_OFFSET_NS) * 9 // 100_000 % PTS_WRAP
+    return int(segment.to_running_time(Gst.Format.TIME, buffer.pts))
+
+
+def pts_of(buffer: Any, pad: Any) -> int:
+    """Returns the PTS that the muxer writes for an access unit, in ticks of 90 kHz; arguments as above."""
+    return (captured_ns(buffer, pad) - CAPTURE_OFFSET_NS) * 9 // 100_000 % PTS_WRAP
 
 
 def is_later(pts: int, other: int) -> bool:

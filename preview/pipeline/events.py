@@ -31,6 +31,23 @@ class HungError(Exception):
     """A driver does not return: only the end of the process frees its device and port."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AccessUnit:
+    """One encoded frame.
+
+    Args:
+        data: as a byte stream; key frames come with their parameter sets.
+        captured_ns: capture time on CLOCK_MONOTONIC.
+        key_frame: whether it decodes without earlier ones.
+        skipped: access units that are missing before it because the event loop did not take them in time.
+    """
+
+    data: bytes
+    captured_ns: int
+    key_frame: bool
+    skipped: int = 0
+
+
 class PipelineEvents(Protocol):
     """Receives the events of a pipeline, on the event loop; none comes after a fault or after `stop`."""
 
@@ -39,6 +56,9 @@ class PipelineEvents(Protocol):
 
     def failed(self, fault: Fault) -> None:
         """The pipeline has failed. Once per pipeline: only the first fault is reported."""
+
+    def listener_failed(self, fault: Fault) -> bool:
+        """The listener has failed; whether the pipeline goes on without it. Otherwise it fails as a whole."""
 
     def measured(self, viewers_refused: int) -> None:
         """New statistics are available; so many viewers were refused since the last ones."""

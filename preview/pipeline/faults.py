@@ -38,21 +38,27 @@ def from_message(message: Any, parts: Parts, plan: Plan) -> Fault:
     culprit = message.src
     elements = _elements(parts).items()
     blame = next((b for b, e in elements if culprit is e or culprit.has_as_ancestor(e)), Blame.OTHER)
+    return of(blame, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
+
+
+def of_listener(message: Any, plan: Plan) -> Fault:
+    """Returns the fault of an ERROR message of the listener's bus."""
+    error, debug = message.parse_error()
     taken = error.matches(Gst.ResourceError.quark(), Gst.ResourceError.OPEN_WRITE) or "bind" in (debug or "")
-    if blame is Blame.LISTENER and taken:
+    if taken:
         port = plan.srt.port
         return Fault(
-            blame,
+            Blame.LISTENER,
             f"UDP port {port} on {plan.srt.bind} can't be used: another program has it, or the address is not"
             f" this machine's. 'ss -lunp sport = :{port}' names the program; or choose another srt.port.",
         )
-    return of(blame, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
+    return of(Blame.LISTENER, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
 
 
 def blocked(parts: Parts, plan: Plan, seconds: float) -> Fault:
     """Returns the fault of a pipeline whose start does not return.
 
-    A bin changes its elements one after the other, from the listener to the source, so the first one in this
+    A bin changes its elements one after the other, from the last to the source, so the first one in this
     order whose change is still pending is the one that blocks.
     """
     pending = [
@@ -63,7 +69,7 @@ def blocked(parts: Parts, plan: Plan, seconds: float) -> Fault:
 
 
 def _elements(parts: Parts) -> dict[Blame, Any]:
-    return {Blame.LISTENER: parts.sink, Blame.ENCODER: parts.encoder, Blame.SOURCE: parts.source}
+    return {Blame.ENCODER: parts.encoder, Blame.SOURCE: parts.source}
 
 
 def _reason(text: str, debug: str) -> str:

@@ -4,7 +4,7 @@ A muxer that groups packets by seven (mpegtsmux alignment=7) holds back the tail
 one fills the group. Without groups (alignment=0) it pushes all packets of a frame as one buffer list, and
 srtsink would send each of them as a datagram of its own. So the frame passes through a pipe:
 
-    muxer ! fdsink ---> pipe ---> fdsrc ! listener
+    muxer ! fdsink ---> pipe ---> fdsrc ! listener (listener.py)
 
 fdsink writes the list with one call of writev, and fdsrc reads it as one buffer. The listener cuts that into
 datagrams of seven packets (7 x 188 = 1316 bytes, SRTO_PAYLOADSIZE of live mode); the last one ends where the
@@ -16,6 +16,7 @@ its tables (PAT, PMT), nor its stream headers; srtsink drops buffers with the on
 would also reach every new viewer, with continuity counters that the stream does not continue; its key frame
 brings tables anyway.
 
+Without a listener the frames go to the null device: the elements and what they count stay as they are.
 No Python runs for a frame, except at frame rates that need clock references: the elements count.
 """
 
@@ -49,12 +50,9 @@ class Framing:
         self._loop = asyncio.get_running_loop()
         self._on_first_frame = on_first_frame
         self._on_end = on_end
-        self._read_fd, self._write_fd = os.pipe()
-        # A full pipe, left behind by a listener that has stopped, must not block a thread of Python.
-        os.set_blocking(self._write_fd, False)
-        self._pipe_in, self._pipe_out = parts.pipe_in, parts.pipe_out
+        self._write_fd = os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
+        self._pipe_in = parts.pipe_in
         self._pipe_in.set_property("fd", self._write_fd)
-        self._pipe_out.set_property("fd", self._read_fd)
         self._begun = False
         self._references = ClockReferences(self._send_reference, lambda: self.frames, fps)
         self._muxer_pad = parts.muxer_pad
@@ -71,22 +69,27 @@ class Framing:
             if self._frame_probe is not None:
                 self._muxer_pad.remove_probe(self._frame_probe)
             self._references.stop()
-            del self._muxer_pad, self._pipe_in, self._pipe_out
+            del self._muxer_pad, self._pipe_in
 
     def close(self) -> None:
         """Closes the pipe; to be called once the pipeline has stopped, which could write to another file."""
         os.close(self._write_fd)
-        os.close(self._read_fd)
+
+    def send_to(self, fd: int) -> None:
+        """Has the frames from now on sent to another file, of which a copy is kept."""
+        # One step for whatever writes at this moment: the number stays, the file is another one (dup2(2)).
+        os.dup2(fd, self._write_fd, inheritable=False)
+
+    def send_to_nobody(self) -> None:
+        """Has the frames from now on discarded."""
+        null = os.open(os.devnull, os.O_WRONLY | os.O_CLOEXEC)
+        self.send_to(null)
+        os.close(null)
 
     @property
     def frames(self) -> int:
         """Encoded frames so far."""
         return int(self._pipe_in.get_property("stats").get_value("rendered"))
-
-    @property
-    def sent_bytes(self) -> int:
-        """Bytes of the transport stream so far."""
-        return int(self._pipe_out.query_position(Gst.Format.BYTES).cur)
 
     @property
     def last_frame_age_ms(self) -> float:

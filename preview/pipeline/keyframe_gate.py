@@ -60,13 +60,21 @@ class KeyframeGate:
         self._losses = TokenBucket(_LOSS_BURST, time.monotonic())
         self._loss_timer: asyncio.TimerHandle | None = None
         """Runs while a lost picture waits for its turn."""
-        self._disconnect = partial(parts.sink.disconnect, parts.sink.connect("caller-added", self._on_caller))
+        self._disconnect: Callable[[], None] | None = None
+        """Ends the watching of a listener."""
+
+    def watch(self, sink: Any) -> None:
+        """Has the viewers that connect to a listener served."""
+        self._disconnect = partial(sink.disconnect, sink.connect("caller-added", self._on_caller))
+
+    def unwatch(self) -> None:
+        """Releases the listener, if there is one: it must be freed to free its port."""
+        if self._disconnect:
+            self._disconnect()
+        self._disconnect = None
 
     def detach(self) -> None:
         """Releases the pipeline, whose listener has stopped: no more viewers connect."""
-        self._disconnect()
-        # It references the listener, which must be freed to free its port.
-        del self._disconnect
         with self._lock:
             if self._probe_id is not None:
                 self._pad.remove_probe(self._probe_id)

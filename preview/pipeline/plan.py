@@ -19,7 +19,7 @@ class Plan:
         encoder: entry of the catalogue.
         choice: the encoder and the preferred one, as reported in the status.
         profile: profile in effect.
-        passphrase: SRTO_PASSPHRASE, empty for none. Excluded from repr.
+        passphrase: SRTO_PASSPHRASE, empty for none; None: there is no listener. Excluded from repr.
     """
 
     settings: PreviewSettings
@@ -27,7 +27,7 @@ class Plan:
     encoder: Encoder
     choice: EncoderChoice
     profile: Profile
-    passphrase: str = field(repr=False)
+    passphrase: str | None = field(repr=False)
 
     @property
     def target(self) -> Target:
@@ -54,4 +54,4 @@ def make_plan(
         UserError: the source can't be used.
     """
     source = sources.plan(settings.source, max(t.fps for t in settings.profiles.targets.values()))
-    return Plan(settings, source, encoder, choice, desired.profile, desired.passphrase)
+    return Plan(settings, source, encoder, choice, desired.profile, desired.session)

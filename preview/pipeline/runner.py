@@ -1,9 +1,9 @@
 """One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
-supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in three
-places only (framing.py, keyframe_gate.py, file_loop.py), at most frame rates for no frame, and schedule calls
-on the loop. Every call that may block in a driver (state changes, properties of a playing encoder, requests
-for key frames) runs in a thread of its own with a deadline.
+supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in four
+places only (framing.py, keyframe_gate.py, file_loop.py, access_units.py), at most frame rates for no frame
+unless it is recorded, and schedule calls on the loop. Every call that may block in a driver (state changes,
+properties of a playing encoder, requests for key frames) runs in a thread of its own with a deadline.
 """
 
 import asyncio
@@ -20,14 +20,15 @@ from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, capture_clock, faults, statistics
+from preview.pipeline.access_units import AccessUnits
 from preview.pipeline.adaptive import BitrateController, Decision, Sample
-from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
+from preview.pipeline.listener import Listener
 from preview.pipeline.plan import Plan
 from preview.pipeline.threads import in_thread
-from preview.pipeline.viewer_limit import ViewerLimit
 from preview.pipeline.watchdogs import Watchdogs
 from preview.values import Measurement, Profile, StreamState
 
@@ -65,7 +66,8 @@ class Runner:
         loop = self._loop = asyncio.get_running_loop()
         parts = self._parts = builder.build(plan)
         self._framing = Framing(parts, self._first_frame, self._source_ended, plan.target.fps)
-        self._viewer_limit = ViewerLimit(parts.sink, plan.srt.max_viewers)
+        self._listener: Listener | None = None
+        self._access_units: AccessUnits | None = None
         self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
         self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
         self._bus = parts.pipeline.get_bus()
@@ -88,6 +90,10 @@ class Runner:
     async def start(self) -> None:
         """Starts the pipeline. Failures are reported as events, also after this has returned."""
         self._loop.add_reader(self._bus_fd, self._read_bus)
+        if self.plan.passphrase is not None:
+            await self._open_listener(self.plan)
+        if self._ended.done():
+            return
         pipeline = self._parts.pipeline
         try:
             start = partial(capture_clock.play, pipeline, self._parts.source)
@@ -107,7 +113,7 @@ class Runner:
         plan = self.plan = replace(self.plan, profile=profile)
         target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
-        self._controller.retarget(target.bitrate_kbps, target.floor_kbps)
+        self._controller.retarget(target.bitrate_kbps, self._floor_kbps)
         apply_target, framing = self._parts.apply_target, self._framing
 
         def apply() -> None:
@@ -115,6 +121,30 @@ class Runner:
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
+
+    async def listen(self, passphrase: str | None) -> None:
+        """Replaces the listener by one with another passphrase, None: by none; the encoder goes on.
+
+        Raises:
+            HungError: the old one hangs.
+        """
+        free = await self._close_listener()
+        try:
+            await in_thread(free, self._timeouts.stop_s)
+        except TimeoutError as error:
+            raise HungError("the SRT listener hung when it was freed") from error
+        self.plan = replace(self.plan, passphrase=None)
+        if passphrase is not None and not self._ended.done():
+            plan = replace(self.plan, passphrase=passphrase)
+            await self._open_listener(plan)
+            self.plan = plan
+
+    def record(self, take: Callable[[AccessUnit], None] | None) -> None:
+        """Hands each access unit to a recording from now on; None: to none."""
+        if self._access_units:
+            self._access_units.close()
+        self._access_units = AccessUnits(self._parts.encoded_pad, take) if take else None
+        self._controller.set_floor(self._floor_kbps)
 
     def request_key_frame(self, newest_pts: int | None) -> bool:
         """Requests a key frame for a viewer that lost a picture; see `KeyframeGate.request_after_loss`."""
@@ -145,25 +175,23 @@ class Runner:
             with suppress(asyncio.CancelledError):
                 await task
         deadline_s = self._timeouts.stop_s
-        for part, name in (
-            (self._parts.sink, "the SRT listener"),
-            (self._parts.source, self.plan.source.label),
-        ):
-            try:
-                await in_thread(partial(stop_element, part), deadline_s)
-            except TimeoutError as error:
-                raise HungError(f"{name} hung when it was stopped") from error
-        del part
-        work = _stop_pipeline(self._release(), self._framing.close, deadline_s)
+        free_listener = await self._close_listener()
+        try:
+            await in_thread(partial(stop_element, self._parts.source), deadline_s)
+        except TimeoutError as error:
+            raise HungError(f"{self.plan.source.label} hung when it was stopped") from error
+        work = _stop_pipeline(free_listener, self._release(), self._framing.close, deadline_s)
         return asyncio.create_task(work, name="stop the encoder")
 
     async def write_graph(self, path: Path) -> None:
-        """Writes the pipeline as a DOT graph; logs a warning where that fails or takes too long."""
+        """Writes pipeline and listener as DOT graphs; logs a warning where that fails or takes too long."""
+        pipelines = [self._parts.pipeline, *([self._listener.pipeline] if self._listener else [])]
 
         def write() -> None:
             make_own_directory(path.parent)
-            graph = Gst.debug_bin_to_dot_data(self._parts.pipeline, Gst.DebugGraphDetails.ALL)
-            path.write_text(graph, encoding="utf-8")
+            everything = Gst.DebugGraphDetails.ALL
+            graphs = [Gst.debug_bin_to_dot_data(each, everything) for each in pipelines]
+            path.write_text("".join(graphs), encoding="utf-8")
 
         try:
             await in_thread(write, _GRAPH_DEADLINE_S)
@@ -172,6 +200,7 @@ class Runner:
 
     def _release(self) -> list[Any]:
         """Drops every reference to the pipeline; the returned list has the last one."""
+        self.record(None)
         self._keyframe_gate.detach()
         self._framing.detach()
         if self._file_loop:
@@ -181,11 +210,43 @@ class Runner:
         del self._parts, self._bus
         return last
 
+    async def _open_listener(self, plan: Plan) -> None:
+        """Starts the listener of a plan; a failure is reported as an event."""
+        listener = self._listener = Listener(plan, self._listener_failed)
+        self._keyframe_gate.watch(listener.sink)
+        await listener.start(self._framing.send_to)
+
+    async def _close_listener(self) -> Callable[[], None]:
+        """Stops the listener, if there is one.
+
+        Returns:
+            Frees the rest of it; may block.
+
+        Raises:
+            HungError: it hangs.
+        """
+        self._framing.send_to_nobody()
+        self._keyframe_gate.unwatch()
+        listener, self._listener = self._listener, None
+        return await listener.stop() if listener else lambda: None
+
+    @property
+    def _floor_kbps(self) -> int:
+        """Lower limit of the adaptive bit rate: a recording may have one of its own."""
+        profile_kbps = self.plan.target.floor_kbps
+        if self._access_units is None:
+            return profile_kbps
+        return max(profile_kbps, self.plan.settings.video_tap.floor_kbps)
+
     # --- events ---
 
     def _first_frame(self) -> None:
         if not self._ended.done():
             self._events.first_frame()
+
+    def _listener_failed(self, fault: Fault) -> None:
+        if not self._ended.done() and not self._events.listener_failed(fault):
+            self._fail(fault)
 
     def _source_ended(self) -> None:
         self._fail(faults.of(Blame.SOURCE, "has ended", self.plan))
@@ -206,7 +267,7 @@ class Runner:
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
         watchdogs = Watchdogs(time.monotonic(), self._timeouts)
-        reading = statistics.read(self._framing, self._parts.sink)
+        reading = statistics.read(self._framing, self._listener)
         while True:
             await asyncio.sleep(_CHECK_INTERVAL_S)
             now = time.monotonic()
@@ -221,15 +282,15 @@ class Runner:
         """Whether the bit rate can't wait for the end of the window."""
         if not self.plan.settings.adaptive.enabled or self._is_pending("bit rate"):
             return False
-        return self._controller.is_overwhelmed(statistics.read(self._framing, self._parts.sink).rtts_ms, now)
+        return self._controller.is_overwhelmed(statistics.read(self._framing, self._listener).rtts_ms, now)
 
     def _measure(self, before: statistics.Reading) -> statistics.Reading:
-        now = statistics.read(self._framing, self._parts.sink)
+        now = statistics.read(self._framing, self._listener)
         self.measurement = statistics.measure(before, now)
         if self.plan.settings.adaptive.enabled:
             links = statistics.measured_links(before, now)
             self._adapt_bitrate(Sample(self.measurement.bitrate_kbps, links, self._picture_age(now.at)))
-        self._events.measured(self._viewer_limit.take_refused())
+        self._events.measured(self._listener.take_refused() if self._listener else 0)
         return now
 
     def _picture_age(self, now: float) -> float | None:
@@ -291,14 +352,17 @@ class Runner:
 
 
 async def _stop_pipeline(
-    last_reference: list[Any], close_pipe: Callable[[], None], deadline_s: float
+    free_listener: Callable[[], None],
+    last_reference: list[Any],
+    close_pipe: Callable[[], None],
+    deadline_s: float,
 ) -> bool:
-    """Stops and frees a pipeline; False when that does not finish in time."""
+    """Frees the listener, stops and frees its pipeline; False when that does not finish in time."""
 
     def stop_and_free() -> None:
+        free_listener()
         stop(last_reference[0])
-        # Freed here, in this thread: libsrt frees the port for good, and cleans up, when the last element is
-        # freed, and both take their time.
+        # Freed here, in this thread: that may take its time.
         last_reference.clear()
         close_pipe()
 

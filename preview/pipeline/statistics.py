@@ -6,10 +6,12 @@ lock that the reading takes. Here it is read from the event loop only.
 
 import time
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from preview.pipeline.adaptive import ViewerLink
 from preview.pipeline.framing import Framing
+from preview.pipeline.listener import Listener
+from preview.pipeline.viewer_limit import address_of
 from preview.values import Measurement
 
 _ACKNOWLEDGED: Final = "packet-ack-received"
@@ -25,7 +27,7 @@ class Reading:
     Args:
         at: the moment.
         frames: encoded frames.
-        bytes: of the transport stream.
+        bytes: of the transport stream, since the listener started.
         last_frame_age_ms: since the capture of the newest frame.
         rtts_ms: round-trip times, by viewer's address.
         packets: srtsink's counters since the viewer connected, by viewer's address.
@@ -39,16 +41,16 @@ class Reading:
     packets: dict[str, dict[str, int]]
 
 
-def read(framing: Framing, sink: Any) -> Reading:
+def read(framing: Framing, listener: Listener | None) -> Reading:
     """Returns the counters of this moment."""
-    stats = sink.get_property("stats")
+    stats = listener.sink.get_property("stats") if listener else None
     # Without viewers the structure has no such field.
     callers = stats.get_value("callers") if stats is not None and stats.has_field("callers") else None
     viewers = {address_of(caller.get_value("caller-address")): caller for caller in callers or ()}
     return Reading(
         at=time.monotonic(),
         frames=framing.frames,
-        bytes=framing.sent_bytes,
+        bytes=listener.sent_bytes if listener else 0,
         last_frame_age_ms=framing.last_frame_age_ms,
         rtts_ms={address: float(caller.get_value("rtt-ms")) for address, caller in viewers.items()},
         packets={
@@ -64,7 +66,8 @@ def measure(before: Reading, now: Reading) -> Measurement:
     links = viewer_links(before, now).values()
     return Measurement(
         fps=(now.frames - before.frames) / seconds,
-        bitrate_kbps=(now.bytes - before.bytes) * 8 / 1000 / seconds,
+        # Another listener counts from 0.
+        bitrate_kbps=max(0, now.bytes - before.bytes) * 8 / 1000 / seconds,
         viewer_count=len(now.packets),
         last_frame_age_ms=round(now.last_frame_age_ms),
         worst_rtt_ms=max((link.rtt_ms for link in links), default=None),
@@ -93,8 +96,3 @@ def measured_links(before: Reading, now: Reading) -> dict[str, ViewerLink]:
     """
     links = viewer_links(before, now)
     return {a: link for a, link in links.items() if before.packets.get(a, {}).get(_ACKNOWLEDGED)}
-
-
-def address_of(socket_address: Any) -> str:
-    """Returns "HOST:PORT" of a socket address."""
-    return f"{socket_address.get_address().to_string()}:{socket_address.get_port()}" if socket_address else ""

@@ -9,8 +9,6 @@ import threading
 import time
 from typing import Any, Final
 
-from preview.pipeline.statistics import address_of
-
 _HANDSHAKE_S: Final = 3.0
 """SRTO_CONNTIMEO: a caller gives up after it."""
 
@@ -60,3 +58,8 @@ class ViewerLimit:
     def _remove(self, address: str) -> None:
         with self._lock:
             self._viewers.pop(address, None)
+
+
+def address_of(socket_address: Any) -> str:
+    """Returns "HOST:PORT" of a socket address."""
+    return f"{socket_address.get_address().to_string()}:{socket_address.get_port()}" if socket_address else ""

@@ -9,7 +9,7 @@ from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import Verdict
-from preview.lifecycle import State
+from preview.lifecycle import Reason, State
 from preview.values import ActualState, Codec, DesiredState, Profile, StreamState
 
 STATES: Final[Mapping[State, pb.LifecycleState.ValueType]] = MappingProxyType(
@@ -20,6 +20,9 @@ PROFILES: Final[Mapping[Profile, pb.Profile.ValueType]] = MappingProxyType(
 )
 CODECS: Final[Mapping[Codec, pb.Codec.ValueType]] = MappingProxyType(
     {codec: pb.Codec.Value(f"CODEC_{codec.name}") for codec in Codec}
+)
+REASONS: Final[Mapping[Reason, pb.Reason.ValueType]] = MappingProxyType(
+    {reason: pb.Reason.Value(f"REASON_{reason.name}") for reason in Reason}
 )
 _PROFILES_BACK: Final = {message: profile for profile, message in PROFILES.items()}
 
@@ -65,6 +68,8 @@ def actual_state(actual: ActualState) -> pb.ActualState:
             latency_ms=actual.latency_ms,
             capture_offset_ns=actual.capture_offset_ns,
         ),
+        pipeline_state=STATES[actual.pipeline_state],
+        reasons=[REASONS[reason] for reason in actual.reasons],
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("common", "gateway", "preview", "drive", "console", "simrobot")
+OURS = ("common", "gateway", "preview", "drive", "recorder", "console", "simrobot")
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,33 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
 @pytest.mark.parametrize(
     ("importer", "forbidden"),
     [
-        ("common/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("common/", ("gateway", "preview", "drive", "recorder", "console", "simrobot")),
         ("drive/", ("gateway", "preview", "console", "simrobot", "omniseer.gateway", "grpc", "asyncio")),
         ("gateway/", ("preview", "console", "simrobot")),
         ("preview/", ("gateway", "console", "simrobot", "omniseer.gateway")),
         ("console/", ("gateway", "preview", "simrobot", "omniseer.preview")),
         ("simrobot/", ("gateway", "preview", "console")),
+        ("recorder/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("recorder/values.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap", "recorder")),
+        ("recorder/intake/", (*WIRE, "omniseer", "asyncio", "mcap", "recorder.mcap", "recorder.config")),
+        ("recorder/mcap/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.config")),
+        ("recorder/video/", (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.mcap")),
+        *(
+            (f"recorder/video/{name}.py", ("asyncio", "time", "recorder.video.tap"))
+            for name in ("access_unit", "message", "stream")
+        ),
+        (
+            "recorder/store/",
+            (*HEAVY, *WIRE, "omniseer", "mcap", "recorder.intake", "recorder.rpc", "recorder.recorder"),
+        ),
+        ("recorder/store/retention.py", ("asyncio", "time", "os", "pathlib", "recorder")),
+        ("recorder/writing/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.store")),
+        *(
+            (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "recorder"))
+            for name in ("lifecycle", "incidents")
+        ),
+        ("recorder/config.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
+        ("recorder/recorder.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),
@@ -79,6 +100,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/links/", ("gateway.ros", "gateway.rpc", "omniseer.gateway")),
         ("gateway/links/reconciler.py", (*WIRE, "asyncio", "gateway.links.preview", "gateway.links.link")),
         ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
+        ("gateway/links/watch.py", (*WIRE, "gateway.links")),
+        ("gateway/links/recorder/", ("gateway.links.preview", "gateway.links.drive", "gateway.links.link")),
         ("gateway/links/drive/", ("gateway.teleop", "gateway.links.preview")),
         ("gateway/teleop/", (*HEAVY, *WIRE, "omniseer", "gateway.ros", "gateway.rpc", "gateway.config")),
         *(
@@ -92,6 +115,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/pipeline/", ("preview.rpc", "preview.supervisor", "preview.app")),
         ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
         ("preview/rpc/", ("common.gst",)),
+        ("preview/tap.py", (*HEAVY, *WIRE, "common.gst", "omniseer", "preview.rpc", "preview.config")),
+        ("common/video_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time")),
         *(
             (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))
             for name in (
@@ -137,19 +162,33 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
 @pytest.mark.parametrize(
     ("library", "homes"),
     [
-        ("rclpy", ("common/ros_node.py", "gateway/ros/", "drive/base.py", "drive/doctor", "simrobot/")),
+        (
+            "rclpy",
+            (
+                "common/ros_node.py",
+                "gateway/ros/",
+                "drive/base.py",
+                "drive/doctor",
+                "recorder/intake/",
+                "simrobot/",
+            ),
+        ),
         ("gi", ("common/gst.py",)),
         ("PySide6", ("console/window/",)),
         ("sdl2", ("console/gamepad/sdl.py",)),
+        ("mcap", ("recorder/mcap/",)),
+        ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
         ("cryptography", ("gateway/access/ca.py",)),
-        ("yaml", ("common/config.py",)),
+        ("yaml", ("common/config.py", "recorder/intake/qos.py", "recorder/mcap/rosbag2.py")),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
+        ("google_crc32c", ("console/client/exporting.py", "recorder/store/export.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
         (
             "google.protobuf",
             (
                 "common/interceptors.py",
+                "common/refusal.py",
                 "gateway/rpc/",
                 "gateway/links/",
                 "preview/rpc/",
@@ -157,7 +196,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "console/client/",
             ),
         ),
-        ("omniseer.gateway", ("gateway/rpc/", "console/client/")),
+        ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
     ],

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from drive.config import DriveSettings
 from gateway.config import GatewaySettings
 from preview.config import PreviewSettings
+from recorder.config import RecorderSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/configuration.md").read_text(encoding="utf-8")
 PROFILE = re.compile(r"^profiles\.(low-bw|balanced|high-quality)\.")
@@ -30,7 +31,8 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         if listed or not inner:
             yield f"{prefix}{name}"
         for part in inner:
-            yield from keys_of(part, f"{prefix}{field.alias or name}{listed}.")
+            named = ".NAME" if "Mapping[str" in str(field.annotation) else listed
+            yield from keys_of(part, f"{prefix}{field.alias or name}{named}.")
 
 
 @pytest.mark.parametrize(
@@ -39,6 +41,7 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         (GatewaySettings, "## Gateway"),
         (PreviewSettings, "## Preview service"),
         (DriveSettings, "## Drive program"),
+        (RecorderSettings, "## Recorder"),
     ],
 )
 def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str) -> None:

@@ -34,7 +34,8 @@ def program(name: str) -> Any:
 
 def options(command: Any) -> set[str]:
     context = typer.Context(command)
-    return {each for parameter in command.get_params(context) for each in parameter.opts}
+    parameters = command.get_params(context)
+    return {each for parameter in parameters for each in (*parameter.opts, *parameter.secondary_opts)}
 
 
 def problem(name: str, words: list[str]) -> str:

@@ -11,7 +11,7 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
-from omniseer.gateway.v1 import overlay_pb2, robot_gateway_pb2, teleop_pb2
+from omniseer.gateway.v1 import overlay_pb2, recording_pb2, robot_gateway_pb2, teleop_pb2
 
 PACKAGE = "omniseer.gateway.v1."
 TRIPLES = [
@@ -20,6 +20,7 @@ TRIPLES = [
 
 _ITSELF = "the gateway's own, true at the moment of the answer"
 _SERVICE = "told by the preview service on every change; service_reachable says whether it still speaks"
+_RECORDER = "reported by the recorder on every change; its state says whether it still answers"
 _EVENT = "of something that happened at an instant which is told with it; it never grows old"
 NEEDS_NO_AGE = {
     "SystemStatus.gateway_name": _ITSELF,
@@ -59,6 +60,22 @@ NEEDS_NO_AGE = {
     "DriveState": "of the instant that comes with it; the ages in it are of what they are named after",
     "StopRobotResponse.message": _ITSELF,
     "ResetStopResponse": _ITSELF,
+    "RecordingStatus": _RECORDER,
+    "RecordingPreset": _RECORDER,
+    "RecordingStateChanged": _EVENT,
+    "Recording": _RECORDER,
+    "RecordingCopy": _RECORDER,
+    "RecordingGap": _RECORDER,
+    "RecordingFile": _RECORDER,
+    "StartRecordingResponse.message": _ITSELF,
+    "StopRecordingResponse.message": _ITSELF,
+    "TriggerSnapshotResponse.message": _ITSELF,
+    "PinRecordingResponse.message": _ITSELF,
+    "DeleteRecordingResponse": _ITSELF,
+    "ListRecordingsResponse.next_page_token": _ITSELF,
+    "ExportHeader": "of a file that never changes",
+    "ExportChunk": "of a file that never changes",
+    "GetRecordingThumbnailResponse": "of an instant that comes with it",
 }
 
 
@@ -66,6 +83,7 @@ def answers() -> list[Descriptor]:
     services = (
         robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
         teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+        recording_pb2.DESCRIPTOR.services_by_name["RecordingService"],
     )
     return [method.output_type for service in services for method in service.methods]
 

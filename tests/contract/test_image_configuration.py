@@ -9,11 +9,12 @@ from typer.testing import CliRunner
 from drive.cli import app as drive_app
 from gateway.cli import app as gateway_app
 from preview.cli import app as preview_app
+from recorder.cli import app as recorder_app
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("program", ["gateway", "preview", "drive"])
+@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder"])
 def test_the_images_name_the_file_once(program: str) -> None:
     file = "preview" if program == "preview" else "gateway"
     dockerfile = (ROOT / f"docker/{file}.Dockerfile").read_text(encoding="utf-8")
@@ -31,6 +32,7 @@ def test_the_variables_name_the_file(tmp_path: Path) -> None:
         (gateway_app, "ROBOT_GATEWAY_CONFIG"),
         (preview_app, "ROBOT_PREVIEW_CONFIG"),
         (drive_app, "ROBOT_DRIVE_CONFIG"),
+        (recorder_app, "ROBOT_RECORDER_CONFIG"),
     ):
         shown = CliRunner().invoke(app, ["check", "--print"], env={variable: str(file)})
         assert shown.exit_code == 0, shown.output

@@ -10,13 +10,14 @@ from grpc_reflection.v1alpha.reflection import SERVICE_NAME as REFLECTION
 
 from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES, STANDARD, Method, Open
-from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
+from omniseer.gateway.v1 import recording_pb2, robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_UNSPECIFIED
 from omniseer.gateway.v1.access_pb2 import Role as WireRole
 
 SERVICES = (
     robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
     teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+    recording_pb2.DESCRIPTOR.services_by_name["RecordingService"],
 )
 PAGE = (Path(__file__).parents[2] / "docs/security.md").read_text(encoding="utf-8")
 

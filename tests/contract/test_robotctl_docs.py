@@ -1,5 +1,6 @@
 """docs/robotctl.md names every key of the JSON documents, and none that is not."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,20 +9,32 @@ from google.protobuf.message import Message
 from common.findings import findings_json, good
 from console.cli.error_report import error_as_json
 from console.cli.info import info_json
+from console.cli.record import exported_json
 from console.client import Unreachable
+from console.client.exporting import ExportedRecording
 from console.client.mapping.driving import drive_item
 from console.client.mapping.events import event
 from console.client.mapping.methods import (
+    DELETE_RECORDING,
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
+    GET_RECORDING,
     GET_SYSTEM_STATUS,
+    LIST_RECORDINGS,
     RESET_STOP,
+    START_RECORDING,
     STOP_ROBOT,
     SUBSCRIBE_EVENTS,
 )
 from console.presentation.json_form import json_form
 from omniseer.gateway.v1.event_pb2 import Event, EventGap
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
+from omniseer.gateway.v1.recording_pb2 import (
+    DeleteRecordingResponse,
+    GetRecordingResponse,
+    ListRecordingsResponse,
+    StartRecordingResponse,
+)
 from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse, SubscribeEventsResponse
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from omniseer.gateway.v1.teleop_pb2 import DriveResponse, ResetStopResponse, StopRobotResponse
@@ -45,6 +58,14 @@ def drive_state() -> DriveResponse:
     answer = DriveResponse()
     fill(answer.state)
     return answer
+
+
+EXPORTED = ExportedRecording(folder=Path("to"), files=1, size=2, received=3, cuts=4, not_final=("a",))
+
+
+def record_list() -> dict[str, Any]:
+    page = LIST_RECORDINGS.decode(filled(ListRecordingsResponse()))
+    return {"status": json_form(page.status), "recordings": json_form(page.recordings)}
 
 
 def events_document() -> dict[str, Any]:
@@ -87,6 +108,23 @@ def events_document() -> dict[str, Any]:
             id="reset-stop",
         ),
         pytest.param("drive --json", json_form(drive_item(drive_state())), id="drive"),
+        pytest.param(
+            "record start --json",
+            {"ok": True, **json_form(START_RECORDING.decode(filled(StartRecordingResponse())))},
+            id="record start",
+        ),
+        pytest.param("record list --json", record_list(), id="record list"),
+        pytest.param(
+            "record show --json",
+            json_form(GET_RECORDING.decode(filled(GetRecordingResponse())).recording),
+            id="record show",
+        ),
+        pytest.param(
+            "record delete --json",
+            {"ok": True, **json_form(DELETE_RECORDING.decode(filled(DeleteRecordingResponse())))},
+            id="record delete",
+        ),
+        pytest.param("record export --json", {"ok": True, **exported_json(EXPORTED)}, id="record export"),
         pytest.param("doctor --json", findings_json([good("tcp", "answers")]), id="doctor"),
     ],
 )

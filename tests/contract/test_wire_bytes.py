@@ -19,6 +19,7 @@ from omniseer.gateway.v1 import (
     overlay_pb2,
     platform_pb2,
     preview_pb2,
+    recording_pb2,
     robot_gateway_pb2,
     source_pb2,
     states_pb2,
@@ -853,7 +854,199 @@ ADDITIONS = [
 ]
 
 
-@pytest.mark.parametrize("case", [*CASES, *ADDITIONS], ids=lambda case: case.message.DESCRIPTOR.name)
+def numbered(message: type[Message], *fields: tuple[int, str, Any]) -> Case:
+    """A case of fields that are each a number, a name and a value; a list has one item."""
+    wire, expected = b"", {}
+    for number, name, value in fields:
+        items = value if isinstance(value, list) else [value]
+        for item in items:
+            match item:
+                case str():
+                    wire += text(number, item)
+                case bytes():
+                    wire += sub(number, item)
+                case int():
+                    wire += uint(number, item)
+                case Case():
+                    wire += sub(number, item.wire)
+        values = [each.message(**each.fields) if isinstance(each, Case) else each for each in items]
+        expected[name] = values if isinstance(value, list) else values[0]
+    return Case(message, wire, expected)
+
+
+SUM = bytes(range(32))
+PRESET = numbered(
+    recording_pb2.RecordingPreset,
+    (1, "name", "driving"),
+    (2, "description", "what driving needs"),
+    (3, "with_video", True),
+    (4, "bytes_per_minute", 1 << 33),
+    (5, "in_ring", True),
+)
+RECORDING_STATUS = numbered(
+    recording_pb2.RecordingStatus,
+    (1, "state", recording_pb2.RECORDER_STATE_UNREACHABLE),
+    (2, "recording_id", "a"),
+    (3, "label", "lap"),
+    (4, "preset", "driving"),
+    (5, "elapsed_ms", 1 << 34),
+    (6, "size", 1 << 35),
+    (7, "messages_written", 1 << 36),
+    (8, "messages_lost", 0),
+    (9, "video", True),
+    (10, "bytes_per_s", 1 << 37),
+    (11, "room_bytes", 1 << 38),
+    (12, "room_s", 0),
+    (13, "ring_s", 30),
+    (14, "snapshots_pending", 2),
+    (15, "recordings", 3),
+    (16, "to_copy", 4),
+    (17, "last_error", "full"),
+    (18, "presets", [PRESET]),
+)
+RECORDING_COPY = numbered(
+    recording_pb2.RecordingCopy,
+    (1, "state", recording_pb2.RECORDING_COPY_STATE_FAILED),
+    (2, "reason", "no network"),
+    (3, "bytes_done", 1 << 33),
+)
+RECORDING_GAP = numbered(
+    recording_pb2.RecordingGap,
+    (1, "cause", recording_pb2.RECORDING_GAP_CAUSE_DISK),
+    (2, "began_unix_ms", 1 << 40),
+    (3, "ended_unix_ms", 1 << 41),
+    (4, "messages", 0),
+)
+RECORDING_FILE = numbered(
+    recording_pb2.RecordingFile,
+    (1, "name", "data/000000.mcap"),
+    (2, "size", 1 << 33),
+    (3, "sha256", SUM),
+    (4, "final", True),
+)
+RECORDING = numbered(
+    recording_pb2.Recording,
+    (1, "id", "a"),
+    (2, "label", "lap"),
+    (3, "notes", "wet"),
+    (4, "kind", recording_pb2.RECORDING_KIND_RUN_BUNDLE),
+    (5, "state", recording_pb2.RECORDING_STATE_FAULTED),
+    (6, "stop_reason", recording_pb2.RECORDING_STOP_REASON_INTERRUPTED),
+    (7, "preset", "driving"),
+    (8, "started_unix_ms", 1 << 40),
+    (9, "ended_unix_ms", 1 << 41),
+    (10, "started_monotonic_ns", 1 << 42),
+    (11, "ended_monotonic_ns", 1 << 43),
+    (12, "boot_id", "boot"),
+    (13, "recorder_run_id", "run"),
+    (14, "duration_ms", 1 << 34),
+    (15, "size", 1 << 35),
+    (16, "messages_written", 1 << 36),
+    (17, "messages_lost", 0),
+    (18, "video_frames", 1 << 37),
+    (19, "trigger", "anna"),
+    (20, "pinned", True),
+    (21, "copy", RECORDING_COPY),
+    (22, "file_count", 1),
+    (23, "gap_count", 2),
+    (24, "files", [RECORDING_FILE]),
+    (25, "gaps", [RECORDING_GAP]),
+    (26, "sha256", SUM),
+)
+EXPORT_HEADER = numbered(recording_pb2.ExportHeader, (1, "size", 1 << 33), (2, "sha256", SUM))
+EXPORT_CHUNK = Case(
+    recording_pb2.ExportChunk,
+    uint(1, 1 << 33) + sub(2, b"data") + tag(3, FIXED32) + struct.pack("<I", 0xE3069283),
+    {"offset": 1 << 33, "data": b"data", "crc32c": 0xE3069283},
+)
+RECORDING_CHANGED = numbered(
+    event_pb2.RecordingStateChanged,
+    (1, "change", event_pb2.RECORDING_CHANGE_LOSS),
+    (2, "recording_id", "a"),
+    (3, "label", "lap"),
+    (4, "kind", recording_pb2.RECORDING_KIND_INCIDENT),
+    (5, "state", recording_pb2.RECORDING_STATE_COMPLETE),
+    (6, "stop_reason", recording_pb2.RECORDING_STOP_REASON_DISK),
+    (7, "messages_lost", 0),
+)
+_ANSWER = ((1, "message", "done"), (2, "recording", RECORDING))
+_REQUESTED = (1, "request_id", "id")
+RECORDINGS = [
+    PRESET,
+    RECORDING_STATUS,
+    RECORDING_COPY,
+    RECORDING_GAP,
+    RECORDING_FILE,
+    RECORDING,
+    EXPORT_HEADER,
+    EXPORT_CHUNK,
+    RECORDING_CHANGED,
+    numbered(event_pb2.Event, (16, "recording_state_changed", RECORDING_CHANGED)),
+    numbered(system_status_pb2.SystemStatus, (21, "recording", RECORDING_STATUS)),
+    numbered(
+        recording_pb2.StartRecordingRequest,
+        _REQUESTED,
+        (2, "label", "lap"),
+        (3, "notes", "wet"),
+        (4, "preset", "driving"),
+        (5, "with_video", False),
+        (6, "max_duration_s", 60),
+        (7, "max_bytes", 1 << 33),
+    ),
+    numbered(recording_pb2.StartRecordingResponse, *_ANSWER),
+    numbered(recording_pb2.StopRecordingRequest, _REQUESTED, (2, "recording_id", "a")),
+    numbered(recording_pb2.StopRecordingResponse, *_ANSWER),
+    numbered(
+        recording_pb2.TriggerSnapshotRequest,
+        _REQUESTED,
+        (2, "pre_s", 0),
+        (3, "post_s", 0),
+        (4, "label", "lap"),
+        (5, "preset", "driving"),
+    ),
+    numbered(recording_pb2.TriggerSnapshotResponse, *_ANSWER),
+    numbered(recording_pb2.ListRecordingsRequest, (1, "page_size", 50), (2, "page_token", "next")),
+    numbered(
+        recording_pb2.ListRecordingsResponse,
+        (1, "recordings", [RECORDING]),
+        (2, "next_page_token", "next"),
+        (3, "status", RECORDING_STATUS),
+    ),
+    numbered(recording_pb2.GetRecordingRequest, (1, "recording_id", "a")),
+    numbered(recording_pb2.GetRecordingResponse, (1, "recording", RECORDING)),
+    numbered(
+        recording_pb2.ExportRecordingRequest,
+        (1, "recording_id", "a"),
+        (2, "file", "data/000000.mcap"),
+        (3, "offset", 1 << 33),
+        (4, "expected_sha256", SUM),
+        (5, "max_bytes_per_s", 1 << 34),
+    ),
+    numbered(recording_pb2.ExportRecordingResponse, (1, "header", EXPORT_HEADER)),
+    numbered(recording_pb2.ExportRecordingResponse, (2, "chunk", EXPORT_CHUNK)),
+    numbered(recording_pb2.GetRecordingThumbnailRequest, (1, "recording_id", "a")),
+    numbered(
+        recording_pb2.GetRecordingThumbnailResponse,
+        (1, "key_frame", SUM),
+        (2, "format", "h265"),
+        (3, "captured_unix_ms", 1 << 40),
+    ),
+    numbered(recording_pb2.PinRecordingRequest, _REQUESTED, (2, "recording_id", "a"), (3, "pinned", True)),
+    numbered(recording_pb2.PinRecordingResponse, *_ANSWER),
+    numbered(
+        recording_pb2.DeleteRecordingRequest,
+        _REQUESTED,
+        (2, "recording_id", "a"),
+        (3, "expected_sha256", SUM),
+        (4, "force", True),
+    ),
+    numbered(recording_pb2.DeleteRecordingResponse, (1, "message", "done")),
+]
+
+
+@pytest.mark.parametrize(
+    "case", [*CASES, *ADDITIONS, *RECORDINGS], ids=lambda case: case.message.DESCRIPTOR.name
+)
 def test_bytes_by_hand_mean_what_the_contract_says(case: Case) -> None:
     message = case.message.FromString(case.wire)
 
@@ -884,12 +1077,13 @@ def test_every_field_of_every_message_has_its_byte_string() -> None:
     for service in (
         robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
         teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+        recording_pb2.DESCRIPTOR.services_by_name["RecordingService"],
     ):
         for method in service.methods:
             messages_below(method.input_type, reachable)
             messages_below(method.output_type, reachable)
     written: dict[str, set[str]] = {}
-    for case in [*CASES, *ADDITIONS]:
+    for case in [*CASES, *ADDITIONS, *RECORDINGS]:
         written.setdefault(case.message.DESCRIPTOR.full_name, set()).update(case.fields)
     assert written == {name: {field.name for field in message.fields} for name, message in reachable.items()}
 

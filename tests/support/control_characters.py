@@ -27,7 +27,7 @@ def change_texts(message: Message, change: Callable[[str], str]) -> None:
         if field.message_type:
             for item in value if field.is_repeated else [value]:
                 change_texts(item, change)
-        elif field.cpp_type == FieldDescriptor.CPPTYPE_STRING and field.is_repeated:
+        elif field.type == FieldDescriptor.TYPE_STRING and field.is_repeated:
             getattr(message, field.name)[:] = [change(item) for item in value]
-        elif field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
+        elif field.type == FieldDescriptor.TYPE_STRING:
             setattr(message, field.name, change(value))

@@ -98,7 +98,7 @@ def _value(field: FieldDescriptor, *, number: int, text: str) -> Any:
         case FieldDescriptor.CPPTYPE_BOOL:
             return True
         case FieldDescriptor.CPPTYPE_STRING:
-            return text
+            return text.encode() if field.type == FieldDescriptor.TYPE_BYTES else text
         case FieldDescriptor.CPPTYPE_FLOAT:
             return number + 0.5  # 32 bits hold it exactly
         case _:
@@ -156,7 +156,8 @@ def _other_values(field: FieldDescriptor) -> Sequence[Any]:
         case FieldDescriptor.CPPTYPE_BOOL:
             return [False]
         case FieldDescriptor.CPPTYPE_STRING:
-            return ["another text", ""]
+            is_bytes = field.type == FieldDescriptor.TYPE_BYTES
+            return [b"other bytes", b""] if is_bytes else ["another text", ""]
         case FieldDescriptor.CPPTYPE_FLOAT:
             return [-0.1, 0.0, math.inf]  # a sign, and digits that 32 bits do not hold exactly
         case _:

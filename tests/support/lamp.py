@@ -5,8 +5,9 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
 
-from gateway.links.link import LinkLostError, RefusedError
+from gateway.links.link import RefusedError
 from gateway.links.reconciler import Desired, Reconciler
+from gateway.links.watch import LinkLostError
 
 SIGN_OF_LIFE_S = 0.05
 BRIGHTEST = 100

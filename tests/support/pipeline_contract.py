@@ -3,7 +3,7 @@
 import asyncio
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +18,7 @@ from preview.config import (
     TimeoutSettings,
 )
 from preview.encoders.catalogue import CATALOGUE
-from preview.pipeline.events import Blame, Fault, PipelineEvents
+from preview.pipeline.events import AccessUnit, Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.supervisor import Pipeline
 from preview.values import DesiredState, EncoderChoice, Profile, Target
@@ -33,6 +33,8 @@ class Events:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        self.goes_on = False
+        """Whether a pipeline goes on without its listener."""
         self.faults: list[Fault] = []
         self._changed = asyncio.Event()
 
@@ -42,6 +44,11 @@ class Events:
     def failed(self, fault: Fault) -> None:
         self.faults.append(fault)
         self._count("failed")
+
+    def listener_failed(self, fault: Fault) -> bool:
+        self.faults.append(fault)
+        self._count("listener_failed")
+        return self.goes_on
 
     def measured(self, viewers_refused: int) -> None:
         assert viewers_refused == 0
@@ -107,6 +114,34 @@ class PipelineContract:
         assert await (await pipeline.stop())
         assert events.counts["first_frame"] == 1
         assert not events.faults
+
+    async def test_a_listener_comes_and_goes_while_it_runs(self) -> None:
+        events = Events()
+        pipeline = self.build(replace(plan_of(LIVE), passphrase=None), events)
+        await pipeline.start()
+        await events.wait_for("first_frame")
+        for passphrase in ("correct horse battery", "", None):
+            await pipeline.listen(passphrase)
+            assert pipeline.plan.passphrase == passphrase
+            assert pipeline.stream.encrypted is bool(passphrase)
+        await events.wait_for("measured", events.counts["measured"] + 2)
+        assert await (await pipeline.stop())
+        assert events.counts["first_frame"] == 1
+        assert not events.faults
+
+    async def test_a_recording_gets_its_access_units_from_then_on(self) -> None:
+        events, units = Events(), list[AccessUnit]()
+        pipeline = self.build(plan_of(LIVE), events)
+        pipeline.record(units.append)
+        await pipeline.start()
+        await events.wait_for("measured", 2)
+        assert units
+        assert units[0].key_frame
+        pipeline.record(None)
+        count = len(units)
+        await events.wait_for("measured", events.counts["measured"] + 2)
+        assert await (await pipeline.stop())
+        assert len(units) == count
 
     async def test_a_source_that_ends_is_one_fault_and_the_last_event(self, tmp_path: Path) -> None:
         events = Events()

@@ -4,11 +4,12 @@ It passes the tests of pipeline_contract.py, as the real one does.
 """
 
 import asyncio
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from common.errors import UserError
-from preview.pipeline.events import Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.values import Measurement, Profile, StreamState
 
@@ -27,6 +28,7 @@ class Script:
         fault_after_s: 0: no frame comes.
         fault_in_switch: reported when the profile is switched.
         fault_in_stop: reported while it is being stopped.
+        listener_faults: of the listeners that are opened while it runs, in turn.
         viewers_refused: in each window.
         stop_s: how long its encoder takes to stop.
         encoder_hangs: its encoder never stops.
@@ -38,6 +40,7 @@ class Script:
     fault_after_s: float = 0.0
     fault_in_switch: Fault | None = None
     fault_in_stop: Fault | None = None
+    listener_faults: list[Fault] = field(default_factory=list)
     viewers_refused: int = 0
     stop_s: float = 0.02
     encoder_hangs: bool = False
@@ -53,6 +56,7 @@ class PipelineDouble:
         self.stopped = False
         self.key_frames_requested: list[int | None] = []
         self.picture_ages_ms: list[int] = []
+        self.take: Callable[[AccessUnit], None] | None = None
         self._events = events
         self._script = script or _script_of(plan)
         self._serving: asyncio.Task[None] | None = None
@@ -73,6 +77,14 @@ class PipelineDouble:
         self.plan = replace(self.plan, profile=profile)
         if self._script.fault_in_switch:
             self._fail(self._script.fault_in_switch)
+
+    async def listen(self, passphrase: str | None) -> None:
+        self.plan = replace(self.plan, passphrase=passphrase)
+        if passphrase is not None and self._script.listener_faults:
+            self._fail_listener(self._script.listener_faults.pop(0))
+
+    def record(self, take: Callable[[AccessUnit], None] | None) -> None:
+        self.take = take
 
     def request_key_frame(self, newest_pts: int | None) -> bool:
         self.key_frames_requested.append(newest_pts)
@@ -103,8 +115,14 @@ class PipelineDouble:
             asyncio.get_running_loop().call_later(script.fault_after_s, self._fail, script.fault)
         while True:
             await asyncio.sleep(WINDOW_S)
+            if self.take:
+                self.take(AccessUnit(b"a frame", captured_ns=1, key_frame=True))
             self.measurement = Measurement(self.plan.target.fps, self.plan.target.bitrate_kbps, 0, 10)
             self._events.measured(self._script.viewers_refused)
+
+    def _fail_listener(self, fault: Fault) -> None:
+        if not self._events.listener_failed(fault):
+            self._fail(fault)
 
     def _fail(self, fault: Fault) -> None:
         if self._end():

@@ -21,6 +21,7 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     # Described by a section of its own.
     "status": (dict,),
     "preview": (dict,),
+    "recording": (dict,),
 }
 
 
@@ -98,6 +99,8 @@ def _referred(said: Documented) -> dict[str, Type]:
     for key, kind in said.items():
         if kind.words.startswith("status"):
             more |= {f"{key}.{inner}": type_ for inner, type_ in documented("status --json").items()}
+        elif kind.words == "recording":
+            more |= {f"{key}.{inner}": type_ for inner, type_ in documented("record show --json").items()}
         elif kind.words == "preview" or (key, kind.words) == ("gateway", "object"):
             status = documented("status --json")
             more |= {inner: type_ for inner, type_ in status.items() if inner.startswith(f"{key}.")}

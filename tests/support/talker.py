@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -48,6 +49,13 @@ class Talker:
     def fall_silent(self, topic: str, message_type: Any) -> None:
         """Takes the publisher out of the graph."""
         self.node.destroy_publisher(self._publishers.pop((topic, message_type)))
+
+
+@pytest.fixture
+def talker(ros_domain: int) -> Iterator["Talker"]:  # noqa: ARG001  # for its effect
+    """A talker in a domain of the test's own."""
+    with talking() as made:
+        yield made
 
 
 @contextmanager

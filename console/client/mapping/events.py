@@ -43,6 +43,7 @@ _KINDS: Final[Mapping[str, tuple[EventKind, _Parts]]] = {
     "client_joined": (EventKind.CLIENT_JOINED, lambda it: _client(it.client_joined)),
     "client_left": (EventKind.CLIENT_LEFT, lambda it: _client(it.client_left)),
     "control_action": (EventKind.CONTROL, lambda _: {}),
+    "recording_state_changed": (EventKind.RECORDING, lambda _: {}),
     "robot_mode_changed": (EventKind.MODE, lambda it: {"mode": printable(it.robot_mode_changed.mode)}),
 }
 """Payload -> its kind, and the fields of the event that the reader does not find by their names.

@@ -13,12 +13,14 @@ from console.client.mapping import enums
 from console.client.mapping.driving import drive_item
 from console.client.mapping.events import event_item
 from console.client.mapping.reader import read
+from console.client.mapping.recording import export_item
 from console.client.results import EventPosition, FaultSeverity, PictureReport, PreviewProfile
-from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, teleop_pb2
+from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, recording_pb2, teleop_pb2
 from omniseer.gateway.v1 import robot_gateway_pb2 as wire
 
 _SERVICE: Final = wire.DESCRIPTOR.services_by_name["RobotGateway"]
 _TELEOP: Final = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
+_RECORDING: Final = recording_pb2.DESCRIPTOR.services_by_name["RecordingService"]
 _MS_PER_S: Final = 1000
 
 ResultT = TypeVar("ResultT")
@@ -133,6 +135,21 @@ SEND_TELEOP_COMMAND: Final = Method(
 DRIVE: Final = Method("Drive", drive_item, idempotent=False, service=_TELEOP)
 STOP_ROBOT: Final = Method("StopRobot", partial(read, results.RobotStopped), service=_TELEOP)
 RESET_STOP: Final = Method("ResetStop", partial(read, results.StopReset), idempotent=False, service=_TELEOP)
+# Idempotent by their request_id, all that change something.
+_recording_answer: Final = partial(read, results.RecordingAnswer)
+START_RECORDING: Final = Method("StartRecording", _recording_answer, service=_RECORDING)
+STOP_RECORDING: Final = Method("StopRecording", _recording_answer, service=_RECORDING)
+TRIGGER_SNAPSHOT: Final = Method("TriggerSnapshot", _recording_answer, service=_RECORDING)
+PIN_RECORDING: Final = Method("PinRecording", _recording_answer, service=_RECORDING)
+LIST_RECORDINGS: Final = Method("ListRecordings", partial(read, results.RecordingPage), service=_RECORDING)
+GET_RECORDING: Final = Method("GetRecording", partial(read, results.RecordingFound), service=_RECORDING)
+GET_THUMBNAIL: Final = Method(
+    "GetRecordingThumbnail", partial(read, results.RecordingThumbnail), service=_RECORDING
+)
+DELETE_RECORDING: Final = Method(
+    "DeleteRecording", partial(read, results.RecordingDeleted), service=_RECORDING
+)
+EXPORT_RECORDING: Final = Method("ExportRecording", export_item, service=_RECORDING)
 METHODS: Final = (
     GET_SYSTEM_STATUS,
     SET_PREVIEW_MODE,
@@ -145,7 +162,15 @@ METHODS: Final = (
     SEND_TELEOP_COMMAND,
     STOP_ROBOT,
     RESET_STOP,
+    START_RECORDING,
+    STOP_RECORDING,
+    TRIGGER_SNAPSHOT,
+    LIST_RECORDINGS,
+    GET_RECORDING,
+    GET_THUMBNAIL,
+    PIN_RECORDING,
+    DELETE_RECORDING,
 )
 """The unary methods."""
-STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS)
+STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS, EXPORT_RECORDING)
 """The server-streaming methods. A test compares both lists, and DRIVE, with the schema."""

@@ -61,6 +61,7 @@ _RENAMED: Final[Mapping[type, Mapping[str, str]]] = {
         "position": _ITSELF,
         "preview": "preview_state_changed",
         "control": "control_action",
+        "recording": "recording_state_changed",
     },
 }
 """Field of a result -> field of the message."""

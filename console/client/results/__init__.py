@@ -26,6 +26,7 @@ from console.client.results.event import (
     EventPosition,
     GapReason,
     PreviewEvent,
+    RecordingEvent,
 )
 from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.overlay import (
@@ -52,6 +53,28 @@ from console.client.results.preview import (
     StreamTransport,
     VideoCodec,
     VideoFormat,
+)
+from console.client.results.recording import (
+    ExportChunk,
+    ExportHeader,
+    RecorderState,
+    Recording,
+    RecordingAnswer,
+    RecordingChange,
+    RecordingCopy,
+    RecordingCopyState,
+    RecordingDeleted,
+    RecordingFile,
+    RecordingFound,
+    RecordingGap,
+    RecordingGapCause,
+    RecordingKind,
+    RecordingPage,
+    RecordingPreset,
+    RecordingState,
+    RecordingStatus,
+    RecordingStopReason,
+    RecordingThumbnail,
 )
 from console.client.results.sample import Freshness, Sample, Source, SourceState
 from console.client.results.status import (

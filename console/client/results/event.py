@@ -5,6 +5,12 @@ from enum import Enum
 
 from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.preview import PreviewProfile, PreviewState
+from console.client.results.recording import (
+    RecordingChange,
+    RecordingKind,
+    RecordingState,
+    RecordingStopReason,
+)
 
 
 class EventKind(Enum):
@@ -20,6 +26,7 @@ class EventKind(Enum):
     CLIENT_LEFT = "client-left"
     CONTROL = "control"
     MODE = "mode"
+    RECORDING = "recording"
 
 
 class ControlResult(Enum):
@@ -73,6 +80,22 @@ class ControlAction:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingEvent:
+    """A recording began or ended, a snapshot is complete, or messages were lost."""
+
+    change: RecordingChange
+    recording_id: str
+    label: str
+    kind: RecordingKind
+    """UNKNOWN for a beginning and a loss, which are of recordings started by hand."""
+    state: RecordingState
+    """UNKNOWN before the end; the next one, too."""
+    stop_reason: RecordingStopReason
+    messages_lost: int | None
+    """So far."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
     """One event. Of the parts below `kind`, the one that belongs to the kind is set."""
 
@@ -97,6 +120,7 @@ class Event:
     control: ControlAction | None = None
     mode: str | None = None
     """The robot's mode, as the robot names it."""
+    recording: RecordingEvent | None = None
 
     @property
     def is_presence(self) -> bool:

@@ -7,6 +7,7 @@ from console.client.results.driving import DriveInhibit, DrivePhase, StopLatch
 from console.client.results.fault import Fault
 from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
+from console.client.results.recording import RecordingStatus
 from console.client.results.sample import Sample, Source
 
 
@@ -159,6 +160,8 @@ class SystemStatus:
     sources: tuple[Source, ...]
     """All sources in the gateway's configuration."""
     gateway: GatewayFacts
+    recording: RecordingStatus | None
+    """None where the robot is not set up for recording."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

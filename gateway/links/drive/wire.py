@@ -4,15 +4,16 @@ import asyncio
 import socket
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Final
 
-from google.protobuf.message import DecodeError, Message
+from google.protobuf.message import DecodeError
 
 from gateway.links.drive.state import DriveCommand, DriveReport, DriveSpec
-from gateway.links.link import LinkLostError
 from gateway.links.reconciler import Desired
+from gateway.links.watch import LinkLostError
+from gateway.links.wire_values import same_fields
 from gateway.status.teleop import (
     FOUND_BY_THE_GATEWAY,
     DriveCounters,
@@ -24,8 +25,6 @@ from gateway.status.teleop import (
 )
 from gateway.status.values import Velocity
 from omniseer.drive.v1 import drive_pb2 as pb
-
-ValueT = TypeVar("ValueT")
 
 _MAX_PACKET_BYTES: Final = 16 * 1024
 _WELCOME_WITHIN_S: Final = 1.0
@@ -211,18 +210,12 @@ def report_from(welcome: pb.Welcome, message: pb.ActualState) -> DriveReport:
         # Unknown ones are of a newer drive program: it does not move, as the phase says.
         inhibits=tuple(INHIBITS[each] for each in message.inhibits if each in INHIBITS),
         session_id=message.session_id,
-        velocity=_same_fields(Velocity, message),
+        velocity=same_fields(Velocity, message),
         speed_limit_mps=message.speed_limit_mps,
-        limits=_same_fields(DriveLimits, welcome.limits),
-        stop=_same_fields(StopLatch, message.stop) if message.HasField("stop") else None,
-        counters=_same_fields(DriveCounters, message.counters),
-        episode=_same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
+        limits=same_fields(DriveLimits, welcome.limits),
+        stop=same_fields(StopLatch, message.stop) if message.HasField("stop") else None,
+        counters=same_fields(DriveCounters, message.counters),
+        episode=same_fields(DriveEpisode, message.episode) if message.HasField("episode") else None,
         problems=tuple(message.problems),
         base_timeout_ms=welcome.base_timeout_ms if welcome.HasField("base_timeout_ms") else None,
     )
-
-
-def _same_fields(kind: type[ValueT], message: Message) -> ValueT:
-    """Returns the equally named fields of a message."""
-    values: dict[str, Any] = {each.name: getattr(message, each.name) for each in fields(kind)}  # type: ignore[arg-type]
-    return kind(**values)

@@ -7,8 +7,9 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Final, NoReturn, Protocol
 
 from common.errors import NotRunningError
-from gateway.links.link import LinkLostError, RefusedError, ServiceClient
+from gateway.links.link import RefusedError, ServiceClient
 from gateway.links.preview.state import PreviewReport, PreviewSpec
+from gateway.links.watch import LinkLostError
 from gateway.status.preview import PreviewState, PreviewView
 
 _log = logging.getLogger(__name__)

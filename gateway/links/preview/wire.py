@@ -2,18 +2,18 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import grpc
-from google.protobuf.message import Message
 
 from common import request_id
 from gateway.links.grpc_client import failed, lost, unix_channel
-from gateway.links.link import LinkLostError
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
+from gateway.links.watch import LinkLostError
+from gateway.links.wire_values import same_fields
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -30,8 +30,6 @@ from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceStub
 if TYPE_CHECKING:
     # Exists in the generated stubs alone: the name that a type checker knows the asyncio form by.
     from omniseer.preview.v1.preview_service_pb2_grpc import PreviewServiceAsyncStub
-
-ValueT = TypeVar("ValueT", Listener, Stream, Encoder, Measurement, Counters)
 
 _FEEDBACK_DEADLINE_S: Final = 0.5
 """Of what viewers have passed on: later it is of no use."""
@@ -123,18 +121,11 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         state=state,
         profile=_PROFILE_OF.get(message.profile),
         last_error=message.last_error,
-        listener=_same_fields(Listener, message.listener) if message.HasField("listener") else None,
-        stream=_same_fields(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
-        encoder=_same_fields(Encoder, message.encoder) if message.HasField("encoder") else None,
-        measurement=_same_fields(Measurement, message.measurement)
+        listener=same_fields(Listener, message.listener) if message.HasField("listener") else None,
+        stream=same_fields(Stream, message.stream, codec=codec) if message.HasField("stream") else None,
+        encoder=same_fields(Encoder, message.encoder) if message.HasField("encoder") else None,
+        measurement=same_fields(Measurement, message.measurement)
         if message.HasField("measurement")
         else None,
-        counters=_same_fields(Counters, message.counters),
+        counters=same_fields(Counters, message.counters),
     )
-
-
-def _same_fields(kind: type[ValueT], message: Message, **converted: Any) -> ValueT:
-    """Returns the equally named fields of a message, None for an unset optional one, and those converted."""
-    unset = {f.name for f in message.DESCRIPTOR.fields if f.has_presence and not message.HasField(f.name)}
-    values: Any = {f.name: None if f.name in unset else getattr(message, f.name) for f in fields(kind)}
-    return kind(**(values | converted))

@@ -10,14 +10,15 @@ from google.protobuf.message_factory import GetMessageClass
 
 from common import interceptors
 from gateway.access.role import Role
-from omniseer.gateway.v1 import teleop_pb2
+from omniseer.gateway.v1 import recording_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import ROLE_ADMIN, ROLE_OPERATOR, ROLE_VIEWER, required_role
 from omniseer.gateway.v1.robot_gateway_pb2 import DESCRIPTOR
 
 CONTRACT: Final = DESCRIPTOR.services_by_name["RobotGateway"]
 """The operator's first service, by whose name the health service knows the gateway."""
 TELEOP: Final = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
-SERVICES: Final = (CONTRACT, TELEOP)
+RECORDING: Final = recording_pb2.DESCRIPTOR.services_by_name["RecordingService"]
+SERVICES: Final = (CONTRACT, TELEOP, RECORDING)
 """All services of the operators' contract. Their methods have names of their own."""
 STOP_ROBOT: Final = "StopRobot"
 """Exempt from every limit: it must work when nothing else does. The only control action of viewers."""

@@ -11,9 +11,24 @@ from gateway.status.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.pictures import Delivery
 from gateway.status.preview import Codec, PreviewState, Profile
+from gateway.status.recording import (
+    RecorderState,
+    RecordingChange,
+    RecordingKind,
+    RecordingState,
+    RecordingStopReason,
+)
 from gateway.status.source_view import SourceState
 from gateway.status.teleop import DriveInhibit, DrivePhase
-from omniseer.gateway.v1 import event_pb2, fault_pb2, preview_pb2, source_pb2, states_pb2, teleop_pb2
+from omniseer.gateway.v1 import (
+    event_pb2,
+    fault_pb2,
+    preview_pb2,
+    recording_pb2,
+    source_pb2,
+    states_pb2,
+    teleop_pb2,
+)
 
 _MemberT = TypeVar("_MemberT", bound=Enum)
 
@@ -40,6 +55,17 @@ CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTR
 TELEOP_STATES: Final = {False: states_pb2.TELEOP_DISABLED, True: states_pb2.TELEOP_ENABLED}
 DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")
 DRIVE_INHIBITS: Final = _by_name(DriveInhibit, teleop_pb2.DriveInhibit, "DRIVE_INHIBIT")
+RECORDER_STATES: Final = _by_name(RecorderState, recording_pb2.RecorderState, "RECORDER_STATE")
+RECORDING_CHANGES: Final = _by_name(RecordingChange, event_pb2.RecordingChange, "RECORDING_CHANGE")
+RECORDING_KINDS: Final[Mapping[RecordingKind | None, Any]] = {
+    None: recording_pb2.RECORDING_KIND_UNSPECIFIED
+} | _by_name(RecordingKind, recording_pb2.RecordingKind, "RECORDING_KIND")
+RECORDING_STATES: Final[Mapping[RecordingState | None, Any]] = {
+    None: recording_pb2.RECORDING_STATE_UNSPECIFIED
+} | _by_name(RecordingState, recording_pb2.RecordingState, "RECORDING_STATE")
+RECORDING_STOP_REASONS: Final[Mapping[RecordingStopReason | None, Any]] = {
+    None: recording_pb2.RECORDING_STOP_REASON_UNSPECIFIED
+} | _by_name(RecordingStopReason, recording_pb2.RecordingStopReason, "RECORDING_STOP_REASON")
 GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 _DELIVERY_OF: Final[Mapping[int, Delivery | None]] = {

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
 from gateway.rpc.mapping.faults import fill_fault
+from gateway.rpc.mapping.recording import recording_changed
 from gateway.status.event import (
     ClientJoined,
     ClientLeft,
@@ -16,6 +17,7 @@ from gateway.status.event import (
     LoggedEvent,
     ModeChanged,
     PreviewChanged,
+    RecordingChanged,
 )
 from gateway.status.event_log import Gap, Position
 from omniseer.gateway.v1 import event_pb2 as pb
@@ -95,5 +97,6 @@ _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
     ClientLeft: ("client_left", lambda it, _: pb.ClientLeft(**asdict(it))),
     ControlAction: ("control_action", _control),
     ModeChanged: ("robot_mode_changed", lambda it, _: pb.RobotModeChanged(**asdict(it))),
+    RecordingChanged: ("recording_state_changed", lambda it, _: recording_changed(it)),
 }
 """Total: a test checks every kind of event, and every payload of the schema."""

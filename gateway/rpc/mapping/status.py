@@ -10,6 +10,7 @@ from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
+from gateway.rpc.mapping.recording import recording_status
 from gateway.rpc.mapping.teleop import teleop_status
 from gateway.status.command import Command
 from gateway.status.event_log import OperatorEvent
@@ -38,7 +39,7 @@ _UNATTRIBUTED: Final = "unknown"
 def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2.SystemStatus:
     """Returns everything but detections and events.
 
-    `teleop` stays unset where the robot is not set up for driving, which means "not available".
+    `teleop` and `recording` stay unset where the robot is not set up for them, which means "not available".
     """
     status = system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
@@ -52,6 +53,7 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
         insecure=snapshot.identity.insecure,
         gateway=gateway_facts(snapshot.gateway),
         teleop=teleop_status(snapshot.teleop, snapshot.at_s) if snapshot.teleop else None,
+        recording=recording_status(snapshot.recorder) if snapshot.recorder else None,
     )
     # In place: a message that is passed to a constructor is copied, which doubles the cost of a short one.
     for fault in snapshot.faults:

@@ -9,6 +9,7 @@ from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.driving import driving_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
 from gateway.status.faults.preview import preview_faults
+from gateway.status.faults.recording import recording_faults
 from gateway.status.faults.sources import sampler_fault, source_faults
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import DIAGNOSTICS
@@ -51,5 +52,6 @@ def conditions(
     yield from diagnostics_faults(snapshot[DIAGNOSTICS])
     yield from preview_faults(snapshot.preview, active, settled=settled)
     yield from driving_faults(snapshot.teleop, settled=settled)
+    yield from recording_faults(snapshot.recorder, snapshot.at_s, settled=settled)
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

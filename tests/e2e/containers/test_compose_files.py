@@ -39,7 +39,7 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert "no-new-privileges:true" in service["security_opt"], name
         assert not service.get("privileged"), name
         assert "cap_add" not in service, name
-    for name in ("gateway", "preview", "drive"):
+    for name in ("gateway", "preview", "drive", "recorder"):
         assert services[name]["restart"] == "unless-stopped"
         assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
         assert int(services[name]["mem_limit"]) <= 512 << 20
@@ -57,6 +57,14 @@ def test_driving_is_off_unless_its_profile_is_asked_for() -> None:
     drive = config(profile="drive")["services"]["drive"]
     assert drive["cpu_shares"] > 1024
     assert (drive["network_mode"], drive["ipc"]) == ("host", "host")
+
+
+def test_recording_is_off_unless_its_profile_is_asked_for_and_yields_to_the_mission() -> None:
+    assert not {"recorder", "recorder-config"} & config()["services"].keys()
+    recorder = config(profile="record")["services"]["recorder"]
+    assert recorder["cpu_shares"] < 1024
+    assert recorder["oom_score_adj"] > 0
+    assert (recorder["network_mode"], recorder["ipc"]) == ("host", "host")
 
 
 @pytest.mark.parametrize("overlay", [each for each in OVERLAYS if each != "demo"])

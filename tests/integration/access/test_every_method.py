@@ -12,18 +12,19 @@ from grpc_reflection.v1alpha import reflection_pb2
 
 from common.healthcheck import state_of
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES
-from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
+from omniseer.gateway.v1 import recording_pb2, robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot, refuse_at_once
 from tests.support.running_gateway import raw_unary
 
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
 TELEOP = teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"]
-METHODS = [*SERVICE.methods, *TELEOP.methods]
+RECORDING = recording_pb2.DESCRIPTOR.services_by_name["RecordingService"]
+METHODS = [*SERVICE.methods, *TELEOP.methods, *RECORDING.methods]
 DRIVE = f"/{TELEOP.full_name}/Drive"
 REFLECTION = "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"
 OK, UNAUTHENTICATED = grpc.StatusCode.OK, grpc.StatusCode.UNAUTHENTICATED
@@ -48,6 +49,16 @@ ANSWERS |= {
     path: (grpc.StatusCode.FAILED_PRECONDITION, Reason.TELEOP_NOT_CONFIGURED)
     for path in PATHS
     if path.startswith(f"/{TELEOP.full_name}/") or "Teleop" in path.rpartition("/")[2]
+}
+# Nor a recorder; most requests need an ID, and are refused without one before that.
+ANSWERS |= {
+    f"/{RECORDING.full_name}/{method.name}": (grpc.StatusCode.INVALID_ARGUMENT, Reason.INVALID_REQUEST)
+    for method in RECORDING.methods
+} | {
+    f"/{RECORDING.full_name}/ListRecordings": (
+        grpc.StatusCode.FAILED_PRECONDITION,
+        Reason.RECORDING_NOT_CONFIGURED,
+    )
 }
 """What an empty request leads to, where the role suffices."""
 

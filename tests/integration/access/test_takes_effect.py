@@ -15,7 +15,7 @@ from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from gateway.access import reloader
 from gateway.access.credential import Kind
 from gateway.access.repeats import BURST

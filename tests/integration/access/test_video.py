@@ -9,7 +9,7 @@ import grpc
 import pytest
 
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from gateway.access.role import Role
 from gateway.platform.hosts import find_hosts
 from omniseer.gateway.v1.robot_gateway_pb2 import (

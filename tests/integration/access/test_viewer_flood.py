@@ -9,7 +9,7 @@ from typing import Any
 import grpc
 
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from gateway.access.role import Role
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest, SetPreviewModeRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub

@@ -17,8 +17,8 @@ from common.bind import bind_tcp, bind_unix
 from common.health import Health
 from common.healthcheck import state_of
 from common.reasons import Reason
+from common.refusal import refusal_in
 from common.rpc import new_server
-from console.client.refusal import refusal_in
 
 SERVING, NOT_SERVING = HealthCheckResponse.SERVING, HealthCheckResponse.NOT_SERVING
 

@@ -12,6 +12,7 @@ from console.client import ClientOptions, GatewayClient, GatewayError, errors
 from tests.support.documented_code import DOCS, Example, examples
 from tests.support.gateway_program import gateway_program
 from tests.support.preview_double import double_process
+from tests.support.recorder_double import recorder_process
 from tests.support.robotctl import environment
 
 PAGE = (DOCS / "client.md").read_text(encoding="utf-8")
@@ -21,7 +22,12 @@ ENDS_WITHIN_S = 60.0
 @pytest.fixture(scope="module")
 def target(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     directory = tmp_path_factory.mktemp("gateway")
-    with double_process(directory / "preview.sock"), gateway_program(directory, sources=[]) as gateway:
+    recorder = directory / "recorder.sock"
+    with (
+        double_process(directory / "preview.sock"),
+        recorder_process(recorder),
+        gateway_program(directory, sources=[], recording={"socket": str(recorder)}) as gateway,
+    ):
         yield f"127.0.0.1:{gateway.port}"
 
 
@@ -63,6 +69,7 @@ def prints_what_it_says(example: Example, target: str, tmp_path: Path) -> None:
         text=True,
         timeout=ENDS_WITHIN_S,
         env=environment(XDG_CONFIG_HOME=str(tmp_path)),
+        cwd=tmp_path,
         check=False,
     )
     assert (ran.returncode, ran.stderr) == (0, "")

@@ -12,12 +12,18 @@ from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import only_line, robotctl
 from tests.support.robotctl_docs import DOCS
 
-GROUPS = {"preview": ("on", "off"), "robots": ("add", "remove", "default")}
+RECORDS = ("start", "stop", "snapshot", "list", "show", "pin", "unpin", "delete", "export")
+GROUPS = {"preview": ("on", "off"), "record": RECORDS, "robots": ("add", "remove", "default")}
 # They talk to a file, or show a window, which has no answer to print.
 WITHOUT_A_ROBOT = {"robots", "login", "logout"}
 WINDOW = {"monitor"}
 # Without further words these would not end by themselves.
-WORDS = {"reset-stop": ("1",), "watch": ("--count", "1"), "view": ("--headless", "--frames", "1")}
+WORDS = {
+    "reset-stop": ("1",),
+    "watch": ("--count", "1"),
+    "view": ("--headless", "--frames", "1"),
+    **{f"record {each}": ("ID",) for each in ("show", "pin", "unpin", "delete", "export")},
+}
 
 
 def names() -> list[str]:
@@ -30,7 +36,8 @@ def lines() -> Iterator[tuple[str, ...]]:
         if name in WITHOUT_A_ROBOT | WINDOW:
             continue
         for word in GROUPS.get(name, (None,)):
-            yield (name, *((word,) if word else ()), *WORDS.get(name, ()))
+            typed = (name, word) if word else (name,)
+            yield (*typed, *WORDS.get(" ".join(typed), ()))
 
 
 def test_they_are_found() -> None:
@@ -76,6 +83,6 @@ def test_the_page_has_a_row_for_each() -> None:
     page = DOCS.read_text(encoding="utf-8")
     for name in names():
         for word in (f"`{name}`", *(f"`{name} {word}`" for word in GROUPS.get(name, ()) if name != "robots")):
-            if name == "preview" and word == "`preview`":
+            if name in {"preview", "record"} and word == f"`{name}`":
                 continue
-            assert f"| {word} |" in page or f"| {word}, " in page, word
+            assert f"| {word} |" in page or f"| {word}, " in page or f", {word} |" in page, word

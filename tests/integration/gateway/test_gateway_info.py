@@ -9,7 +9,7 @@ from pathlib import Path
 import grpc
 import pytest
 
-from gateway.platform.files import boot_id
+from common.boot import boot_id
 from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoRequest
 from tests.support.running_gateway import Operator, running_gateway
 

@@ -10,7 +10,7 @@ import grpc
 import pytest
 
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from omniseer.gateway.v1.robot_gateway_pb2 import (
     GetSystemStatusRequest,
     SubscribeEventsRequest,

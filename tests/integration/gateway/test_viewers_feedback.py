@@ -10,7 +10,7 @@ import grpc
 import pytest
 
 from common.reasons import Reason
-from console.client.refusal import refusal_in
+from common.refusal import refusal_in
 from gateway.rpc.connections.admission import METHOD_RATES
 from omniseer.gateway.v1.preview_pb2 import PICTURE_DELIVERY_DIRECT
 from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest, RequestKeyFrameRequest

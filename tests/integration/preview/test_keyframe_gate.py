@@ -91,10 +91,11 @@ class Ground:
     def __init__(self) -> None:
         self.pad, self.sink = Pad(), Sink()
         self._threads: list[threading.Thread] = []
-        parts: Any = SimpleNamespace(parser_pad=self.pad, sink=self.sink)
+        parts: Any = SimpleNamespace(parser_pad=self.pad)
         self.requested = 0
         # Its calls on the loop, which request key frames for new viewers, wait until the test awaits.
         self.gate = KeyframeGate(parts, self._request)
+        self.gate.watch(self.sink)
 
     def _request(self) -> None:
         self.requested += 1

@@ -1,13 +1,16 @@
 """The real pipeline passes the tests that its double passes."""
 
 import asyncio
+import socket
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from preview.config import AdaptiveSettings
 from preview.pipeline.adaptive import BitrateController, Decision, Sample
-from preview.pipeline.events import PipelineEvents
+from preview.pipeline.events import AccessUnit, PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
 from tests.support.eventually import eventually
@@ -49,4 +52,37 @@ async def test_the_age_that_viewers_report_reaches_the_adaptive_bit_rate(
     await eventually(windows, lambda ages: ages[-1] == 140, "the age")
     assert seen[0] is None
     await viewer
+    assert await (await runner.stop())
+
+
+async def test_a_recording_gets_every_encoded_frame() -> None:
+    """The gate for viewers drops frames until a key frame, which the recording must not miss."""
+    units, events = list[AccessUnit](), Events()
+    runner = Runner(plan_of(f"{LIVE} num-buffers=45"), events)
+    runner.record(units.append)
+    await runner.start()
+    await events.wait_for("first_frame")
+    viewer = asyncio.create_task(asyncio.to_thread(record, runner.plan.srt.port, 0.5))
+    await events.wait_for("failed")
+    captured = runner._parts.rate.get_property("in")  # what the encoder was given
+    assert len(units) == captured - runner._parts.rate.get_property("drop")
+    assert [unit.skipped for unit in units] == [0] * len(units)
+    assert all(later.captured_ns > earlier.captured_ns for earlier, later in pairwise(units))
+    assert await (await runner.stop())
+    await viewer
+
+
+async def test_a_pipeline_that_may_do_without_its_listener_goes_on(tmp_path: Path) -> None:
+    events = Events()
+    events.goes_on = True
+    runner = Runner(plan_of(LIVE), events)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", runner.plan.srt.port))
+        await runner.start()
+        assert "can't be used" in events.faults[0].text
+        await events.wait_for("first_frame")
+    await runner.listen("correct horse battery")
+    assert events.counts["listener_failed"] == 1
+    await runner.write_graph(tmp_path / "graph.dot")
+    assert "GstSRTSink" in (tmp_path / "graph.dot").read_text(encoding="utf-8")
     assert await (await runner.stop())

@@ -1,13 +1,5 @@
 """Every test here has a ROS domain of its own."""
 
-from collections.abc import Iterator
+from tests.support.talker import talker
 
-import pytest
-
-from tests.support.talker import Talker, talking
-
-
-@pytest.fixture
-def talker(ros_domain: int) -> Iterator[Talker]:  # noqa: ARG001  # for its effect
-    with talking() as made:
-        yield made
+__all__ = ["talker"]

@@ -13,7 +13,7 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
 from gateway.config import GatewaySettings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import DRIVE, PREVIEW, Service, operator_endpoint, service_endpoint
+from gateway.doctor.endpoints import DRIVE, PREVIEW, RECORDER, Service, operator_endpoint, service_endpoint
 from gateway.doctor.examination import examine
 from gateway.links.preview.exposure import video_exposure
 from gateway.status.preview import Listener
@@ -157,3 +157,13 @@ def test_the_doctor_asks_the_service_where_its_listener_is(tmp_path: Path, behav
     else:
         assert finding.verdict is Verdict.NOTE
         assert "unknown state" in finding.what
+
+
+def test_the_recorder_is_looked_for_where_it_is_configured(tmp_path: Path) -> None:
+    path = tmp_path / "recorder.sock"
+    assert "robot-recorder serve" in service_endpoint(RECORDER, path).remedy
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        assert service_endpoint(RECORDER, path).verdict is Verdict.GOOD
+    assert "Start the recorder again" in service_endpoint(RECORDER, path).remedy

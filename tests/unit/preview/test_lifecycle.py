@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from preview.lifecycle import TRANSITIONS, Event, IllegalEventError, Lifecycle, State
+from preview.lifecycle import (
+    TRANSITIONS,
+    Event,
+    IllegalEventError,
+    Lifecycle,
+    Listening,
+    State,
+    state_for_viewers,
+)
 
 # How to get to each state from the beginning.
 PATHS = {
@@ -143,3 +151,27 @@ def test_whatever_happens_the_books_balance(events: list[Event]) -> None:
     if lifecycle.state is State.STOPPING:
         lifecycle.handle(Event.STOPPED)
     assert lifecycle.state is State.DISABLED
+
+
+# By whether the preview is enabled, and whether there is a listener: what operators see of each state of the
+# pipeline, in the order DISABLED, STARTING, RUNNING, STOPPING, FAULTED.
+_D, _S, _R, _X, _F = State.DISABLED, State.STARTING, State.RUNNING, State.STOPPING, State.FAULTED
+FOR_VIEWERS = {
+    (True, Listening.YES): [_D, _S, _R, _X, _F],
+    (True, Listening.NO): [_D, _S, _S, _X, _F],
+    (True, Listening.FAILED): [_D, _S, _F, _X, _F],
+    (False, Listening.YES): [_D, _X, _X, _X, _F],
+    (False, Listening.NO): [_D, _D, _D, _D, _D],
+    (False, Listening.FAILED): [_D, _D, _D, _D, _D],
+}
+
+
+@pytest.mark.parametrize(("case", "expected"), FOR_VIEWERS.items(), ids=str)
+def test_what_operators_see_of_a_pipeline(case: tuple[bool, Listening], expected: list[State]) -> None:
+    enabled, listening = case
+    seen = [state_for_viewers(state, enabled=enabled, listening=listening) for state in (_D, _S, _R, _X, _F)]
+    assert seen == expected
+
+
+def test_every_case_of_what_operators_see_is_written_out() -> None:
+    assert set(FOR_VIEWERS) == {(enabled, listening) for enabled in (True, False) for listening in Listening}

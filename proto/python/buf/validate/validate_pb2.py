@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import descriptor_pb2 as google_dot_protobuf_dot_descriptor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1b\x62uf/validate/validate.proto\x12\x0c\x62uf.validate\x1a google/protobuf/descriptor.proto\"/\n\x0cMessageRules\x12\x1f\n\x03\x63\x65l\x18\x03 \x03(\x0b\x32\x12.buf.validate.Rule\"7\n\x04Rule\x12\n\n\x02id\x18\x01 \x01(\t\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x12\n\nexpression\x18\x03 \x01(\t\"\xc2\x01\n\nFieldRules\x12)\n\x05\x66loat\x18\x01 \x01(\x0b\x32\x18.buf.validate.FloatRulesH\x00\x12+\n\x06uint32\x18\x05 \x01(\x0b\x32\x19.buf.validate.UInt32RulesH\x00\x12+\n\x06string\x18\x0e \x01(\x0b\x32\x19.buf.validate.StringRulesH\x00\x12\'\n\x04\x65num\x18\x10 \x01(\x0b\x32\x17.buf.validate.EnumRulesH\x00\x42\x06\n\x04type\"G\n\nFloatRules\x12\r\n\x03lte\x18\x03 \x01(\x02H\x00\x12\r\n\x03gte\x18\x05 \x01(\x02H\x01\x42\x0b\n\tless_thanB\x0e\n\x0cgreater_than\")\n\x0bUInt32Rules\x12\r\n\x03lte\x18\x03 \x01(\rH\x00\x42\x0b\n\tless_than\"/\n\x0bStringRules\x12\x0f\n\x07max_len\x18\x03 \x01(\x04\x12\x0f\n\x07pattern\x18\x06 \x01(\t\"!\n\tEnumRules\x12\x14\n\x0c\x64\x65\x66ined_only\x18\x02 \x01(\x08:M\n\x07message\x12\x1f.google.protobuf.MessageOptions\x18\x87\t \x01(\x0b\x32\x1a.buf.validate.MessageRules:G\n\x05\x66ield\x12\x1d.google.protobuf.FieldOptions\x18\x87\t \x01(\x0b\x32\x18.buf.validate.FieldRules')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1b\x62uf/validate/validate.proto\x12\x0c\x62uf.validate\x1a google/protobuf/descriptor.proto\"/\n\x0cMessageRules\x12\x1f\n\x03\x63\x65l\x18\x03 \x03(\x0b\x32\x12.buf.validate.Rule\"7\n\x04Rule\x12\n\n\x02id\x18\x01 \x01(\t\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x12\n\nexpression\x18\x03 \x01(\t\"\xed\x01\n\nFieldRules\x12)\n\x05\x66loat\x18\x01 \x01(\x0b\x32\x18.buf.validate.FloatRulesH\x00\x12+\n\x06uint32\x18\x05 \x01(\x0b\x32\x19.buf.validate.UInt32RulesH\x00\x12+\n\x06string\x18\x0e \x01(\x0b\x32\x19.buf.validate.StringRulesH\x00\x12)\n\x05\x62ytes\x18\x0f \x01(\x0b\x32\x18.buf.validate.BytesRulesH\x00\x12\'\n\x04\x65num\x18\x10 \x01(\x0b\x32\x17.buf.validate.EnumRulesH\x00\x42\x06\n\x04type\"G\n\nFloatRules\x12\r\n\x03lte\x18\x03 \x01(\x02H\x00\x12\r\n\x03gte\x18\x05 \x01(\x02H\x01\x42\x0b\n\tless_thanB\x0e\n\x0cgreater_than\")\n\x0bUInt32Rules\x12\r\n\x03lte\x18\x03 \x01(\rH\x00\x42\x0b\n\tless_than\"@\n\x0bStringRules\x12\x0f\n\x07min_len\x18\x02 \x01(\x04\x12\x0f\n\x07max_len\x18\x03 \x01(\x04\x12\x0f\n\x07pattern\x18\x06 \x01(\t\"\x1d\n\nBytesRules\x12\x0f\n\x07max_len\x18\x03 \x01(\x04\"!\n\tEnumRules\x12\x14\n\x0c\x64\x65\x66ined_only\x18\x02 \x01(\x08:M\n\x07message\x12\x1f.google.protobuf.MessageOptions\x18\x87\t \x01(\x0b\x32\x1a.buf.validate.MessageRules:G\n\x05\x66ield\x12\x1d.google.protobuf.FieldOptions\x18\x87\t \x01(\x0b\x32\x18.buf.validate.FieldRules')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -37,13 +37,15 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_RULE']._serialized_start=128
   _globals['_RULE']._serialized_end=183
   _globals['_FIELDRULES']._serialized_start=186
-  _globals['_FIELDRULES']._serialized_end=380
-  _globals['_FLOATRULES']._serialized_start=382
-  _globals['_FLOATRULES']._serialized_end=453
-  _globals['_UINT32RULES']._serialized_start=455
-  _globals['_UINT32RULES']._serialized_end=496
-  _globals['_STRINGRULES']._serialized_start=498
-  _globals['_STRINGRULES']._serialized_end=545
-  _globals['_ENUMRULES']._serialized_start=547
-  _globals['_ENUMRULES']._serialized_end=580
+  _globals['_FIELDRULES']._serialized_end=423
+  _globals['_FLOATRULES']._serialized_start=425
+  _globals['_FLOATRULES']._serialized_end=496
+  _globals['_UINT32RULES']._serialized_start=498
+  _globals['_UINT32RULES']._serialized_end=539
+  _globals['_STRINGRULES']._serialized_start=541
+  _globals['_STRINGRULES']._serialized_end=605
+  _globals['_BYTESRULES']._serialized_start=607
+  _globals['_BYTESRULES']._serialized_end=636
+  _globals['_ENUMRULES']._serialized_start=638
+  _globals['_ENUMRULES']._serialized_end=671
 # @@protoc_insertion_point(module_scope)

@@ -85,6 +85,7 @@ class FieldRules(_message.Message):
     FLOAT_FIELD_NUMBER: _builtins.int
     UINT32_FIELD_NUMBER: _builtins.int
     STRING_FIELD_NUMBER: _builtins.int
+    BYTES_FIELD_NUMBER: _builtins.int
     ENUM_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def float(self) -> Global___FloatRules:
@@ -99,6 +100,10 @@ class FieldRules(_message.Message):
         """Of a string."""
 
     @_builtins.property
+    def bytes(self) -> Global___BytesRules:
+        """Of bytes."""
+
+    @_builtins.property
     def enum(self) -> Global___EnumRules:
         """Of an enum."""
 
@@ -108,13 +113,14 @@ class FieldRules(_message.Message):
         float: Global___FloatRules | None = ...,
         uint32: Global___UInt32Rules | None = ...,
         string: Global___StringRules | None = ...,
+        bytes: Global___BytesRules | None = ...,
         enum: Global___EnumRules | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["bytes", b"bytes", "enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["bytes", b"bytes", "enum", b"enum", "float", b"float", "string", b"string", "type", b"type", "uint32", b"uint32"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_type: _TypeAlias = _typing.Literal["float", "uint32", "string", "enum"]  # noqa: Y015
+    _WhichOneofReturnType_type: _TypeAlias = _typing.Literal["float", "uint32", "string", "bytes", "enum"]  # noqa: Y015
     _WhichOneofArgType_type: _TypeAlias = _typing.Literal["type", b"type"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_type) -> _WhichOneofReturnType_type | None: ...
 
@@ -183,8 +189,11 @@ class StringRules(_message.Message):
 
     DESCRIPTOR: _descriptor.Descriptor
 
+    MIN_LEN_FIELD_NUMBER: _builtins.int
     MAX_LEN_FIELD_NUMBER: _builtins.int
     PATTERN_FIELD_NUMBER: _builtins.int
+    min_len: _builtins.int
+    """At least so many characters."""
     max_len: _builtins.int
     """At most so many characters."""
     pattern: _builtins.str
@@ -192,16 +201,39 @@ class StringRules(_message.Message):
     def __init__(
         self,
         *,
+        min_len: _builtins.int | None = ...,
         max_len: _builtins.int | None = ...,
         pattern: _builtins.str | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "pattern", b"pattern"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "min_len", b"min_len", "pattern", b"pattern"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "pattern", b"pattern"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len", "min_len", b"min_len", "pattern", b"pattern"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___StringRules: _TypeAlias = StringRules  # noqa: Y015
+
+@_typing.final
+class BytesRules(_message.Message):
+    """Of bytes."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    MAX_LEN_FIELD_NUMBER: _builtins.int
+    max_len: _builtins.int
+    """At most so many."""
+    def __init__(
+        self,
+        *,
+        max_len: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["max_len", b"max_len"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___BytesRules: _TypeAlias = BytesRules  # noqa: Y015
 
 @_typing.final
 class EnumRules(_message.Message):

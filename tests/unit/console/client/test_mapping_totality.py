@@ -17,7 +17,7 @@ from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 
 from console.client import results
-from console.client.mapping import enums
+from console.client.mapping import enums, recording
 from console.client.mapping.driving import (
     DriveCommand,
     command_request,
@@ -57,6 +57,7 @@ from omniseer.gateway.v1 import (
     overlay_pb2,
     platform_pb2,
     preview_pb2,
+    recording_pb2,
     robot_gateway_pb2,
     source_pb2,
     states_pb2,
@@ -74,6 +75,7 @@ FILES: Final = (
     overlay_pb2,
     platform_pb2,
     preview_pb2,
+    recording_pb2,
     robot_gateway_pb2,
     states_pb2,
     system_status_pb2,
@@ -84,6 +86,7 @@ ANSWERS: Final = {
     for service in (
         robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"],
         teleop_pb2.DESCRIPTOR.services_by_name["TeleopService"],
+        recording_pb2.DESCRIPTOR.services_by_name["RecordingService"],
     )
     for method in service.methods
 }
@@ -109,6 +112,13 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.DrivePhase, teleop_pb2.DrivePhase),
         (results.DriveInhibit, teleop_pb2.DriveInhibit),
         (results.Supervision, teleop_pb2.Supervision),
+        (results.RecorderState, recording_pb2.RecorderState),
+        (results.RecordingKind, recording_pb2.RecordingKind),
+        (results.RecordingState, recording_pb2.RecordingState),
+        (results.RecordingStopReason, recording_pb2.RecordingStopReason),
+        (results.RecordingCopyState, recording_pb2.RecordingCopyState),
+        (results.RecordingGapCause, recording_pb2.RecordingGapCause),
+        (results.RecordingChange, event_pb2.RecordingChange),
     )
 }
 
@@ -157,6 +167,7 @@ RENAMED: Final[Mapping[str, str]] = {
     "Event.sequence": "position.sequence",
     "Event.preview_state_changed": "preview",
     "Event.control_action": "control",
+    "Event.recording_state_changed": "recording",
     "ClientJoined.address": "client_address",
     "ClientLeft.address": "client_address",
     "ClientJoined.who": "client_name",
@@ -171,6 +182,8 @@ INLINED: Final = {
     "SubscribeEventsResponse.gap",
     "DriveResponse.opened",
     "DriveResponse.state",
+    "ExportRecordingResponse.header",
+    "ExportRecordingResponse.chunk",
     "Event.fault_raised",
     "Event.fault_cleared",
     "Event.client_joined",
@@ -267,6 +280,12 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "WatchSystemStatusResponse.detections": ("detections",),
     "TeleopStatus.stop": ("stop",),
     "TeleopStatus.base_timeout_ms": ("base_timeout_ms",),
+    "SystemStatus.recording": ("recording",),
+    "RecordingStatus.messages_lost": ("messages_lost",),
+    "RecordingStatus.room_s": ("room_s",),
+    "Recording.messages_lost": ("messages_lost",),
+    "RecordingGap.messages": ("messages",),
+    "RecordingStateChanged.messages_lost": ("messages_lost",),
     "DriveState.stop": ("stop",),
     "DriveState.picture_age_ms": ("picture_age_ms",),
 }
@@ -309,6 +328,7 @@ EVENT_KINDS: Final[Mapping[str, EventKind]] = {
     "client_left": EventKind.CLIENT_LEFT,
     "control_action": EventKind.CONTROL,
     "robot_mode_changed": EventKind.MODE,
+    "recording_state_changed": EventKind.RECORDING,
 }
 """Payload of an event -> `Event.kind`, which no field feeds."""
 
@@ -320,10 +340,11 @@ EVENT_PARTS: Final = (
     "client_name",
     "control",
     "mode",
+    "recording",
 )
 """The parts of an `Event` that its payload feeds; those of other payloads are None."""
 
-UNIQUE_TYPES: Final = (int, float, str)
+UNIQUE_TYPES: Final = (int, float, str, bytes)
 """The types with enough values for each field to have its own; flags and enumerations have too few."""
 
 Flat = dict[str, object]
@@ -635,6 +656,39 @@ def test_every_field_of_the_requests_of_driving_is_set() -> None:
     assert robot_gateway_pb2.SetTeleopEnabledRequest.FromString(enabled_request(True)).enabled
     velocity = robot_gateway_pb2.SendTeleopCommandRequest.FromString(velocity_request(0.25, 0.5, 0.75))
     assert (velocity.linear_x_mps, velocity.linear_y_mps, velocity.angular_z_rad_s) == (0.25, 0.5, 0.75)
+
+
+def test_every_field_of_the_requests_of_recordings_is_set() -> None:
+    requests: dict[type[Message], bytes] = {
+        recording_pb2.StartRecordingRequest: recording.start_request(
+            "id",
+            label="label",
+            notes="notes",
+            preset="preset",
+            with_video=False,
+            max_duration_s=1,
+            max_bytes=2,
+        ),
+        recording_pb2.StopRecordingRequest: recording.stop_request("id", "recording"),
+        recording_pb2.TriggerSnapshotRequest: recording.snapshot_request(
+            "id", pre_s=0, post_s=2, label="label", preset="preset"
+        ),
+        recording_pb2.ListRecordingsRequest: recording.list_request(7, "token"),
+        recording_pb2.GetRecordingRequest: recording.get_request("recording"),
+        recording_pb2.GetRecordingThumbnailRequest: recording.thumbnail_request("recording"),
+        recording_pb2.ExportRecordingRequest: recording.export_request(
+            "recording", "file", offset=7, expected_sha256=b"sum", max_bytes_per_s=9
+        ),
+        recording_pb2.PinRecordingRequest: recording.pin_request("id", "recording", pinned=True),
+        recording_pb2.DeleteRecordingRequest: recording.delete_request(
+            "id", "recording", expected_sha256=b"sum", force=True
+        ),
+    }
+    for kind, data in requests.items():
+        request = kind.FromString(data)
+        assert {field.name for field, _ in request.ListFields()} == set(kind.DESCRIPTOR.fields_by_name)
+    started = recording_pb2.StartRecordingRequest.FromString(recording.start_request("id"))
+    assert not started.HasField("with_video")
 
 
 def test_every_kind_of_event_has_a_word() -> None:

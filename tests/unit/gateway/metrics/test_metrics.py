@@ -14,7 +14,7 @@ from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.histogram import Histogram
-from gateway.metrics.collector import GatewayCollector
+from gateway.metrics.collector import GatewayCollector, RecorderMetrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats, Stats
@@ -38,6 +38,7 @@ from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Received, Velocity
 from tests.support.drive_views import stopped_view
 from tests.support.eventually import eventually
+from tests.support.recorder_views import recording_view
 
 ROOT = Path(__file__).parents[4]
 NOW_S = 1000.0
@@ -68,6 +69,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
         gateway=Runtime("abc", "boot", 61_500, 3, 10, 1),
         pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
         teleop=stopped_view(NOW_S),
+        recorder=recording_view(NOW_S),
     )
 
 
@@ -81,6 +83,8 @@ class World:
     closed = 34
     throttled = 35
     muted = 36
+    expired = 37
+    sent_bytes = 38
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -101,6 +105,7 @@ def families(calls: Stats, now: Snapshot | None = None) -> list[Metric]:
         event_stream=world,
         preview_link=world,
         drive_link=world,
+        recorder=RecorderMetrics(world, world, world),
     )
     return list(text_string_to_metric_families(collector.text().decode()))
 

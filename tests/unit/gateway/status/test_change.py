@@ -9,11 +9,13 @@ from gateway.status.board import Board
 from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Measurement, PreviewState
+from gateway.status.recording import RecorderState, RecorderView
 from gateway.status.snapshot import Runtime, Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.teleop import DrivePhase
 from gateway.status.values import Mode, Received, Velocity
 from tests.support.drive_views import actual, stopped_view
+from tests.support.recorder_views import status, view
 from tests.support.status import OFF, snapshot_of
 
 FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 90.0, 100.0, None, 1)
@@ -71,6 +73,21 @@ def test_this_is_no_change(later: Snapshot) -> None:
 )
 def test_this_is_a_change(later: Snapshot) -> None:
     assert change_key(later) != BEFORE
+
+
+def test_a_recording_that_grows_is_no_change_and_what_an_operator_acts_on_is_one() -> None:
+    before = change_key(snapshot(recorder=view(status(), 99.0)))
+    grown = status(elapsed_ms=9**9, size=9**9, messages_written=9**9, bytes_per_s=1, room_bytes=1, room_s=1)
+    assert change_key(snapshot(recorder=view(grown, 100.0, disk_free_bytes=1))) == before
+    for changed in (
+        status(state=RecorderState.FINALISING),
+        status(recording_id="another"),
+        status(messages_lost=18),
+        status(last_error="no room"),
+        status(snapshots_pending=4),
+    ):
+        assert change_key(snapshot(recorder=view(changed, 99.0))) != before
+    assert change_key(snapshot(recorder=RecorderView("gone"))) != before
 
 
 def test_every_field_of_the_snapshot_is_projected_or_excluded_by_name() -> None:

@@ -11,7 +11,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from gateway.ros.receive_time import Instant, received_at
+from common.receive_time import Instant, received_at
 from gateway.status.board import Board
 from gateway.status.fault import Severity
 from gateway.status.faults.tracker import FaultTracker

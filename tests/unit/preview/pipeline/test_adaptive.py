@@ -364,3 +364,24 @@ def test_it_never_leaves_its_bounds(samples: list[Sample], target: int, floor: i
         assert min(floor, target) <= decision.bitrate_kbps <= target
         assert "\n" not in decision.reason
         assert (decision.reason == "") <= (decision.bitrate_kbps == target)
+
+
+def test_a_higher_floor_lifts_a_rate_below_it_and_holds_it(settled: Run) -> None:
+    settled.after(*[CONGESTED] * 40)
+    settled.controller.set_floor(1500)
+    decision = settled.after(CONGESTED)
+    assert decision.bitrate_kbps == 1500
+    assert min(settled.rates(20, CONGESTED)) == 1500
+    settled.controller.set_floor(500)
+    assert settled.rates(30, CONGESTED)[-1] == 500
+
+
+def test_a_rate_that_a_recording_lifted_says_why(settled: Run) -> None:
+    settled.after(*[CONGESTED] * 40)
+    settled.controller.set_floor(1500)
+    assert settled.after(NO_VIEWER).reason == "a recording holds it at 1.50 Mbit/s at least"
+
+
+def test_a_floor_above_the_target_is_the_target(settled: Run) -> None:
+    settled.controller.set_floor(9000)
+    assert set(settled.rates(10, CONGESTED)) == {2500}

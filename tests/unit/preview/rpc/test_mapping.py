@@ -8,7 +8,7 @@ from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.probe import Verdict
-from preview.lifecycle import Counters, State
+from preview.lifecycle import Counters, Reason, State
 from preview.rpc import mapping
 from preview.values import ActualState, Codec, EncoderChoice, Measurement, Profile, StreamState, Target
 
@@ -26,6 +26,8 @@ FULL = ActualState(
     stream=StreamState(Target(1280, 720, 60, 4500, 800), 3000, "because", Codec.H265, encrypted=True),
     encoder=EncoderChoice("va-h265", hardware=True, wanted="mpp-h265", fallback_reason="why"),
     measurement=Measurement(59.5, 4400.0, 21, 12, 30.5, 1.5),
+    pipeline_state=State.RUNNING,
+    reasons=(Reason.VIEWERS, Reason.RECORDING),
 )
 
 
@@ -35,6 +37,7 @@ FULL = ActualState(
         (mapping.STATES, State, pb.LifecycleState),
         (mapping.PROFILES, Profile, pb.Profile),
         (mapping.CODECS, Codec, pb.Codec),
+        (mapping.REASONS, Reason, pb.Reason),
     ],
 )
 def test_every_enum_is_covered_on_both_sides(table: Any, ours: Any, theirs: Any) -> None:
@@ -84,6 +87,8 @@ def test_every_value_arrives_at_its_place() -> None:
             worst_rtt_ms=30.5,
             worst_loss_percent=1.5,
         ),
+        pipeline_state=pb.LIFECYCLE_STATE_RUNNING,
+        reasons=[pb.REASON_VIEWERS, pb.REASON_RECORDING],
     )
 
 

@@ -8,6 +8,7 @@ from google.protobuf import message as _message
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
+from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 import builtins as _builtins
 import sys
@@ -72,6 +73,38 @@ EVENT_GAP_REASON_NEW_RUN: EventGapReason.ValueType  # 2
 """The gateway program was restarted. What the earlier run had not sent yet is lost."""
 Global___EventGapReason: _TypeAlias = EventGapReason  # noqa: Y015
 
+class _RecordingChange:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _RecordingChangeEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_RecordingChange.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    RECORDING_CHANGE_UNSPECIFIED: _RecordingChange.ValueType  # 0
+    """Not known."""
+    RECORDING_CHANGE_STARTED: _RecordingChange.ValueType  # 1
+    """It began."""
+    RECORDING_CHANGE_ENDED: _RecordingChange.ValueType  # 2
+    """It ended; stop_reason says why."""
+    RECORDING_CHANGE_SNAPSHOT_COMPLETE: _RecordingChange.ValueType  # 3
+    """A snapshot, or an incident, has all that it is to contain."""
+    RECORDING_CHANGE_LOSS: _RecordingChange.ValueType  # 4
+    """Messages were lost from the recording that runs. One event for losses less than 10 s apart."""
+
+class RecordingChange(_RecordingChange, metaclass=_RecordingChangeEnumTypeWrapper):
+    """What happened to a recording."""
+
+RECORDING_CHANGE_UNSPECIFIED: RecordingChange.ValueType  # 0
+"""Not known."""
+RECORDING_CHANGE_STARTED: RecordingChange.ValueType  # 1
+"""It began."""
+RECORDING_CHANGE_ENDED: RecordingChange.ValueType  # 2
+"""It ended; stop_reason says why."""
+RECORDING_CHANGE_SNAPSHOT_COMPLETE: RecordingChange.ValueType  # 3
+"""A snapshot, or an incident, has all that it is to contain."""
+RECORDING_CHANGE_LOSS: RecordingChange.ValueType  # 4
+"""Messages were lost from the recording that runs. One event for losses less than 10 s apart."""
+Global___RecordingChange: _TypeAlias = RecordingChange  # noqa: Y015
+
 @_typing.final
 class EventPosition(_message.Message):
     """A place in the order of events."""
@@ -124,6 +157,7 @@ class Event(_message.Message):
     CLIENT_LEFT_FIELD_NUMBER: _builtins.int
     CONTROL_ACTION_FIELD_NUMBER: _builtins.int
     ROBOT_MODE_CHANGED_FIELD_NUMBER: _builtins.int
+    RECORDING_STATE_CHANGED_FIELD_NUMBER: _builtins.int
     run_id: _builtins.str
     """As in EventPosition."""
     sequence: _builtins.int
@@ -170,6 +204,10 @@ class Event(_message.Message):
     def robot_mode_changed(self) -> Global___RobotModeChanged:
         """The robot reports another mode."""
 
+    @_builtins.property
+    def recording_state_changed(self) -> Global___RecordingStateChanged:
+        """A recording began or ended, a snapshot is complete, or messages were lost."""
+
     def __init__(
         self,
         *,
@@ -188,12 +226,13 @@ class Event(_message.Message):
         client_left: Global___ClientLeft | None = ...,
         control_action: Global___ControlAction | None = ...,
         robot_mode_changed: Global___RobotModeChanged | None = ...,
+        recording_state_changed: Global___RecordingStateChanged | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "robot_mode_changed", b"robot_mode_changed"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "component", b"component", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "message", b"message", "monotonic_ns", b"monotonic_ns", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "robot_mode_changed", b"robot_mode_changed", "run_id", b"run_id", "sequence", b"sequence", "severity", b"severity", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "component", b"component", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "message", b"message", "monotonic_ns", b"monotonic_ns", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed", "run_id", b"run_id", "sequence", b"sequence", "severity", b"severity", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_payload: _TypeAlias = _typing.Literal["fault_raised", "fault_cleared", "preview_state_changed", "encoder_fallback", "client_joined", "client_left", "control_action", "robot_mode_changed"]  # noqa: Y015
+    _WhichOneofReturnType_payload: _TypeAlias = _typing.Literal["fault_raised", "fault_cleared", "preview_state_changed", "encoder_fallback", "client_joined", "client_left", "control_action", "robot_mode_changed", "recording_state_changed"]  # noqa: Y015
     _WhichOneofArgType_payload: _TypeAlias = _typing.Literal["payload", b"payload"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_payload) -> _WhichOneofReturnType_payload | None: ...
 
@@ -458,3 +497,53 @@ class EventGap(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___EventGap: _TypeAlias = EventGap  # noqa: Y015
+
+@_typing.final
+class RecordingStateChanged(_message.Message):
+    """A recording began or ended, a snapshot is complete, or messages were lost."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    CHANGE_FIELD_NUMBER: _builtins.int
+    RECORDING_ID_FIELD_NUMBER: _builtins.int
+    LABEL_FIELD_NUMBER: _builtins.int
+    KIND_FIELD_NUMBER: _builtins.int
+    STATE_FIELD_NUMBER: _builtins.int
+    STOP_REASON_FIELD_NUMBER: _builtins.int
+    MESSAGES_LOST_FIELD_NUMBER: _builtins.int
+    change: Global___RecordingChange.ValueType
+    """What happened."""
+    recording_id: _builtins.str
+    """Which recording."""
+    label: _builtins.str
+    """Its label. Empty when none was given."""
+    kind: _recording_pb2.RecordingKind.ValueType
+    """What made it. Unspecified with RECORDING_CHANGE_STARTED and RECORDING_CHANGE_LOSS, which are of recordings
+    started by hand.
+    """
+    state: _recording_pb2.RecordingState.ValueType
+    """Its state at the end. Unspecified before that."""
+    stop_reason: _recording_pb2.RecordingStopReason.ValueType
+    """Why it ended. Unspecified before that."""
+    messages_lost: _builtins.int
+    """Messages lost from it so far. Unset: unknown."""
+    def __init__(
+        self,
+        *,
+        change: Global___RecordingChange.ValueType = ...,
+        recording_id: _builtins.str = ...,
+        label: _builtins.str = ...,
+        kind: _recording_pb2.RecordingKind.ValueType = ...,
+        state: _recording_pb2.RecordingState.ValueType = ...,
+        stop_reason: _recording_pb2.RecordingStopReason.ValueType = ...,
+        messages_lost: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "messages_lost", b"messages_lost"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost", "change", b"change", "kind", b"kind", "label", b"label", "messages_lost", b"messages_lost", "recording_id", b"recording_id", "state", b"state", "stop_reason", b"stop_reason"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__messages_lost: _TypeAlias = _typing.Literal["messages_lost"]  # noqa: Y015
+    _WhichOneofArgType__messages_lost: _TypeAlias = _typing.Literal["_messages_lost", b"_messages_lost"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__messages_lost) -> _WhichOneofReturnType__messages_lost | None: ...
+
+Global___RecordingStateChanged: _TypeAlias = RecordingStateChanged  # noqa: Y015

@@ -11,6 +11,7 @@ from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
+from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 from omniseer.gateway.v1 import source_pb2 as _source_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 from omniseer.gateway.v1 import teleop_pb2 as _teleop_pb2
@@ -47,6 +48,7 @@ class SystemStatus(_message.Message):
     MISSION_FIELD_NUMBER: _builtins.int
     SOURCES_FIELD_NUMBER: _builtins.int
     GATEWAY_FIELD_NUMBER: _builtins.int
+    RECORDING_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -98,6 +100,10 @@ class SystemStatus(_message.Message):
     def gateway(self) -> _gateway_info_pb2.GatewayFacts:
         """The gateway program itself."""
 
+    @_builtins.property
+    def recording(self) -> _recording_pb2.RecordingStatus:
+        """Recording. Unset where the robot is not set up for it."""
+
     def __init__(
         self,
         *,
@@ -114,10 +120,11 @@ class SystemStatus(_message.Message):
         mission: Global___MissionStatus | None = ...,
         sources: _abc.Iterable[_source_pb2.SourceStatus] | None = ...,
         gateway: _gateway_info_pb2.GatewayFacts | None = ...,
+        recording: _recording_pb2.RecordingStatus | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -55,6 +55,30 @@ LIFECYCLE_STATE_FAULTED: LifecycleState.ValueType  # 5
 """Enabled but not delivering; a retry is scheduled."""
 Global___LifecycleState: _TypeAlias = LifecycleState  # noqa: Y015
 
+class _Reason:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _ReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Reason.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    REASON_UNSPECIFIED: _Reason.ValueType  # 0
+    """Never sent."""
+    REASON_VIEWERS: _Reason.ValueType  # 1
+    """The desired state is enabled: the listener serves viewers."""
+    REASON_RECORDING: _Reason.ValueType  # 2
+    """A recorder is connected to the video tap. It needs no listener, and is none of the operators' viewers."""
+
+class Reason(_Reason, metaclass=_ReasonEnumTypeWrapper):
+    """Why a pipeline is to run."""
+
+REASON_UNSPECIFIED: Reason.ValueType  # 0
+"""Never sent."""
+REASON_VIEWERS: Reason.ValueType  # 1
+"""The desired state is enabled: the listener serves viewers."""
+REASON_RECORDING: Reason.ValueType  # 2
+"""A recorder is connected to the video tap. It needs no listener, and is none of the operators' viewers."""
+Global___Reason: _TypeAlias = Reason  # noqa: Y015
+
 class _Profile:
     ValueType = _typing.NewType("ValueType", _builtins.int)
     V: _TypeAlias = ValueType  # noqa: Y015
@@ -159,16 +183,23 @@ class ActualState(_message.Message):
     MEASUREMENT_FIELD_NUMBER: _builtins.int
     COUNTERS_FIELD_NUMBER: _builtins.int
     LISTENER_FIELD_NUMBER: _builtins.int
+    PIPELINE_STATE_FIELD_NUMBER: _builtins.int
+    REASONS_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process of the service: a new value means that all counters restarted at 0."""
     applied_revision: _builtins.int
     """The newest revision applied. 0: none yet."""
     state: Global___LifecycleState.ValueType
-    """State of the lifecycle."""
+    """State of the preview for viewers. DISABLED while a pipeline runs for a recording alone: then nothing
+    listens, and stream, encoder and measurement are unset. FAULTED also while a recording goes on and
+    only the listener has failed.
+    """
     profile: Global___Profile.ValueType
     """The profile of the newest revision applied; a running pipeline follows at once."""
     last_error: _builtins.str
     """The last error and what to do, for people. Empty for none since the preview was last enabled."""
+    pipeline_state: Global___LifecycleState.ValueType
+    """State of the one pipeline that serves all reasons."""
     @_builtins.property
     def stream(self) -> Global___Stream:
         """Parameters of the stream being served. Unset while no pipeline exists."""
@@ -189,6 +220,10 @@ class ActualState(_message.Message):
     def listener(self) -> Global___Listener:
         """Address for viewers, whether a pipeline exists or not."""
 
+    @_builtins.property
+    def reasons(self) -> _containers.RepeatedScalarFieldContainer[Global___Reason.ValueType]:
+        """Why a pipeline is to run. Empty: none is."""
+
     def __init__(
         self,
         *,
@@ -202,10 +237,12 @@ class ActualState(_message.Message):
         measurement: Global___Measurement | None = ...,
         counters: Global___Counters | None = ...,
         listener: Global___Listener | None = ...,
+        pipeline_state: Global___LifecycleState.ValueType = ...,
+        reasons: _abc.Iterable[Global___Reason.ValueType] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["counters", b"counters", "encoder", b"encoder", "listener", b"listener", "measurement", b"measurement", "stream", b"stream"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "counters", b"counters", "encoder", b"encoder", "instance_id", b"instance_id", "last_error", b"last_error", "listener", b"listener", "measurement", b"measurement", "profile", b"profile", "state", b"state", "stream", b"stream"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "counters", b"counters", "encoder", b"encoder", "instance_id", b"instance_id", "last_error", b"last_error", "listener", b"listener", "measurement", b"measurement", "pipeline_state", b"pipeline_state", "profile", b"profile", "reasons", b"reasons", "state", b"state", "stream", b"stream"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.links.drive.wire import DriveClient
-from gateway.links.link import LinkLostError
+from gateway.links.watch import LinkLostError
 from omniseer.drive.v1 import drive_pb2 as pb
 
 

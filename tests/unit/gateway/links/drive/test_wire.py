@@ -10,7 +10,7 @@ from drive.wire import event_of
 from gateway.links.drive import wire
 from gateway.links.drive.commands import ENDS
 from gateway.links.drive.state import DriveCommand
-from gateway.links.link import LinkLostError
+from gateway.links.watch import LinkLostError
 from gateway.status.teleop import (
     FOUND_BY_THE_GATEWAY,
     DriveActual,

@@ -2,10 +2,10 @@
 
 import pytest
 
-from gateway.links.link import LinkLostError
 from gateway.links.preview import wire
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
+from gateway.links.watch import LinkLostError
 from gateway.status.preview import (
     Codec,
     Counters,
@@ -55,6 +55,9 @@ def test_a_full_report() -> None:
             worst_loss_percent=1.5,
         ),
         counters=pb.Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
+        # A recording is no affair of the preview's operators: the gateway has no use for these.
+        pipeline_state=pb.LIFECYCLE_STATE_RUNNING,
+        reasons=[pb.REASON_RECORDING],
     )
     assert {field.name for field, _ in message.ListFields()} == set(pb.ActualState.DESCRIPTOR.fields_by_name)
     assert wire.from_wire(message) == PreviewReport(

@@ -18,10 +18,17 @@ from gateway.status.event import (
     LoggedEvent,
     ModeChanged,
     PreviewChanged,
+    RecordingChanged,
 )
 from gateway.status.event_log import Gap, GapReason, Position
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import PreviewState, Profile
+from gateway.status.recording import (
+    RecordingChange,
+    RecordingKind,
+    RecordingState,
+    RecordingStopReason,
+)
 from omniseer.gateway.v1.event_pb2 import Event as EventMessage
 
 FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"), 1.0, 2.0, 3.0, 4)
@@ -34,6 +41,15 @@ DETAILS: list[Detail] = [
     ClientLeft("10.0.0.1:1", "alice"),
     ControlAction("alice", "10.0.0.1:1", "SetPreviewMode", "enabled: true", ControlResult.REFUSED, "no"),
     ModeChanged("exploring"),
+    RecordingChanged(
+        RecordingChange.ENDED,
+        "a",
+        "lap",
+        RecordingKind.MANUAL,
+        RecordingState.COMPLETE,
+        RecordingStopReason.DISK,
+        7,
+    ),
 ]
 
 

@@ -34,6 +34,13 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
+from gateway.status.recording import (
+    RecorderState,
+    RecordingChange,
+    RecordingKind,
+    RecordingState,
+    RecordingStopReason,
+)
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
@@ -63,15 +70,18 @@ from gateway.status.values import (
     Vision,
 )
 from omniseer.gateway.v1 import (
+    event_pb2,
     fault_pb2,
     overlay_pb2,
     preview_pb2,
+    recording_pb2,
     robot_gateway_pb2,
     source_pb2,
     states_pb2,
     teleop_pb2,
 )
 from tests.support.drive_views import stopped_view
+from tests.support.recorder_views import recording_view
 
 FRESH = SourceRule(10**9, required=True)
 NOW_S = 1000.0
@@ -90,6 +100,11 @@ FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "l
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
         (DrivePhase, enums.DRIVE_PHASES, teleop_pb2.DrivePhase),
         (DriveInhibit, enums.DRIVE_INHIBITS, teleop_pb2.DriveInhibit),
+        (RecorderState, enums.RECORDER_STATES, recording_pb2.RecorderState),
+        (RecordingKind, enums.RECORDING_KINDS, recording_pb2.RecordingKind),
+        (RecordingState, enums.RECORDING_STATES, recording_pb2.RecordingState),
+        (RecordingStopReason, enums.RECORDING_STOP_REASONS, recording_pb2.RecordingStopReason),
+        (RecordingChange, enums.RECORDING_CHANGES, event_pb2.RecordingChange),
     ],
 )
 def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table: Any, wire_enum: Any) -> None:
@@ -108,7 +123,7 @@ def test_a_profile_outside_the_enum_is_an_invalid_request() -> None:
 def test_every_method_of_the_contract_has_a_handler() -> None:
     assert SERVICES[0].full_name == SERVICE
     anything: Any = _AnyService()
-    methods = Services(anything, anything, anything, anything, anything).methods()
+    methods = Services(*[anything] * 6).methods()
     names = [method.name for service in SERVICES for method in service.methods]
     assert set(methods) == set(names)
     assert len(methods) == len(names), "statistics tell methods apart by their names"
@@ -119,7 +134,19 @@ def test_the_control_actions_are_these_and_a_viewer_may_only_stop() -> None:
     changing = {method.name: method.needed for method in methods if method.changes_robot}
     assert changing.pop("StopRobot") is Role.VIEWER
     assert changing == dict.fromkeys(
-        ("SetPreviewMode", "SetTeleopEnabled", "SendTeleopCommand", "Drive", "ResetStop"), Role.OPERATOR
+        (
+            "SetPreviewMode",
+            "SetTeleopEnabled",
+            "SendTeleopCommand",
+            "Drive",
+            "ResetStop",
+            "StartRecording",
+            "StopRecording",
+            "TriggerSnapshot",
+            "PinRecording",
+            "DeleteRecording",
+        ),
+        Role.OPERATOR,
     )
 
 
@@ -181,6 +208,7 @@ def everything() -> Snapshot:
         now_s=NOW_S,
         pictures=Pictures(1, 140, 138),
         teleop=stopped_view(NOW_S),
+        recorder=recording_view(at_s),
     )
 
 

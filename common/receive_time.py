@@ -1,8 +1,13 @@
-"""Converts the time of reception that the middleware reports to the gateway's monotonic clock."""
+"""Converts the time of reception that the middleware reports to the monotonic clock."""
 
+import time
 from dataclasses import dataclass
+from typing import Final
 
-_NS_PER_S = 1e9
+_NS_PER_S: Final = 1e9
+_MAX_CLOCK_GAP_S: Final = 50e-6
+"""Between reading the two clocks; a larger gap means that the thread was preempted in between."""
+_CLOCK_TRIES: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,3 +28,12 @@ def received_at(stamp_ns: int, now: Instant, emptied_at_s: float) -> float:
     """
     age_s = (now.system_ns - stamp_ns) / _NS_PER_S
     return min(max(now.monotonic_s - age_s, emptied_at_s), now.monotonic_s)
+
+
+def present_instant() -> Instant:
+    """Reads both clocks as closely together as the scheduler allows: the gap between them is an error."""
+    for _ in range(_CLOCK_TRIES):
+        now = Instant(time.monotonic(), time.time_ns())
+        if time.monotonic() - now.monotonic_s < _MAX_CLOCK_GAP_S:
+            break
+    return now

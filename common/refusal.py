@@ -9,14 +9,14 @@ from google.rpc.error_details_pb2 import BadRequest, ErrorInfo, RetryInfo
 from google.rpc.status_pb2 import Status
 
 DOMAIN: Final = "omniseer.gateway.v1"
-"""The domain of the gateway's reasons; those of a proxy have another."""
+"""The `domain` of google.rpc.ErrorInfo: who defines the reasons. Those of a proxy have another."""
 _KEY: Final = "grpc-status-details-bin"
 _NS_PER_S: Final = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """The details; empty where an older gateway, or gRPC itself, refused."""
+    """The details; empty where an older program, or gRPC itself, refused."""
 
     reason: str = ""
     fields: tuple[str, ...] = ()

@@ -1,7 +1,7 @@
-"""The one thread that reads ROS: it polls every source some twenty times a second. No executor spins.
+"""The one thread of a program that reads ROS: it polls some twenty times a second. No executor spins.
 
-An executor wakes up for every message, polling costs the same at any message rate. An operator's screen can't
-show more than twenty values a second, and a value's age is exact whenever it is fetched.
+An executor wakes up for every message, polling costs little more at a higher rate. An operator's screen
+can't show more than twenty values a second, and a value's age is exact whenever it is fetched.
 """
 
 import logging
@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Final, Protocol, Self
 
-from gateway.status.board import Board
-
 _log = logging.getLogger(__name__)
 
 SAMPLING_HZ: Final = 20.0
@@ -21,6 +19,13 @@ SAMPLING_HZ: Final = 20.0
 
 _STOP_WITHIN_S: Final = 5.0
 _WARN_EVERY_S: Final = 10.0
+
+
+class Watched(Protocol):
+    """Where the end of each pass is noted."""
+
+    ros_passed_s: float | None
+    """Monotonic time of the newest one."""
 
 
 class Takes(Protocol):
@@ -34,18 +39,18 @@ class Sampler:
     """Calls `take` of every source at fixed times, from `__enter__` to `__exit__`.
 
     What the graph holds can be anything, and rclpy raises many things: an error of one source costs that
-    source one pass, never the thread. The end of each pass is noted on the board, so that a thread that hangs
-    in the middleware is a fault of its own.
+    source one pass, never the thread. The end of each pass is noted, so that a thread that hangs in the
+    middleware can be noticed.
 
     Args:
         sources: polled one after the other.
-        board: where the end of each pass is noted.
+        watched: where the end of each pass is noted.
         rate_hz: how often.
     """
 
-    def __init__(self, sources: Sequence[Takes], board: Board, rate_hz: float = SAMPLING_HZ) -> None:
+    def __init__(self, sources: Sequence[Takes], watched: Watched, rate_hz: float = SAMPLING_HZ) -> None:
         self._sources = tuple(sources)
-        self._board = board
+        self._watched = watched
         self._period_s = 1 / rate_hz
         self._warned_at_s = -math.inf
         self._stop = threading.Event()
@@ -53,7 +58,7 @@ class Sampler:
         self._thread = threading.Thread(target=self._run, name="ros-sampler", daemon=True)
 
     def __enter__(self) -> Self:
-        self._board.ros_passed_s = time.monotonic()
+        self._watched.ros_passed_s = time.monotonic()
         self._thread.start()
         return self
 
@@ -73,7 +78,7 @@ class Sampler:
                     source.take()
                 except Exception:  # noqa: BLE001  # whatever it is: the other sources are read all the same
                     self._warn()
-            self._board.ros_passed_s = passed_s = time.monotonic()
+            self._watched.ros_passed_s = passed_s = time.monotonic()
             # Missed passes are skipped, not repeated: they would find nothing new.
             due_s = max(due_s + self._period_s, passed_s)
 

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gateway.ros.receive_time import Instant, received_at
+from common.receive_time import Instant, received_at
 
 S = 1_000_000_000
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from gateway.ros.sampler import Sampler, Takes
+from common.sampler import Sampler, Takes
 from gateway.status.board import Board
 
 

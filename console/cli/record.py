@@ -1,0 +1,300 @@
+"""robotctl record: recordings on the robot, and their copies on this computer."""
+
+import asyncio
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from console.cli.export_progress import ExportBar
+from console.cli.session import Session, print_json, with_session
+from console.cli.tables import grid
+from console.client import ExportOptions, Recording
+from console.client.export_path import path_below
+from console.client.exporting import ExportedRecording
+from console.presentation.formatting import age, plural, size, wall_clock
+from console.presentation.json_form import json_form
+from console.presentation.recording import is_written, recording_state, recording_summary, remarks
+
+record_app = typer.Typer(
+    help="Record on the robot, keep its last minutes, copy recordings to this computer.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+IdArgument = Annotated[
+    str, typer.Argument(metavar="ID", help="The recording, as `robotctl record list` names it.")
+]
+LabelOption = Annotated[str, typer.Option("--label", metavar="TEXT", help="A name for people.")]
+PresetOption = Annotated[
+    str,
+    typer.Option(
+        "--preset", metavar="NAME", help="What to record.", show_default="the first one of the robot"
+    ),
+]
+
+
+@record_app.command("start")
+@with_session
+def start(
+    session: Session,
+    *,
+    label: LabelOption = "",
+    notes: Annotated[str, typer.Option("--notes", metavar="TEXT", help="For people.")] = "",
+    preset: PresetOption = "",
+    video: Annotated[
+        bool | None,
+        typer.Option("--video/--no-video", help="With the video, or not.", show_default="as the preset says"),
+    ] = None,
+    max_s: Annotated[
+        int, typer.Option("--max-duration", metavar="SECONDS", min=0, help="Stop by itself; 0: never.")
+    ] = 0,
+    max_mb: Annotated[
+        int, typer.Option("--max-size", metavar="MB", min=0, help="Stop by itself; 0: never.")
+    ] = 0,
+) -> None:
+    """Start a recording on the robot's disk. It goes on when this computer leaves."""
+    with session.connect() as gateway:
+        answer = gateway.start_recording(
+            label,
+            notes=notes,
+            preset=preset,
+            with_video=video,
+            max_duration_s=max_s,
+            max_bytes=max_mb * 1_000_000,
+        )
+    session.show({"ok": True, **json_form(answer)}, answer.message)
+
+
+@record_app.command("stop")
+@with_session
+def stop(
+    session: Session,
+    *,
+    recording_id: Annotated[
+        str, typer.Argument(metavar="[ID]", help="The recording.", show_default="the one that runs")
+    ] = "",
+) -> None:
+    """Stop a recording. Exit code 0 as well when it has ended before."""
+    with session.connect() as gateway:
+        answer = gateway.stop_recording(recording_id)
+    session.show({"ok": True, **json_form(answer)}, answer.message)
+
+
+@record_app.command("snapshot")
+@with_session
+def snapshot(
+    session: Session,
+    *,
+    label: LabelOption = "",
+    before: Annotated[
+        int | None,
+        typer.Option(
+            "--before",
+            metavar="SECONDS",
+            min=0,
+            max=3600,
+            help="Seconds until now.",
+            show_default="the robot's",
+        ),
+    ] = None,
+    after: Annotated[
+        int | None,
+        typer.Option(
+            "--after",
+            metavar="SECONDS",
+            min=0,
+            max=600,
+            help="Seconds from now on.",
+            show_default="the robot's",
+        ),
+    ] = None,
+    preset: PresetOption = "",
+) -> None:
+    """Keep the last seconds, and the next ones. Ends at once; the robot completes it."""
+    with session.connect() as gateway:
+        answer = gateway.trigger_snapshot(label, pre_s=before, post_s=after, preset=preset)
+    session.show({"ok": True, **json_form(answer)}, answer.message)
+
+
+@record_app.command("list")
+@with_session
+def list_all(session: Session) -> None:
+    """List the recordings on the robot, the newest first."""
+    with session.connect() as gateway:
+        status = gateway.list_recordings(page_size=1).status
+        recordings = tuple(gateway.recordings())
+    document = {"status": json_form(status), "recordings": json_form(recordings)}
+    summary = Text(f"{status.state.value.upper()}  {recording_summary(status, compact=False)}", style="dim")
+    session.show(document, Group(_list_table(recordings), Text(), summary) if recordings else summary)
+
+
+@record_app.command("show")
+@with_session
+def show(session: Session, *, recording_id: IdArgument) -> None:
+    """Show a recording with its files and its gaps."""
+    with session.connect() as gateway:
+        found = gateway.recording(recording_id)
+    session.show(json_form(found), _view(found))
+
+
+@record_app.command("pin")
+@with_session
+def pin(session: Session, *, recording_id: IdArgument) -> None:
+    """Pin a recording: making room never deletes it."""
+    _pin(session, recording_id, pinned=True)
+
+
+@record_app.command("unpin")
+@with_session
+def unpin(session: Session, *, recording_id: IdArgument) -> None:
+    """End the pin of a recording."""
+    _pin(session, recording_id, pinned=False)
+
+
+@record_app.command("delete")
+@with_session
+def delete(
+    session: Session,
+    *,
+    recording_id: IdArgument,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Although it is pinned or not copied yet; for administrators."),
+    ] = False,
+) -> None:
+    """Delete a recording from the robot's disk, as it is now: one that changes meanwhile stays."""
+    with session.connect() as gateway:
+        found = gateway.recording(recording_id)
+        deleted = gateway.delete_recording(recording_id, expected_sha256=found.sha256, force=force)
+    session.show({"ok": True, **json_form(deleted)}, deleted.message)
+
+
+@record_app.command("export")
+@with_session
+def export(
+    session: Session,
+    *,
+    recording_id: IdArgument,
+    to: Annotated[
+        Path, typer.Option("--to", metavar="DIR", help="Where its folder is made.", show_default="here")
+    ] = Path(),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what an earlier export has left.")
+    ] = False,
+    limit_mbit: Annotated[
+        float,
+        typer.Option("--limit", metavar="MBIT/S", min=0, help="Highest rate; 0: as the robot is configured."),
+    ] = 0,
+) -> None:
+    """Copy a recording to this computer, into the folder DIR/ID, and verify it.
+
+    It goes on by itself when the connection was cut. Of a recording that is still written, it copies what is
+    final so far.
+    """
+    try:
+        asyncio.run(_export(session, recording_id, to, resume=resume, limit_mbit=limit_mbit))
+    except KeyboardInterrupt:
+        words = shlex.join(["record", "export", recording_id, "--to", str(to), "--resume"])
+        print(f"What was received stays. To go on, type: robotctl {words}", file=sys.stderr)
+        raise
+
+
+async def _export(session: Session, recording_id: str, to: Path, *, resume: bool, limit_mbit: float) -> None:
+    async with session.connect_async() as client:
+        found = await client.recording(recording_id)
+        folder = path_below(to, found.id)
+        with ExportBar(session.out, shown=not session.as_json) as bar:
+            done = await client.export_recording(
+                recording_id,
+                folder,
+                ExportOptions(
+                    resume=resume, max_bytes_per_s=round(limit_mbit * 1e6 / 8), progress=bar.update
+                ),
+            )
+    if session.as_json:
+        print_json(session.out, {"ok": True, **exported_json(done)})
+    else:
+        session.out.print(_exported(done, found))
+
+
+def exported_json(done: ExportedRecording) -> dict[str, Any]:
+    """Returns the JSON form of what was copied."""
+    return {
+        "folder": str(done.folder),
+        "files": done.files,
+        "size": done.size,
+        "received": done.received,
+        "cuts": done.cuts,
+        "not_final": list(done.not_final),
+    }
+
+
+def _exported(done: ExportedRecording, recording: Recording) -> str:
+    text = f"{done.folder}: {plural(done.files, 'file')}, {size(done.size)}, verified"
+    if done.not_final or is_written(recording):
+        rest = plural(len(done.not_final), "file")
+        text += f"\nThe recording goes on: {rest} not final yet. Later, type the same with --resume"
+    return text
+
+
+def _pin(session: Session, recording_id: str, *, pinned: bool) -> None:
+    with session.connect() as gateway:
+        answer = gateway.pin_recording(recording_id, pinned)
+    session.show({"ok": True, **json_form(answer)}, answer.message)
+
+
+def _list_table(recordings: tuple[Recording, ...]) -> Table:
+    table = grid("nowrap", "nowrap", "nowrap", "right", "right", "fold", "fold")
+    table.add_row("id", "began", "state", "length", "size", "label", "", style="dim")
+    for each in recordings:
+        table.add_row(
+            Text(each.id),
+            Text(wall_clock(each.started_unix_ms)),
+            Text(recording_state(each)),
+            age(each.duration_ms),
+            size(each.size),
+            Text(each.label or each.preset),
+            Text(remarks(each), style="dim"),
+        )
+    return table
+
+
+def _view(recording: Recording) -> RenderableType:
+    facts = grid("nowrap", "fold")
+    ended = wall_clock(recording.ended_unix_ms) if recording.ended_unix_ms else "still written"
+    for label, text in (
+        ("label", recording.label),
+        ("notes", recording.notes),
+        ("state", recording_state(recording)),
+        ("preset", recording.preset),
+        ("began", wall_clock(recording.started_unix_ms)),
+        ("ended", ended),
+        ("length", age(recording.duration_ms)),
+        ("size", size(recording.size)),
+        ("messages", f"{recording.messages_written}, {_lost(recording.messages_lost)}"),
+        ("video", plural(recording.video_frames, "frame") if recording.video_frames else "none"),
+        ("", remarks(recording)),
+        ("copy", recording.copy.reason),
+    ):
+        if text:
+            facts.add_row(Text(label, style="dim"), Text(text))
+    files = grid("fold", "right", "nowrap")
+    for file in recording.files:
+        files.add_row(Text(file.name), size(file.size), Text("" if file.final else "still written"))
+    gaps = grid("nowrap", "nowrap", "fold")
+    for gap in recording.gaps:
+        when = f"{wall_clock(gap.began_unix_ms)} to {wall_clock(gap.ended_unix_ms, form='%H:%M:%S')}"
+        gaps.add_row(
+            Text("gap", style="bold yellow"), Text(when), f"{gap.cause.value}, {_lost(gap.messages)}"
+        )
+    return Group(Text(recording.id, style="bold"), Text(), facts, Text(), files, gaps)
+
+
+def _lost(messages: int | None) -> str:
+    return "losses unknown" if messages is None else f"{messages} lost"

@@ -1,0 +1,119 @@
+"""What can't be reconciled: the operators' calls, which the recorder answers, and reports of faults."""
+
+import asyncio
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from typing import Final
+
+import grpc
+
+from common import request_id
+from gateway.links.recorder.refusals import refused, unreachable
+from gateway.links.recorder.wire import RecorderClient
+from gateway.links.watch import WatchConnector
+from gateway.status.fault import Condition
+
+_ANSWER_WITHIN_S: Final = 5.0
+_LONGER_S: Final[Mapping[str, float]] = {"StartRecording": 10.0, "StopRecording": 12.0}
+"""Methods that wait for the disk: a stop answers after 10 s while its files are still being finalised."""
+_GONE: Final = "nothing answers on its socket"
+_CALLER: Final = "x-caller"
+"""Metadata: who calls, for people."""
+
+
+class RecorderCalls:
+    """A connector for the link that uses its connection for calls as well.
+
+    Args:
+        connector: opens the connections.
+    """
+
+    def __init__(self, connector: WatchConnector[RecorderClient]) -> None:
+        self._connector = connector
+        self._client: RecorderClient | None = None
+        """None while there is no connection."""
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[RecorderClient]:
+        """Yields a connection."""
+        async with self._connector.connect() as client:
+            self._client = client
+            try:
+                yield client
+            finally:
+                self._client = None
+
+    async def call(self, method: str, request: bytes, caller: str, remaining_s: float | None) -> bytes:
+        """Passes a unary call on, and returns the response, both serialised.
+
+        Args:
+            method: its name, which both contracts share.
+            request: the operator's.
+            caller: for people.
+            remaining_s: until the caller's deadline; None without one.
+
+        Raises:
+            DomainError: the recorder refuses, or does not answer.
+        """
+        timeout_s = _LONGER_S.get(method, _ANSWER_WITHIN_S)
+        if remaining_s is not None:
+            timeout_s = min(timeout_s, remaining_s)
+        try:
+            return await self._connected().call(method, request, timeout_s, _metadata(caller))
+        except grpc.aio.AioRpcError as error:
+            raise refused(error) from None
+        except asyncio.CancelledError:
+            if _is_cancelled():
+                raise
+            raise unreachable(_GONE) from None
+
+    async def export(self, request: bytes, caller: str) -> AsyncGenerator[bytes]:
+        """Passes an export on: yields its responses, serialised, each as it is taken.
+
+        Raises:
+            DomainError: the recorder refuses, or is gone.
+        """
+        stream = self._connected().export(request, _metadata(caller))
+        try:
+            async for response in stream:
+                yield response
+        except grpc.aio.AioRpcError as error:
+            raise refused(error) from None
+        except asyncio.CancelledError:
+            if _is_cancelled():
+                raise
+            raise unreachable(_GONE) from None
+        finally:
+            stream.cancel()
+
+    async def report_fault(self, fault: Condition) -> str:
+        """Reports a fault; returns the incident that it became, empty for none.
+
+        Raises:
+            DomainError: the recorder refuses, or does not answer.
+        """
+        try:
+            return await self._connected().report_fault(
+                fault.fault_id, fault.severity, fault.message, _ANSWER_WITHIN_S
+            )
+        except grpc.aio.AioRpcError as error:
+            raise refused(error) from None
+        except asyncio.CancelledError:
+            if _is_cancelled():
+                raise
+            raise unreachable(_GONE) from None
+
+    def _connected(self) -> RecorderClient:
+        if self._client is None:
+            raise unreachable(_GONE)
+        return self._client
+
+
+def _metadata(caller: str) -> tuple[tuple[str, str], ...]:
+    return (request_id.HEADER, request_id.current()), (_CALLER, caller)
+
+
+def _is_cancelled() -> bool:
+    """Whether this task is cancelled: gRPC raises the same when the link closes the channel under a call."""
+    task = asyncio.current_task()
+    return bool(task and task.cancelling())

@@ -1,0 +1,81 @@
+"""Reports faults to the recorder, which keeps what happened around them."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Iterable
+from typing import Final, NoReturn
+
+from common.backoff import Backoff
+from common.broadcast import Broadcast
+from common.errors import DomainError, RecorderUnreachableError
+from gateway.links.recorder.calls import RecorderCalls
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.faults.recording import OWN
+
+_log = logging.getLogger(__name__)
+
+EXPIRED_S: Final = 30.0
+"""After that the ring may not have the instant any more."""
+_FIRST_PAUSE_S: Final = 0.2
+_LONGEST_PAUSE_S: Final = 2.0
+
+
+class Incidents:
+    """Has each fault of the severity ERROR reported once, when it is raised or becomes one.
+
+    What the recorder does not get within EXPIRED_S is dropped. At most as many wait as faults are listed.
+
+    Args:
+        calls: to the recorder.
+        clock: monotonic seconds.
+
+    Attributes:
+        expired: faults that were never reported.
+    """
+
+    def __init__(self, calls: RecorderCalls, clock: Callable[[], float] = time.monotonic) -> None:
+        self._calls = calls
+        self._clock = clock
+        self._known: frozenset[str] = frozenset()
+        self._waiting: dict[str, tuple[Condition, float]] = {}
+        """By fault ID: what to report, and since when."""
+        self._added = Broadcast()
+        self.expired = 0
+
+    def take(self, faults: Iterable[Fault]) -> None:
+        """Takes the faults of an instant. Never waits."""
+        errors = {
+            each.condition.fault_id: each.condition
+            for each in faults
+            if each.active and each.condition.severity is Severity.ERROR and each.condition.component != OWN
+        }
+        now_s = self._clock()
+        for fault_id in errors.keys() - self._known:
+            self._waiting[fault_id] = errors[fault_id], now_s
+        self._known = frozenset(errors)
+        if self._waiting:
+            self._added.notify_all()
+
+    async def run(self) -> NoReturn:
+        """Reports them, until cancelled."""
+        backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
+        while True:
+            await self._added.wait_until(lambda: bool(self._waiting))
+            fault_id, (condition, since_s) = next(iter(self._waiting.items()))
+            if self._clock() - since_s > EXPIRED_S:
+                del self._waiting[fault_id]
+                self.expired += 1
+                _log.warning("no incident was recorded of %s: the recorder did not answer", fault_id)
+                continue
+            try:
+                incident = await self._calls.report_fault(condition)
+            except RecorderUnreachableError:
+                await asyncio.sleep(backoff.next_s())
+                continue
+            except DomainError as error:
+                _log.warning("no incident was recorded of %s: %s", fault_id, error)
+            else:
+                _log.info("fault %s: %s", fault_id, f"incident {incident}" if incident else "no incident")
+            backoff.reset()
+            self._waiting.pop(fault_id, None)

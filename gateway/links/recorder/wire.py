@@ -1,0 +1,143 @@
+"""Schema and client of the recorder (omniseer.recorder.v1).
+
+Its messages are mostly those of the operators' contract. They are passed on as bytes, so that this side needs
+no knowledge of them, and an export costs the gateway no parsing.
+"""
+
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import grpc
+
+from gateway.links.grpc_client import lost, unix_channel
+from gateway.links.watch import LinkLostError
+from gateway.links.wire_values import same_fields
+from gateway.status.fault import Severity
+from gateway.status.recording import (
+    ENDED,
+    RecorderReport,
+    RecorderState,
+    RecorderStatus,
+    RecordingBrief,
+    RecordingKind,
+    RecordingPreset,
+    RecordingState,
+    RecordingStopReason,
+)
+from omniseer.recorder.v1 import recorder_service_pb2 as pb
+from omniseer.recorder.v1.recorder_service_pb2_grpc import RecorderServiceStub
+
+if TYPE_CHECKING:
+    # Exists in the generated stubs alone: the name that a type checker knows the asyncio form by.
+    from omniseer.recorder.v1.recorder_service_pb2_grpc import RecorderServiceAsyncStub
+
+MemberT = TypeVar("MemberT", bound=Enum)
+Metadata = Sequence[tuple[str, str]]
+
+_SERVICE: Final = f"/{pb.DESCRIPTOR.services_by_name['RecorderService'].full_name}"
+_MAX_MESSAGE_BYTES: Final = 4 * 1024 * 1024
+"""A thumbnail has up to 2 MiB, a recording up to 10000 files."""
+_REPORT: Final = pb.WatchStateResponse.DESCRIPTOR.fields_by_name
+_STATUS: Final = _REPORT["status"].message_type
+_RECORDING: Final = _REPORT["ended"].message_type
+
+
+def _by_number(domain: type[MemberT], message: Any, field: str, prefix: str) -> Mapping[int, MemberT]:
+    """Returns the members of an enum by the numbers that a field of a message has for them."""
+    values = message.fields_by_name[field].enum_type.values_by_name
+    return {
+        values[f"{prefix}_{each.name}"].number: each for each in domain if f"{prefix}_{each.name}" in values
+    }
+
+
+STATES: Final = _by_number(RecorderState, _STATUS, "state", "RECORDER_STATE")
+KINDS: Final = _by_number(RecordingKind, _RECORDING, "kind", "RECORDING_KIND")
+RECORDING_STATES: Final = _by_number(RecordingState, _RECORDING, "state", "RECORDING_STATE")
+STOP_REASONS: Final = _by_number(RecordingStopReason, _RECORDING, "stop_reason", "RECORDING_STOP_REASON")
+_SEVERITIES: Final = _by_number(Severity, pb.ReportFaultRequest.DESCRIPTOR, "severity", "FAULT_SEVERITY")
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderConnector:
+    """Connects to the recorder on the Unix socket where it listens, or will."""
+
+    socket: Path
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator["RecorderClient"]:
+        """Yields a client; connects with its first call."""
+        # Exports have a connection of their own: reports never wait behind their bytes.
+        async with (
+            unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
+            unix_channel(self.socket, _MAX_MESSAGE_BYTES) as exports,
+        ):
+            yield RecorderClient(channel, exports)
+
+
+class RecorderClient:
+    """A Reporter of the recorder, and its other methods. All but `reports` raise what gRPC raises."""
+
+    def __init__(self, channel: grpc.aio.Channel, exports: grpc.aio.Channel) -> None:
+        self._channel = channel
+        self._exports = exports
+        self._stub: RecorderServiceAsyncStub = RecorderServiceStub(channel)
+
+    async def reports(self) -> AsyncIterator[RecorderReport]:
+        """Yields what WatchState reports."""
+        stream = self._stub.WatchState(pb.WatchStateRequest())
+        try:
+            while isinstance(message := await stream.read(), pb.WatchStateResponse):
+                yield report_from(message)
+        except grpc.aio.AioRpcError as error:
+            raise lost(error) from None
+
+    async def call(self, method: str, request: bytes, timeout_s: float, metadata: Metadata) -> bytes:
+        """Calls a method whose messages are the operators'; returns the response as it comes."""
+        call: Any = self._channel.unary_unary(f"{_SERVICE}/{method}")
+        response: bytes = await call(request, timeout=timeout_s, metadata=tuple(metadata))
+        return response
+
+    def export(self, request: bytes, metadata: Metadata) -> Any:
+        """Starts ExportRecording; its responses come as they are on the wire."""
+        call: Any = self._exports.unary_stream(f"{_SERVICE}/ExportRecording")
+        return call(request, metadata=tuple(metadata))
+
+    async def report_fault(self, fault_id: str, severity: Severity, message: str, timeout_s: float) -> str:
+        """Reports a fault; returns the incident that it became or was merged with, empty for none."""
+        number: Any = next(number for number, each in _SEVERITIES.items() if each is severity)
+        request = pb.ReportFaultRequest(fault_id=fault_id, severity=number, message=message)
+        return (await self._stub.ReportFault(request, timeout=timeout_s)).recording_id
+
+
+def report_from(message: pb.WatchStateResponse) -> RecorderReport:
+    """Returns the report in a message.
+
+    Raises:
+        LinkLostError: the state is unknown, because the recorder is of another version than the gateway.
+    """
+    state = STATES.get(message.status.state)
+    if state is None or state is RecorderState.UNREACHABLE:
+        number = message.status.state
+        raise LinkLostError(f"it reports the unknown state number {number}; its version does not match")
+    presets = tuple(same_fields(RecordingPreset, each) for each in message.status.presets)
+    ended = {each.id: each for each in map(_brief, (message.newest, *message.ended)) if each.state in ENDED}
+    return same_fields(
+        RecorderReport,
+        message,
+        status=same_fields(RecorderStatus, message.status, state=state, presets=presets),
+        ended=tuple(ended.values()),
+    )
+
+
+def _brief(message: Any) -> RecordingBrief:
+    return same_fields(
+        RecordingBrief,
+        message,
+        kind=KINDS.get(message.kind),
+        state=RECORDING_STATES.get(message.state),
+        stop_reason=STOP_REASONS.get(message.stop_reason),
+    )

@@ -1,0 +1,103 @@
+"""Recordings: passed on to the recorder, which owns them and answers."""
+
+from collections.abc import AsyncIterator
+
+from google.protobuf.message import Message
+
+from common.errors import NotAllowedError, PreconditionError
+from common.reasons import Reason
+from gateway.access.role import Role
+from gateway.links.recorder.calls import RecorderCalls
+from gateway.rpc.calls.call import CallContext
+from gateway.rpc.responses.export_stream import ExportStream
+from omniseer.gateway.v1.recording_pb2 import (
+    DeleteRecordingRequest,
+    ExportRecordingRequest,
+    GetRecordingRequest,
+    GetRecordingThumbnailRequest,
+    ListRecordingsRequest,
+    PinRecordingRequest,
+    StartRecordingRequest,
+    StopRecordingRequest,
+    TriggerSnapshotRequest,
+)
+
+
+class RecordingService:
+    """Handlers of recordings. Requests come here valid, and responses leave as the recorder made them.
+
+    Args:
+        calls: to the recorder; None where the robot is not set up for recording.
+        exports: passes the bytes of files on.
+    """
+
+    def __init__(self, calls: RecorderCalls | None, exports: ExportStream) -> None:
+        self._calls = calls
+        self._exports = exports
+
+    async def start_recording(self, request: StartRecordingRequest, call: CallContext) -> bytes:
+        """Returns when the first file is open."""
+        return await self._pass_on(request, call)
+
+    async def stop_recording(self, request: StopRecordingRequest, call: CallContext) -> bytes:
+        """Returns when the files are final, or after 10 s."""
+        return await self._pass_on(request, call)
+
+    async def trigger_snapshot(self, request: TriggerSnapshotRequest, call: CallContext) -> bytes:
+        """Returns at once."""
+        return await self._pass_on(request, call)
+
+    async def list_recordings(self, request: ListRecordingsRequest, call: CallContext) -> bytes:
+        """Returns a page."""
+        return await self._pass_on(request, call)
+
+    async def get_recording(self, request: GetRecordingRequest, call: CallContext) -> bytes:
+        """Returns one recording."""
+        return await self._pass_on(request, call)
+
+    async def get_recording_thumbnail(
+        self, request: GetRecordingThumbnailRequest, call: CallContext
+    ) -> bytes:
+        """Returns a key frame."""
+        return await self._pass_on(request, call)
+
+    async def pin_recording(self, request: PinRecordingRequest, call: CallContext) -> bytes:
+        """Returns when the pin is on the disk."""
+        return await self._pass_on(request, call)
+
+    async def delete_recording(self, request: DeleteRecordingRequest, call: CallContext) -> bytes:
+        """Returns when the recording is gone.
+
+        Raises:
+            NotAllowedError: force by someone who is no administrator.
+        """
+        self._configured()
+        if request.force and call.principal and not call.principal.role.may(Role.ADMIN):
+            raise NotAllowedError(
+                f"deleting with force needs the role admin; {call.principal.name} has the role "
+                f"{call.principal.role.value}"
+            )
+        return await self._pass_on(request, call)
+
+    def export_recording(self, request: ExportRecordingRequest, call: CallContext) -> AsyncIterator[bytes]:
+        """Yields a header, then the chunks."""
+        return self._exports.responses(self._configured(), request.SerializeToString(), _caller(call))
+
+    async def _pass_on(self, request: Message, call: CallContext) -> bytes:
+        return await self._configured().call(
+            call.method.name, request.SerializeToString(), _caller(call), call.remaining_s()
+        )
+
+    def _configured(self) -> RecorderCalls:
+        if self._calls is None:
+            raise PreconditionError(
+                "this robot is not set up for recording: run robot-recorder there, and name its socket as "
+                "recording.socket in the gateway's configuration",
+                Reason.RECORDING_NOT_CONFIGURED,
+            )
+        return self._calls
+
+
+def _caller(call: CallContext) -> str:
+    """Returns who calls, for people: by name, or by host where callers are not authenticated."""
+    return call.principal.name if call.principal else call.peer.host

@@ -1,0 +1,53 @@
+"""Assembles the recorder, starts its parts in order and stops them in reverse."""
+
+import asyncio
+import logging
+import secrets
+
+from common import bind, rpc
+from common.boot import boot_id
+from common.health import Health
+from recorder.config import RecorderSettings
+from recorder.priority import step_back
+from recorder.recorder import Recorder
+from recorder.rpc.servicer import SERVICE, RecorderServicer
+from recorder.sources import RobotSources
+from recorder.store.lock import folder_lock
+from recorder.store.run_bundles import RunBundles
+from recorder.writing.queue import SampleQueue
+
+_log = logging.getLogger(__name__)
+
+_RUN_ID_BYTES = 8
+
+
+async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
+    """Records and serves until `stop`.
+
+    Raises:
+        UserError: the folder, the socket or ROS 2 can't be used.
+    """
+    # Before there are other threads: each begins with the priority of the one that starts it.
+    step_back()
+    queue = SampleQueue(settings.queue_bytes)
+    with folder_lock(settings.root):
+        async with RobotSources(settings, queue) as sources:
+            recorder = Recorder(
+                settings,
+                queue,
+                sources,
+                sources.latched,
+                boot_id=boot_id(),
+                run_id=secrets.token_hex(_RUN_ID_BYTES),
+            )
+            server = rpc.new_server()
+            RecorderServicer(recorder, RunBundles(settings.run_bundles), settings).register(server)
+            Health(SERVICE).register(server)
+            bind.bind_unix(server, settings.socket)
+            await server.start()
+            _log.info("serving on %s; recordings are in %s", settings.socket, settings.root)
+            try:
+                await recorder.run(stop)
+            finally:
+                await server.stop(rpc.STOP_GRACE_S)
+                settings.socket.unlink(missing_ok=True)

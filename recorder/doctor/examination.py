@@ -1,0 +1,70 @@
+"""`robot-recorder doctor`: the configuration, the disk, the running program, the graph."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import grpc
+
+from common.config import load
+from common.errors import UserError
+from common.findings import Finding, good, note, wrong
+from recorder.config import RecorderSettings
+from recorder.doctor.judgement import folder_findings, preset_findings, program_findings
+from recorder.rpc.client import newest_state
+from recorder.store.room import Limits, disk_of, used_bytes
+
+
+def examine(config_file: Path | None) -> Iterator[Finding]:
+    """Yields the findings on this machine.
+
+    Args:
+        config_file: of the program.
+    """
+    try:
+        settings = load(RecorderSettings, config_file)
+    except UserError as error:
+        yield wrong("config", error.what, "robot-recorder does not start", error.remedy)
+        return
+    yield good("config", f"{config_file or 'the environment'}: ok")
+    yield from _folder(settings)
+    try:
+        yield from program_findings(newest_state(settings.socket))
+    except grpc.RpcError as error:
+        yield note(
+            "recorder",
+            f"no recorder answers at {settings.socket}: {error.code().name}",
+            "Nothing is recorded",
+            "Start it: robot-recorder serve",
+        )
+    if (tap := settings.video.socket) is None:
+        yield note(
+            "video", "video.socket is not set", "Recordings have no video", "docs/recording.md says how"
+        )
+    elif tap.is_socket():
+        yield good("video", f"the preview serves its video at {tap}")
+    else:
+        yield wrong(
+            "video",
+            f"nothing serves video at {tap}",
+            "Recordings have no video until it does",
+            "Start the preview with video_tap.socket set to the same path",
+        )
+    try:
+        yield from _graph(settings)
+    except UserError as error:
+        yield wrong("ros", error.what, "Without ROS 2 no topic can be recorded", error.remedy)
+
+
+def _folder(settings: RecorderSettings) -> Iterator[Finding]:
+    existing = next(each for each in (settings.root, *settings.root.parents) if each.exists())
+    room = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
+    free = room.room_bytes(used_bytes([settings.root]), disk_of(existing))
+    yield from folder_findings(settings, free, writable=os.access(existing, os.W_OK | os.X_OK))
+
+
+def _graph(settings: RecorderSettings) -> Iterator[Finding]:
+    # Late: without ROS 2 the rest is still examined.
+    from recorder.doctor.graph import look  # noqa: PLC0415
+
+    yield from preset_findings(settings, *look(settings))

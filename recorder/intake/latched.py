@@ -1,0 +1,60 @@
+"""The newest messages of transient local topics, which each segment begins with. Pure.
+
+Messages carry no publisher. The one that a message replaces is found by its number: the one before it, or the
+only one there is. An assumption: a publisher keeps one message for late subscribers (depth 1), as those of
+/tf_static, /robot_description and maps do; Fast DDS does not announce the depth.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from recorder.values import Channel, Sample
+
+MAX_MESSAGES: Final = 64
+"""Of a channel; then the oldest goes."""
+MAX_BYTES: Final = 64 * 1024 * 1024
+"""Of all channels; then the oldest of the largest channel goes, but no channel's newest message."""
+
+
+class LatchedCache:
+    """Keeps the newest message of each publisher, bounded. For one thread."""
+
+    def __init__(self) -> None:
+        self._channels: dict[Channel, list[Sample]] = {}
+        self._bytes = 0
+
+    def take(self, sample: Sample) -> None:
+        """Takes a message of a latched channel."""
+        kept = self._channels.setdefault(sample.channel, [])
+        replaced = _replaced_by(sample, kept)
+        if replaced is not None:
+            self._remove(kept, replaced)
+        elif len(kept) >= MAX_MESSAGES:
+            self._remove(kept, 0)
+        kept.append(sample)
+        self._bytes += len(sample.data)
+        while self._bytes > MAX_BYTES and (
+            many := [each for each in self._channels.values() if len(each) > 1]
+        ):
+            self._remove(max(many, key=lambda each: sum(len(one.data) for one in each)), 0)
+
+    def samples(self) -> Sequence[Sample]:
+        """Returns what is kept; of each channel in the order of reception."""
+        return [sample for kept in self._channels.values() for sample in kept]
+
+    def _remove(self, kept: list[Sample], at: int) -> None:
+        self._bytes -= len(kept.pop(at).data)
+
+
+def _replaced_by(sample: Sample, kept: Sequence[Sample]) -> int | None:
+    """Returns the index of the message that this one makes obsolete; None if it is another publisher's."""
+    for at, each in enumerate(kept):
+        if each.data == sample.data:
+            return at
+    if not sample.sequence:
+        return 0 if len(kept) == 1 else None
+    before = [at for at, each in enumerate(kept) if each.sequence < sample.sequence]
+    if len(kept) == 1 and before:
+        return 0
+    preceding = [at for at in before if kept[at].sequence == sample.sequence - 1]
+    return preceding[0] if len(preceding) == 1 else None

@@ -1,0 +1,160 @@
+"""One channel at work: its subscription, emptied without waiting, and replaced without losing a message."""
+
+from collections.abc import Hashable, Sequence
+from typing import Any, Final
+
+from common.receive_time import Instant, received_at
+from common.ros_node import subscribe_raw
+from recorder.intake.loss import LossCounter
+from recorder.intake.qos import FIRST_DEPTH, MAX_BYTES, depth_for, profile_of
+from recorder.values import Channel, GapCause, Loss, Sample
+
+OVERLAP_S: Final = 1.0
+"""The old and the new subscription run side by side for so long: discovery takes some tenths of a second."""
+_MEASURED_S: Final = 1.0
+_TOLERANCE: Final = 1.25
+"""A queue too short by this factor, or beyond its bound in bytes, is replaced."""
+_REMEMBERED: Final = 50_000
+"""Messages by which repetitions are recognised: those of the overlap, at up to 50 kHz."""
+_NS_PER_S: Final = 1e9
+
+_Key = tuple[int, int]
+"""Source time and number of a message: the same in both subscriptions."""
+
+
+class Source:
+    """Takes the messages of one channel. For the sampling thread.
+
+    Args:
+        node: whose subscriptions these are.
+        message_type: the channel's class.
+        channel: what the messages belong to.
+        offers: endpoints of its publishers.
+        now: the present instant: no message is older, unless it was latched.
+
+    Raises:
+        TypeMissingError: the type support can't be loaded.
+    """
+
+    def __init__(
+        self, node: Any, message_type: Any, channel: Channel, offers: Sequence[Any], now: Instant
+    ) -> None:
+        self._node, self._message_type, self.channel = node, message_type, channel
+        self._depth = FIRST_DEPTH
+        self._profile = profile_of(offers, self._depth)
+        self._subscription = subscribe_raw(node, message_type, channel.topic, self._profile)
+        self._next: Any = None
+        self._switch_at_s = 0.0
+        self._emptied_at_s = now.monotonic_s
+        self._loss = LossCounter()
+        self._recent: dict[_Key, None] = {}
+        self._measured_from_s = now.monotonic_s
+        self._messages = self._bytes = 0
+
+    def take(self, now: Instant) -> list[Sample]:
+        """Returns the messages that have come since the last call. Never waits.
+
+        Raises:
+            Exception: rclpy's; nothing has been taken.
+        """
+        samples = self._fresh(self._drain(self._subscription, now))
+        if self._next:
+            samples += self._fresh(self._drain(self._next, now))
+            if now.monotonic_s >= self._switch_at_s:
+                self._switch()
+        for each in samples:
+            self._loss.take(each.sequence, each.log_time_ns)
+            self._bytes += len(each.data)
+        self._messages += len(samples)
+        self._emptied_at_s = now.monotonic_s
+        return samples
+
+    def update(self, offers: Sequence[Any] | None, now: Instant) -> Loss | None:
+        """Adapts the subscription to the publishers and to their rate; returns what has been lost.
+
+        Args:
+            offers: endpoints of the publishers; None if unknown.
+            now: the present instant.
+        """
+        self._adapt(offers, now)
+        publishers: frozenset[Hashable] | None = None
+        if offers is not None:
+            publishers = frozenset(tuple(each.endpoint_gid) for each in offers)
+        lost = self._loss.collect(publishers)
+        if lost is None:
+            return None
+        return Loss(self.channel, GapCause.MIDDLEWARE, lost.began_ns, lost.ended_ns, lost.messages)
+
+    def close(self) -> None:
+        """Ends the subscription."""
+        for each in (self._subscription, self._next):
+            if each:
+                self._node.destroy_subscription(each)
+        self._next = None
+
+    def _adapt(self, offers: Sequence[Any] | None, now: Instant) -> None:
+        measured_s = now.monotonic_s - self._measured_from_s
+        if self._next or measured_s < _MEASURED_S:
+            return
+        depth = self._depth
+        if self._messages:
+            mean_bytes = self._bytes / self._messages
+            fitting = depth_for(self._messages / measured_s, mean_bytes)
+            if fitting > _TOLERANCE * depth or depth * mean_bytes > _TOLERANCE * MAX_BYTES:
+                depth = fitting
+        self._measured_from_s, self._messages, self._bytes = now.monotonic_s, 0, 0
+        profile = profile_of(offers, depth) if offers else self._profile
+        changed = (profile.reliability, profile.durability) != (
+            self._profile.reliability,
+            self._profile.durability,
+        )
+        if changed or depth != self._depth:
+            self._next = subscribe_raw(self._node, self._message_type, self.channel.topic, profile)
+            self._profile, self._depth = profile, depth
+            self._switch_at_s = now.monotonic_s + OVERLAP_S
+
+    def _switch(self) -> None:
+        self._node.destroy_subscription(self._subscription)
+        self._subscription, self._next = self._next, None
+        if not self.channel.latched:
+            self._recent.clear()
+
+    def _drain(self, subscription: Any, now: Instant) -> list[Sample]:
+        samples: list[Sample] = []
+        for _ in range(self._depth):
+            try:
+                taken = subscription.handle.take_message(self._message_type, True)
+            except Exception:
+                if samples:
+                    break  # it will be raised again, when nothing can be lost by it
+                raise
+            if taken is None:
+                break
+            data, info = taken
+            samples.append(self._sample(data, info, now))
+        return samples
+
+    def _fresh(self, samples: list[Sample]) -> list[Sample]:
+        """Returns the samples without those that came by the other subscription, or as history once more."""
+        if not (self._next or self.channel.latched):
+            return samples
+        fresh = [each for each in samples if _key(each) not in self._recent]
+        self._recent.update(dict.fromkeys(map(_key, fresh)))
+        while len(self._recent) > _REMEMBERED:
+            del self._recent[next(iter(self._recent))]
+        return fresh
+
+    def _sample(self, data: bytes, info: dict[str, Any], now: Instant) -> Sample:
+        received_ns = info["received_timestamp"]
+        return Sample(
+            channel=self.channel,
+            data=data,
+            log_time_ns=received_ns,
+            publish_time_ns=info["source_timestamp"],
+            sequence=info["publication_sequence_number"] or 0,
+            monotonic_ns=int(received_at(received_ns, now, self._emptied_at_s) * _NS_PER_S),
+        )
+
+
+def _key(sample: Sample) -> _Key:
+    return sample.publish_time_ns, sample.sequence

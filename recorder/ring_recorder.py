@@ -1,0 +1,291 @@
+"""Records the ring, and makes snapshots and incidents of it."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from common.errors import InvalidRequestError, PreconditionError, TooMuchError
+from common.reasons import Reason
+from recorder.config import RecorderSettings
+from recorder.incidents import SEVERITIES, Incidents, Rules
+from recorder.store.catalogue import Catalogue
+from recorder.store.folder import new_id
+from recorder.store.housekeeping import Housekeeping, attempt
+from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
+from recorder.store.ring import SEGMENT_S, Ring, RingSegment, link_next
+from recorder.store.salvage import ended
+from recorder.writing.output import Closed, Output, Shape
+from recorder.writing.writer import Writer
+
+_log = logging.getLogger(__name__)
+
+MAX_SNAPSHOTS: Final = 16
+_LONGEST_TRIGGER: Final = 1000
+_NS_PER_S: Final = 1_000_000_000
+_NS_PER_MS: Final = 1_000_000
+
+
+@dataclass(slots=True)
+class _Snapshot:
+    """A snapshot that is being made; instants of CLOCK_MONOTONIC in ns."""
+
+    id: str
+    kind: Kind
+    from_ns: int
+    until_ns: int
+
+
+class RingRecorder:
+    """The ring of a recorder, which calls it under its lock.
+
+    Args:
+        settings: of the program; `ring.preset` is set.
+        ring: its segments.
+        catalogue: where snapshots become recordings.
+        housekeeping: makes room for them.
+        writer: writes the ring.
+        boot_id: of the computer; empty if unknown.
+        run_id: of this process.
+
+    Attributes:
+        output: of the ring; None while it can't be written.
+    """
+
+    def __init__(
+        self,
+        settings: RecorderSettings,
+        ring: Ring,
+        catalogue: Catalogue,
+        housekeeping: Housekeeping,
+        writer: Writer,
+        *,
+        boot_id: str,
+        run_id: str,
+    ) -> None:
+        self._settings = settings
+        self._preset = settings.ring.preset or ""
+        self._ring = ring
+        self._catalogue = catalogue
+        self._housekeeping = housekeeping
+        self._writer = writer
+        self._boot_id = boot_id
+        self._run_id = run_id
+        self.output: Output | None = None
+        self._pending: list[_Snapshot] = []
+        incidents = settings.incidents
+        self._incidents = Incidents(
+            Rules(
+                incidents.enabled,
+                SEVERITIES[incidents.min_severity],
+                incidents.cooldown_s,
+                frozenset(incidents.ignore),
+            )
+        )
+
+    @property
+    def pending(self) -> int:
+        """Snapshots that are being made."""
+        return len(self._pending)
+
+    @property
+    def held_s(self) -> int:
+        """Seconds that the ring holds."""
+        return int(self._ring.held_ns(time.monotonic_ns()) / _NS_PER_S)
+
+    @property
+    def next_due_s(self) -> float | None:
+        """How long until the next snapshot has its end; None without one."""
+        dues = [each.until_ns for each in self._pending]
+        return (min(dues) - time.monotonic_ns()) / _NS_PER_S if dues else None
+
+    def shape(self) -> Shape:
+        """Returns the shape of the ring's next output."""
+        return Shape(
+            self._ring.directory,
+            self._ring.name,
+            self._ring.next_number,
+            self._preset,
+            self._settings.records_video(self._preset),
+            self._settings.segments.max_bytes,
+            SEGMENT_S,
+        )
+
+    async def open(self, closed: Callable[[Output, Closed], None]) -> None:
+        """Begins to record, after what a failure has cut off is whole.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        for segment in await asyncio.to_thread(self._ring.recover):
+            await self._link(segment)
+        output = Output(self.shape(), self._writer.head, closed)
+        self.output = output
+        await asyncio.wrap_future(self._writer.add(output))
+
+    async def close(self) -> None:
+        """Makes the last segment final."""
+        if self.output:
+            output, self.output = self.output, None
+            await asyncio.wrap_future(self._writer.remove(output))
+
+    async def rotate(self) -> None:
+        """Makes the present segment final, so that snapshots can have it."""
+        if self.output:
+            await asyncio.wrap_future(self._writer.rotate(self.output))
+
+    async def take(self, closed: Closed) -> None:
+        """Takes a segment that has become final."""
+        segment = RingSegment(closed.number, closed.began_ns, closed.ended_ns, closed.summary)
+        self._ring.add(segment)
+        await self._link(segment)
+
+    async def drop_outdated(self) -> None:
+        """Deletes the segments that are older than what is kept."""
+        for segment in self._ring.outdated(time.monotonic_ns()):
+            await attempt("a segment of the ring stays", lambda each=segment: self._ring.drop(each))  # type: ignore[misc]
+
+    def due(self, recording_id: str = "", *, all_of_them: bool = False) -> list[str]:
+        """Returns the snapshots that have their end; with an ID that one, whether it has or not."""
+        now_ns = time.monotonic_ns()
+        return [
+            each.id
+            for each in self._pending
+            if all_of_them or each.id == recording_id or (not recording_id and each.until_ns <= now_ns)
+        ]
+
+    async def snapshot(
+        self, kind: Kind, pre_s: int, post_s: int, *, label: str = "", preset: str = "", trigger: str = ""
+    ) -> Manifest:
+        """Keeps what the ring holds of the seconds before, and waits for those after.
+
+        Raises:
+            InvalidRequestError: the ring does not record this preset.
+            PreconditionError: the ring can't be written at present.
+            TooMuchError: the disk has no room, or 16 are being made.
+        """
+        if preset and preset != self._preset:
+            raise InvalidRequestError(f"the ring records '{self._preset}', not '{preset}'")
+        if self.output is None:
+            raise PreconditionError(
+                "the ring can't be written at present; see last_error", Reason.RECORDER_NOT_READY
+            )
+        if len(self._pending) >= MAX_SNAPSHOTS:
+            raise TooMuchError(f"{MAX_SNAPSHOTS} snapshots are being made", Reason.TOO_MANY_SNAPSHOTS)
+        await self._housekeeping.need_room()
+        now_ns, calendar_ns = time.monotonic_ns(), time.time_ns()
+        pre_ns, post_ns = pre_s * _NS_PER_S, post_s * _NS_PER_S
+        manifest = Manifest(
+            id=new_id(calendar_ns / _NS_PER_S),
+            label=label,
+            kind=kind,
+            state=RecordingState.RECORDING,
+            preset=self._preset,
+            with_video=self._settings.records_video(self._preset),
+            started_unix_ms=(calendar_ns - pre_ns) // _NS_PER_MS,
+            started_monotonic_ns=max(now_ns - pre_ns, 0),
+            boot_id=self._boot_id,
+            run_id=self._run_id,
+            trigger=trigger[:_LONGEST_TRIGGER],
+            window_ns=(calendar_ns - pre_ns, calendar_ns + post_ns),
+        )
+        try:
+            made = await asyncio.to_thread(
+                self._begun, manifest, self._ring.within(now_ns - pre_ns, now_ns + post_ns)
+            )
+        except OSError as error:
+            raise TooMuchError(
+                f"the disk refuses the snapshot: {error.strerror}", Reason.DISK_FULL
+            ) from error
+        self._pending.append(_Snapshot(made.id, kind, now_ns - pre_ns, now_ns + post_ns))
+        _log.info("%s %s is being made: %s", kind, made.id, trigger or "requested")
+        return made
+
+    async def report_fault(self, fault_id: str, severity: int, message: str) -> str:
+        """Makes an incident of a fault, or merges it with one that is being made; returns its ID, or ""."""
+        if not self._incidents.wanted(fault_id, severity):
+            return ""
+        now_s = time.monotonic()
+        pending = [each for each in self._pending if each.kind is Kind.INCIDENT]
+        if earlier := self._incidents.earlier(fault_id, now_s, [each.id for each in pending]):
+            return earlier
+        configured = self._settings.incidents
+        if pending:
+            made = pending[-1].id
+            pending[-1].until_ns = time.monotonic_ns() + configured.post_s * _NS_PER_S
+            await self._add_trigger(made, fault_id)
+        else:
+            trigger = f"{fault_id}: {message}" if message else fault_id
+            try:
+                manifest = await self.snapshot(
+                    Kind.INCIDENT, configured.pre_s, configured.post_s, trigger=trigger
+                )
+            except (PreconditionError, TooMuchError) as error:
+                _log.warning("no incident of %s: %s", fault_id, error)
+                return ""
+            made = manifest.id
+        self._incidents.made(fault_id, made, now_s)
+        return made
+
+    async def finish(self, recording_id: str, reason: StopReason) -> None:
+        """Ends a snapshot whose last segment is final."""
+        manifest = self._catalogue.get(recording_id)
+        if manifest:
+            done = self._at_end(manifest)
+            folder = self._catalogue.folder_of(done)
+            complete = await attempt(
+                f"{done.id} is completed later", lambda: ended(folder, done, RecordingState.COMPLETE, reason)
+            )
+            faulted = {"state": RecordingState.FAULTED, "stop_reason": StopReason.DISK}
+            await self._keep(complete or done.model_copy(update=faulted))
+            _log.info("%s is complete: %d segments", done.id, len(done.segments))
+        self._pending = [each for each in self._pending if each.id != recording_id]
+
+    def _begun(self, manifest: Manifest, segments: list[RingSegment]) -> Manifest:
+        """Makes a snapshot's folder, with what the ring has of it already; in a thread."""
+        folder = self._catalogue.create(manifest)
+        try:
+            for segment in segments:
+                manifest = link_next(folder, manifest, segment)
+            self._catalogue.write(manifest)
+        except OSError:
+            self._catalogue.delete(manifest)
+            raise
+        return manifest
+
+    def _at_end(self, manifest: Manifest) -> Manifest:
+        """Returns the manifest with the begin of what it contains, which may be later than was requested."""
+        now_ms, now_ns = time.time_ns() // _NS_PER_MS, time.monotonic_ns()
+        numbered = self.output.progress.numbered if self.output else manifest.numbered
+        update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
+        firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
+        if firsts:
+            began_ms = min(firsts) // _NS_PER_MS
+            update["started_unix_ms"] = began_ms
+            update["started_monotonic_ns"] = max(now_ns - max(now_ms - began_ms, 0) * _NS_PER_MS, 0)
+        return manifest.model_copy(update=update)
+
+    async def _add_trigger(self, recording_id: str, fault_id: str) -> None:
+        if before := self._catalogue.get(recording_id):
+            trigger = f"{before.trigger}; {fault_id}"[:_LONGEST_TRIGGER]
+            await self._keep(before.model_copy(update={"trigger": trigger}))
+
+    async def _link(self, segment: RingSegment) -> None:
+        """Adds a segment to the snapshots that it belongs to."""
+        for snapshot in self._pending:
+            manifest = self._catalogue.get(snapshot.id)
+            if manifest and segment.overlaps(snapshot.from_ns, snapshot.until_ns):
+                folder = self._catalogue.folder_of(manifest)
+                linked = await attempt(
+                    f"{manifest.id} lacks a segment",
+                    lambda folder=folder, manifest=manifest: link_next(folder, manifest, segment),  # type: ignore[misc]
+                )
+                if linked:
+                    await self._keep(linked)
+
+    async def _keep(self, manifest: Manifest) -> None:
+        await attempt(
+            f"the manifest of {manifest.id} is not on the disk", lambda: self._catalogue.write(manifest)
+        )

@@ -1,0 +1,1 @@
+"""gRPC interface for the gateway: RecorderService, and the mapping between messages and domain values."""

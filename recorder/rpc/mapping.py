@@ -1,0 +1,201 @@
+"""Maps domain values to messages and back: the only module of the recorder that knows both."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+from common.errors import InvalidRequestError
+from omniseer.gateway.v1 import recording_pb2 as pb
+from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
+from recorder.config import RecorderSettings
+from recorder.lifecycle import State
+from recorder.recorder import Recorder
+from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
+from recorder.store.run_bundles import Bundle
+from recorder.values import Gap, GapCause
+
+STATES: Final[Mapping[State, pb.RecorderState.ValueType]] = MappingProxyType(
+    {each: pb.RecorderState.Value(f"RECORDER_STATE_{each.name}") for each in State}
+)
+KINDS: Final[Mapping[Kind, pb.RecordingKind.ValueType]] = MappingProxyType(
+    {each: pb.RecordingKind.Value(f"RECORDING_KIND_{each.name}") for each in Kind}
+)
+RECORDING_STATES: Final[Mapping[RecordingState, pb.RecordingState.ValueType]] = MappingProxyType(
+    {each: pb.RecordingState.Value(f"RECORDING_STATE_{each.name}") for each in RecordingState}
+)
+STOP_REASONS: Final[Mapping[StopReason, pb.RecordingStopReason.ValueType]] = MappingProxyType(
+    {each: pb.RecordingStopReason.Value(f"RECORDING_STOP_REASON_{each.name}") for each in StopReason}
+)
+GAP_CAUSES: Final[Mapping[GapCause, pb.RecordingGapCause.ValueType]] = MappingProxyType(
+    {each: pb.RecordingGapCause.Value(f"RECORDING_GAP_CAUSE_{each.name}") for each in GapCause}
+)
+COPY_STATES: Final[Mapping[CopyState, pb.RecordingCopyState.ValueType]] = MappingProxyType(
+    {
+        each: pb.RecordingCopyState.Value(
+            "RECORDING_COPY_STATE_UNSPECIFIED"
+            if each is CopyState.NONE
+            else f"RECORDING_COPY_STATE_{each.name}"
+        )
+        for each in CopyState
+    }
+)
+_COPY_STATES_BACK: Final = {message: state for state, message in COPY_STATES.items()}
+_NS_PER_MS: Final = 1_000_000
+
+
+def recording(recorder: Recorder, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
+    """Returns the message of a recording.
+
+    Args:
+        recorder: has how far it has come, if it runs.
+        manifest: of the recording.
+        whole: whether with its files and gaps.
+    """
+    live = recorder.live(manifest)
+    gaps = manifest.all_gaps
+    files = [
+        pb.RecordingFile(name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True)
+        for file in manifest.files
+    ]
+    if live.part:
+        files.append(pb.RecordingFile(name=live.part, size=live.part_bytes))
+    message = pb.Recording(
+        id=manifest.id,
+        label=manifest.label,
+        notes=manifest.notes,
+        kind=KINDS[manifest.kind],
+        state=RECORDING_STATES[manifest.state],
+        stop_reason=(
+            STOP_REASONS[manifest.stop_reason]
+            if manifest.stop_reason
+            else pb.RECORDING_STOP_REASON_UNSPECIFIED
+        ),
+        preset=manifest.preset,
+        started_unix_ms=manifest.started_unix_ms,
+        ended_unix_ms=manifest.ended_unix_ms,
+        started_monotonic_ns=manifest.started_monotonic_ns,
+        ended_monotonic_ns=manifest.ended_monotonic_ns,
+        boot_id=manifest.boot_id,
+        recorder_run_id=manifest.run_id,
+        duration_ms=live.duration_ms,
+        size=manifest.size + live.part_bytes,
+        messages_written=live.messages,
+        video_frames=live.frames,
+        trigger=manifest.trigger,
+        pinned=manifest.pinned,
+        copy=_copy(manifest.copied),
+        file_count=len(files),
+        gap_count=len(gaps),
+        sha256=manifest.sha256,
+    )
+    if live.lost is not None:
+        message.messages_lost = live.lost
+    if whole:
+        message.files.extend(files[:10_000])
+        message.gaps.extend(_gap(each) for each in gaps)
+    return message
+
+
+def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recording:
+    """Returns the message of a run bundle; with its files if their sums are given."""
+    final = found.final
+    message = pb.Recording(
+        id=found.id,
+        label=found.folder.name if found.folder.name.isprintable() else "",
+        kind=pb.RECORDING_KIND_RUN_BUNDLE,
+        state=RECORDING_STATES[found.state],
+        started_unix_ms=found.began_ns // _NS_PER_MS,
+        ended_unix_ms=found.ended_ns // _NS_PER_MS if final else 0,
+        duration_ms=(found.ended_ns - found.began_ns) // _NS_PER_MS,
+        size=found.size,
+        file_count=len(found.files),
+    )
+    if found.state is RecordingState.RECOVERED:
+        message.stop_reason = pb.RECORDING_STOP_REASON_INTERRUPTED
+    for file in found.files if sums is not None else ():
+        sha256 = (sums or {}).get(file.name, b"")
+        message.files.add(name=file.name, size=file.size, sha256=sha256, final=final and bool(sha256))
+    return message
+
+
+def status(recorder: Recorder, settings: RecorderSettings) -> pb.RecordingStatus:
+    """Returns the message of the recorder's state."""
+    message = pb.RecordingStatus(
+        state=STATES[recorder.phase.state],
+        bytes_per_s=recorder.bytes_per_s,
+        room_bytes=max(recorder.room.bytes, 0),
+        ring_s=recorder.ring_s,
+        snapshots_pending=recorder.snapshots_pending,
+        last_error=recorder.last_error,
+        presets=[
+            pb.RecordingPreset(
+                name=name,
+                description=preset.description,
+                with_video=preset.video and settings.video.socket is not None,
+                bytes_per_minute=recorder.bytes_per_minute.get(name, 0),
+                in_ring=name == settings.ring.preset,
+            )
+            for name, preset in settings.presets.items()
+        ],
+    )
+    recordings = recorder.recordings
+    message.recordings = len(recordings)
+    message.to_copy = sum(each.copied.outstanding for each in recordings)
+    if (room_s := recorder.room_s) is not None:
+        message.room_s = int(min(room_s, 1e9))
+    if running := recorder.running:
+        live = recorder.live(running)
+        message.recording_id = running.id
+        message.label = running.label
+        message.preset = running.preset
+        message.elapsed_ms = live.duration_ms
+        message.size = running.size + live.part_bytes
+        message.messages_written = live.messages
+        message.video = live.frames > 0
+        if live.lost is not None:
+            message.messages_lost = live.lost
+    return message
+
+
+def watch_state(recorder: Recorder, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
+    """Returns the message that the gateway watches."""
+    newest = recorder.newest
+    message = recorder_pb.WatchStateResponse(
+        instance_id=recorder.run_id,
+        status=status(recorder, settings),
+        newest=recording(recorder, newest) if newest else None,
+        messages_dropped=recorder.dropped,
+        disk_free_bytes=recorder.room.disk.free_bytes,
+        disk_size_bytes=recorder.room.disk.size_bytes,
+        disk_short=recorder.disk_short,
+        ended=[recording(recorder, each) for each in recorder.recently_ended],
+    )
+    if (lost := recorder.lost) is not None:
+        message.messages_lost = lost
+    return message
+
+
+def copy(message: pb.RecordingCopy) -> Copy:
+    """Returns the state of a copy.
+
+    Raises:
+        InvalidRequestError: a state that is not known here.
+    """
+    state = _COPY_STATES_BACK.get(message.state)
+    if state is None:
+        raise InvalidRequestError(f"copy state {message.state} is not known")
+    return Copy(state=state, reason=message.reason, bytes_done=message.bytes_done)
+
+
+def _copy(value: Copy) -> pb.RecordingCopy:
+    return pb.RecordingCopy(state=COPY_STATES[value.state], reason=value.reason, bytes_done=value.bytes_done)
+
+
+def _gap(gap: Gap) -> pb.RecordingGap:
+    update: dict[str, Any] = {} if gap.messages is None else {"messages": gap.messages}
+    return pb.RecordingGap(
+        cause=GAP_CAUSES[gap.cause],
+        began_unix_ms=max(gap.began_ns, 0) // _NS_PER_MS,
+        ended_unix_ms=max(gap.ended_ns, 0) // _NS_PER_MS,
+        **update,
+    )

@@ -1,0 +1,312 @@
+"""RecorderService: receives, maps, calls, maps, replies."""
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from typing import Any, Final
+
+import grpc
+
+from common.errors import (
+    ConflictError,
+    DamagedError,
+    InvalidRequestError,
+    NotFoundError,
+    PreconditionError,
+)
+from common.reasons import Reason
+from omniseer.gateway.v1 import recording_pb2 as pb
+from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
+from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
+from recorder.config import RecorderSettings
+from recorder.recorder import Recorder
+from recorder.requests import Result, SnapshotOptions, StartOptions
+from recorder.rpc import mapping
+from recorder.store.export import Content, Pace, UnreadableError, chunks
+from recorder.store.run_bundles import Bundle, RunBundles
+from recorder.thumbnail import find_thumbnail
+
+SERVICE: Final = recorder_pb.DESCRIPTOR.services_by_name["RecorderService"].full_name
+
+_HEARTBEAT_S: Final = 2.0
+_HEARTBEAT_WRITING_S: Final = 0.5
+_PAGE: Final = 50
+_LARGEST_PAGE: Final = 200
+_CALLER: Final = "x-caller"
+_LONGEST_CALLER: Final = 100
+
+
+class RecorderServicer(pb_grpc.RecorderServiceServicer):
+    """RecorderService.
+
+    Args:
+        recorder: owns what is recorded.
+        bundles: the robot's own experiments.
+        settings: of the program.
+    """
+
+    def __init__(self, recorder: Recorder, bundles: RunBundles, settings: RecorderSettings) -> None:
+        self._recorder = recorder
+        self._bundles = bundles
+        self._settings = settings
+        self._pace = Pace(settings.export.max_bytes_per_s)
+
+    def register(self, server: grpc.aio.Server) -> None:
+        """Adds the methods to a server."""
+        pb_grpc.add_RecorderServiceServicer_to_server(self, server)
+
+    async def WatchState(  # noqa: N802  # the schema names it
+        self, _request: recorder_pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> AsyncIterator[recorder_pb.WatchStateResponse]:
+        """Streams the state, now and on every change; a slow reader skips outdated states."""
+        changed = True
+
+        def has_changed() -> bool:
+            nonlocal changed
+            before, changed = changed, True
+            return before
+
+        while True:
+            changed = False
+            yield mapping.watch_state(self._recorder, self._settings)
+            writes = self._recorder.writes
+            await self._recorder.changes.wait_until(
+                has_changed, _HEARTBEAT_WRITING_S if writes else _HEARTBEAT_S
+            )
+
+    async def StartRecording(  # noqa: N802  # the schema names it
+        self, request: pb.StartRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.StartRecordingResponse:
+        """Starts a recording."""
+        options = StartOptions(
+            label=request.label,
+            notes=request.notes,
+            preset=request.preset,
+            with_video=request.with_video if request.HasField("with_video") else None,
+            max_duration_s=request.max_duration_s,
+            max_bytes=request.max_bytes,
+        )
+        result = await self._recorder.start(_request_id(request), options)
+        return pb.StartRecordingResponse(message=result.message, recording=self._recording_of(result))
+
+    async def StopRecording(  # noqa: N802  # the schema names it
+        self, request: pb.StopRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.StopRecordingResponse:
+        """Stops a recording."""
+        result = await self._recorder.stop(_request_id(request), request.recording_id)
+        return pb.StopRecordingResponse(message=result.message, recording=self._recording_of(result))
+
+    async def TriggerSnapshot(  # noqa: N802  # the schema names it
+        self, request: pb.TriggerSnapshotRequest, context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.TriggerSnapshotResponse:
+        """Makes a snapshot."""
+        options = SnapshotOptions(
+            pre_s=request.pre_s if request.HasField("pre_s") else None,
+            post_s=request.post_s if request.HasField("post_s") else None,
+            label=request.label,
+            preset=request.preset,
+        )
+        result = await self._recorder.snapshot(_request_id(request), options, _caller(context))
+        return pb.TriggerSnapshotResponse(message=result.message, recording=self._recording_of(result))
+
+    async def ListRecordings(  # noqa: N802  # the schema names it
+        self, request: pb.ListRecordingsRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.ListRecordingsResponse:
+        """Returns a page of the list."""
+        recordings = [mapping.recording(self._recorder, each) for each in self._recorder.recordings]
+        recordings += [mapping.bundle(each) for each in await asyncio.to_thread(self._bundles.all)]
+        recordings.sort(key=_place, reverse=True)
+        if request.page_token:
+            recordings = _after(recordings, request.page_token)
+        size = min(request.page_size or _PAGE, _LARGEST_PAGE)
+        page = recordings[:size]
+        return pb.ListRecordingsResponse(
+            recordings=page,
+            next_page_token=_token(page[-1]) if len(recordings) > size else "",
+            status=mapping.status(self._recorder, self._settings),
+        )
+
+    async def GetRecording(  # noqa: N802  # the schema names it
+        self, request: pb.GetRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.GetRecordingResponse:
+        """Returns a recording with its files."""
+        if bundle := await self._bundle(request.recording_id):
+            sums = await asyncio.to_thread(self._sums, bundle)
+            return pb.GetRecordingResponse(recording=mapping.bundle(bundle, sums))
+        manifest = self._recorder.get(request.recording_id)
+        return pb.GetRecordingResponse(recording=mapping.recording(self._recorder, manifest, whole=True))
+
+    async def ExportRecording(  # noqa: N802  # the schema names it
+        self, request: pb.ExportRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> AsyncIterator[pb.ExportRecordingResponse]:
+        """Streams a final file."""
+        bundle = await self._bundle(request.recording_id)
+        content = await self._content(request, bundle)
+        if request.expected_sha256 and request.expected_sha256 != content.sha256:
+            raise ConflictError(
+                f"{request.file} is another file than the one that was begun; begin anew",
+                Reason.RECORDING_CHANGED,
+            )
+        if request.offset > content.size:
+            raise InvalidRequestError(f"offset {request.offset} is beyond the end, {content.size}")
+        header = pb.ExportHeader(size=content.size, sha256=content.sha256)
+        yield pb.ExportRecordingResponse(header=header)
+
+        def check() -> None:
+            if bundle is None and not self._recorder.has(request.recording_id):
+                raise ConflictError(
+                    f"recording {request.recording_id} was deleted meanwhile", Reason.RECORDING_DELETED
+                )
+
+        paces = (self._pace, Pace(request.max_bytes_per_s))
+        try:
+            async for chunk in chunks(content, request.offset, paces, check):
+                yield pb.ExportRecordingResponse(
+                    chunk=pb.ExportChunk(offset=chunk.offset, data=chunk.data, crc32c=chunk.crc32c)
+                )
+        except UnreadableError as error:
+            check()
+            raise DamagedError(f"{request.file}: {error}") from error
+
+    async def GetRecordingThumbnail(  # noqa: N802  # the schema names it
+        self, request: pb.GetRecordingThumbnailRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.GetRecordingThumbnailResponse:
+        """Returns a key frame."""
+        manifest = self._recorder.get(request.recording_id)
+        found = await asyncio.to_thread(find_thumbnail, self._recorder.folder_of(manifest), manifest)
+        if found is None:
+            raise NotFoundError(
+                f"{manifest.id} has no key frame of video that is final", Reason.RECORDING_NOT_FOUND
+            )
+        return pb.GetRecordingThumbnailResponse(
+            key_frame=found.key_frame, format=found.format, captured_unix_ms=found.captured_unix_ms
+        )
+
+    async def PinRecording(  # noqa: N802  # the schema names it
+        self, request: pb.PinRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.PinRecordingResponse:
+        """Pins a recording, or ends that."""
+        await self._refuse_bundle(request.recording_id)
+        result = await self._recorder.pin(_request_id(request), request.recording_id, pinned=request.pinned)
+        return pb.PinRecordingResponse(message=result.message, recording=self._recording_of(result))
+
+    async def DeleteRecording(  # noqa: N802  # the schema names it
+        self, request: pb.DeleteRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.DeleteRecordingResponse:
+        """Deletes a recording."""
+        await self._refuse_bundle(request.recording_id)
+        result = await self._recorder.delete(
+            _request_id(request), request.recording_id, request.expected_sha256, force=request.force
+        )
+        return pb.DeleteRecordingResponse(message=result.message)
+
+    async def ReportFault(  # noqa: N802  # the schema names it
+        self, request: recorder_pb.ReportFaultRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> recorder_pb.ReportFaultResponse:
+        """Makes an incident of a fault."""
+        made = await self._recorder.report_fault(request.fault_id, request.severity, request.message)
+        return recorder_pb.ReportFaultResponse(recording_id=made)
+
+    async def SetCopy(  # noqa: N802  # the schema names it
+        self, request: recorder_pb.SetCopyRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> recorder_pb.SetCopyResponse:
+        """Records the state of a copy."""
+        await self._refuse_bundle(request.recording_id)
+        await self._recorder.set_copy(request.recording_id, mapping.copy(request.copy))
+        return recorder_pb.SetCopyResponse()
+
+    def _recording_of(self, result: Result) -> pb.Recording | None:
+        return mapping.recording(self._recorder, result.recording) if result.recording else None
+
+    async def _bundle(self, recording_id: str) -> Bundle | None:
+        return (
+            None
+            if self._recorder.has(recording_id)
+            else await asyncio.to_thread(self._bundles.get, recording_id)
+        )
+
+    async def _refuse_bundle(self, recording_id: str) -> None:
+        if await self._bundle(recording_id):
+            raise PreconditionError(
+                f"{recording_id} is a folder of the robot's own experiments, which is never changed here",
+                Reason.RECORDING_READ_ONLY,
+            )
+
+    def _sums(self, bundle: Bundle) -> dict[str, bytes]:
+        """Returns the sums of a bundle's files, without those that can't be read; in a thread."""
+        if not bundle.final:
+            return {}
+        sums = {}
+        for file in bundle.files:
+            try:
+                sums[file.name] = self._bundles.sha256(bundle, file)
+            except OSError:
+                continue
+        return sums
+
+    async def _content(self, request: pb.ExportRecordingRequest, bundle: Bundle | None) -> Content:
+        if bundle:
+            return await self._bundle_content(bundle, request.file)
+        manifest = self._recorder.get(request.recording_id)
+        for file in manifest.files:
+            if file.name == request.file:
+                path = self._recorder.folder_of(manifest) / file.name
+                return Content(path, file.size, bytes.fromhex(file.sha256))
+        if request.file == self._recorder.live(manifest).part:
+            raise _not_final(request.file)
+        raise _no_such_file(manifest.id, request.file)
+
+    async def _bundle_content(self, bundle: Bundle, name: str) -> Content:
+        file = bundle.file(name)
+        if file is None:
+            raise _no_such_file(bundle.id, name)
+        if not bundle.final:
+            raise _not_final(name)
+        try:
+            sha256 = await asyncio.to_thread(self._bundles.sha256, bundle, file)
+        except OSError as error:
+            raise DamagedError(f"{name}: the disk can't read it: {error.strerror}") from error
+        return Content(bundle.folder / file.name, file.size, sha256)
+
+
+def _request_id(request: Any) -> str:
+    """Returns the caller's ID of the request.
+
+    Raises:
+        InvalidRequestError: there is none; the gateway would have refused that.
+    """
+    if not request.request_id:
+        raise InvalidRequestError("request_id is empty; make one for each action")
+    return str(request.request_id)
+
+
+def _caller(context: grpc.aio.ServicerContext[Any, Any]) -> str:
+    metadata: Sequence[tuple[str, str | bytes]] = tuple(context.invocation_metadata() or ())
+    named = next((value for key, value in metadata if key == _CALLER), "")
+    return str(named)[:_LONGEST_CALLER]
+
+
+def _place(each: pb.Recording) -> tuple[int, str]:
+    return each.started_unix_ms, each.id
+
+
+def _token(last: pb.Recording) -> str:
+    return f"{last.started_unix_ms}.{last.id}"
+
+
+def _after(recordings: list[pb.Recording], token: str) -> list[pb.Recording]:
+    """Returns those that follow on the page before, even if its last one has been deleted meanwhile."""
+    instant, dot, last = token.partition(".")
+    if not (dot and instant.isascii() and instant.isdigit() and last):
+        raise InvalidRequestError("page_token is none that this robot has issued")
+    place = (int(instant), last)
+    return [each for each in recordings if _place(each) < place]
+
+
+def _no_such_file(recording_id: str, name: str) -> NotFoundError:
+    text = f"{recording_id} has no file '{name}'; GetRecording has those there are"
+    return NotFoundError(text, Reason.RECORDING_NOT_FOUND)
+
+
+def _not_final(name: str) -> PreconditionError:
+    text = f"{name} is still being written; wait for the next file, or stop the recording"
+    return PreconditionError(text, Reason.FILE_NOT_FINAL)

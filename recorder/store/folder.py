@@ -1,0 +1,75 @@
+"""Names and paths of recordings, and writing that survives a power loss.
+
+No path comes from a request: a recording is looked up by its ID in the catalogue, a file by its name in
+the manifest. What the patterns here do not match, in the folder or in a request, is not ours.
+"""
+
+import os
+import re
+import secrets
+import tempfile
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from common.private_files import sync_directory
+
+ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
+"""Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
+SEGMENT: Final = re.compile(r"data/\d{6}\.mcap")
+"""A segment's name in a recording's folder."""
+RECORDINGS: Final = "recordings"
+DATA: Final = "data"
+MANIFEST: Final = "manifest.json"
+METADATA: Final = f"{DATA}/metadata.yaml"
+"""rosbag2's file, beside the segments: some readers look for them nowhere else."""
+
+_FILE_MODE: Final = 0o640
+_DIRECTORY_MODE: Final = 0o750
+
+
+def new_id(unix_s: float) -> str:
+    """Returns an ID that was never used: IDs of the same second differ in 24 random bits."""
+    return f"{datetime.fromtimestamp(unix_s, UTC):%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
+
+
+def segment_name(number: int) -> str:
+    """Returns the name of a recording's segment, counted from 0."""
+    return f"{DATA}/{number:06d}.mcap"
+
+
+def segment_number(name: str) -> int:
+    """Returns which segment of its recording has this name."""
+    return int(Path(name).stem)
+
+
+def make_directory(directory: Path) -> None:
+    """Makes a directory and its missing parents.
+
+    Raises:
+        OSError: it can't be made.
+    """
+    missing = [each for each in (directory, *directory.parents) if not each.exists()]
+    for each in reversed(missing):
+        each.mkdir(mode=_DIRECTORY_MODE, exist_ok=True)
+        sync_directory(each.parent)
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Replaces a file atomically (rename(2)); afterwards it survives a power loss.
+
+    Raises:
+        OSError: the disk is full or fails. The file is as it was.
+    """
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fchmod(file.fileno(), _FILE_MODE)
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync_directory(path.parent)

@@ -1,0 +1,320 @@
+"""What is known of a recording besides its content: one JSON file in its folder, replaced atomically."""
+
+import hashlib
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Final, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from recorder.store.folder import ID, MANIFEST, SEGMENT, replace_file, segment_number
+from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, SegmentSummary
+
+MAX_GAPS: Final = 1000
+_NS_PER_MS: Final = 1_000_000
+_MAX_BYTES: Final = 64 * 1024 * 1024
+
+
+class Kind(StrEnum):
+    """What made a recording."""
+
+    MANUAL = "manual"
+    SNAPSHOT = "snapshot"
+    INCIDENT = "incident"
+    RUN_BUNDLE = "run_bundle"
+
+
+class RecordingState(StrEnum):
+    """State of a recording."""
+
+    STARTING = "starting"
+    RECORDING = "recording"
+    FINALISING = "finalising"
+    COMPLETE = "complete"
+    RECOVERED = "recovered"
+    FAULTED = "faulted"
+
+    @property
+    def open(self) -> bool:
+        """Whether it is still written."""
+        return self in (RecordingState.STARTING, RecordingState.RECORDING, RecordingState.FINALISING)
+
+
+class StopReason(StrEnum):
+    """Why a recording ended."""
+
+    REQUESTED = "requested"
+    LIMIT = "limit"
+    DISK = "disk"
+    ERROR = "error"
+    SHUTDOWN = "shutdown"
+    INTERRUPTED = "interrupted"
+
+
+class CopyState(StrEnum):
+    """Whether a recording is kept elsewhere, too."""
+
+    NONE = "none"
+    """Only here, and no copy is wanted."""
+    QUEUED = "queued"
+    UPLOADING = "uploading"
+    VERIFYING = "verifying"
+    VERIFIED = "verified"
+    PAUSED = "paused"
+    FAILED = "failed"
+
+
+class _Part(BaseModel):
+    # Of a later version, unknown keys are no damage.
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class Copy(_Part):
+    """State of the copy elsewhere."""
+
+    state: CopyState = CopyState.NONE
+    reason: str = ""
+    bytes_done: int = Field(default=0, ge=0)
+
+    @property
+    def outstanding(self) -> bool:
+        """Whether a copy is wanted and not confirmed yet."""
+        return self.state not in (CopyState.NONE, CopyState.VERIFIED)
+
+
+class Topic(_Part):
+    """A topic with one message type that a recording has."""
+
+    name: str
+    type: str
+    offered_qos: str = ""
+
+
+class File(_Part):
+    """A file that never changes again."""
+
+    name: str = Field(min_length=1, max_length=255)
+    size: int = Field(ge=0)
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+
+
+class Segment(File):
+    """One MCAP file of a recording."""
+
+    name: str = Field(pattern=f"^{SEGMENT.pattern}$")
+    first_ns: int | None = None
+    last_ns: int | None = None
+    """Earliest and latest log time; None without messages."""
+    counts: Mapping[int, int] = {}
+    """Messages by topic: by its position in the manifest, which names each topic once."""
+    gaps: tuple[Gap, ...] = ()
+
+    @property
+    def messages(self) -> int:
+        """How many messages it has, frames of video included."""
+        return sum(self.counts.values())
+
+
+class Manifest(_Part):
+    """A recording.
+
+    Attributes:
+        id: as RecordingService defines it.
+        trigger: who or what caused a snapshot or an incident.
+        max_duration_s, max_bytes: where it stops by itself; 0 for no limit.
+        numbered: whether the middleware numbers the messages, so that losses can be counted.
+        gaps: besides those of the segments.
+        metadata: rosbag2's file, once the recording has ended.
+        window_ns: of a snapshot, what it is to contain: two instants of the calendar clock.
+        deleting: whether its deletion has begun.
+    """
+
+    id: str = Field(pattern=f"^{ID.pattern}$")
+    label: str = ""
+    notes: str = ""
+    kind: Kind
+    state: RecordingState
+    stop_reason: StopReason | None = None
+    preset: str = ""
+    with_video: bool = False
+    started_unix_ms: int = Field(default=0, ge=0)
+    ended_unix_ms: int = Field(default=0, ge=0)
+    started_monotonic_ns: int = Field(default=0, ge=0)
+    ended_monotonic_ns: int = Field(default=0, ge=0)
+    boot_id: str = ""
+    run_id: str = ""
+    trigger: str = ""
+    max_duration_s: int = Field(default=0, ge=0)
+    max_bytes: int = Field(default=0, ge=0)
+    pinned: bool = False
+    numbered: bool = True
+    copied: Copy = Copy()
+    topics: tuple[Topic, ...] = ()
+    segments: tuple[Segment, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    metadata: File | None = None
+    window_ns: tuple[int, int] | None = None
+    deleting: bool = False
+
+    @property
+    def files(self) -> tuple[File, ...]:
+        """Its final files, in the order of their names."""
+        return (*self.segments, self.metadata) if self.metadata else self.segments
+
+    @property
+    def size(self) -> int:
+        """Bytes of its final files."""
+        return sum(file.size for file in self.files)
+
+    @property
+    def next_number(self) -> int:
+        """The number of its next segment."""
+        return max((segment_number(segment.name) + 1 for segment in self.segments), default=0)
+
+    @property
+    def messages(self) -> int:
+        """Messages in its final segments."""
+        return sum(segment.messages for segment in self.segments)
+
+    @property
+    def video_frames(self) -> int:
+        """Frames of video in its final segments."""
+        video = [index for index, topic in enumerate(self.topics) if topic.name == VIDEO_TOPIC]
+        return sum(segment.counts.get(index, 0) for index in video for segment in self.segments)
+
+    @property
+    def all_gaps(self) -> tuple[Gap, ...]:
+        """Its gaps in order, at most 1000; further ones are merged with the last."""
+        found = [*self.gaps, *(gap for segment in self.segments for gap in segment.gaps)]
+        found.sort(key=lambda gap: (gap.began_ns, gap.ended_ns))
+        return tuple(bounded(found))
+
+    @property
+    def lost(self) -> int | None:
+        """Messages lost from its final segments; None if unknown."""
+        gaps = self.all_gaps
+        counted = all(gap.messages is not None for gap in gaps if gap.cause is GapCause.MIDDLEWARE)
+        return sum(gap.messages or 0 for gap in gaps) if self.numbered and counted else None
+
+    @property
+    def sha256(self) -> bytes:
+        """SHA-256 over the names and sums of its files; empty while it is written."""
+        if self.state.open:
+            return b""
+        lines = [f"{file.sha256}  {file.name}\n" for file in self.files]
+        return hashlib.sha256("".join(lines).encode()).digest()
+
+    def with_segment(self, name: str, summary: SegmentSummary) -> Self:
+        """Returns the manifest with one more segment, or with one in place of that of the same name."""
+        topics = list(self.topics)
+        counts = {}
+        for channel in summary.channels:
+            topic = Topic(name=channel.topic, type=channel.type, offered_qos=channel.offered_qos)
+            if topic not in topics:
+                topics.append(topic)
+            counts[topics.index(topic)] = channel.messages
+        added = Segment(
+            name=name,
+            size=summary.size,
+            sha256=summary.sha256,
+            first_ns=summary.first_ns,
+            last_ns=summary.last_ns,
+            counts=counts,
+            gaps=summary.gaps,
+        )
+        segments = sorted(
+            (*(each for each in self.segments if each.name != name), added), key=lambda each: each.name
+        )
+        return self.model_copy(update={"topics": tuple(topics), "segments": tuple(segments)})
+
+    def before(self, number: int) -> Self:
+        """Returns the manifest without the segments from a number on."""
+        kept = tuple(each for each in self.segments if segment_number(each.name) < number)
+        return self.model_copy(update={"segments": kept})
+
+    def spanning(self) -> Self:
+        """Returns the manifest with the begin and end of its messages where it has none."""
+        firsts = [each.first_ns for each in self.segments if each.first_ns is not None]
+        lasts = [each.last_ns for each in self.segments if each.last_ns is not None]
+        update = {}
+        if firsts and not self.started_unix_ms:
+            update["started_unix_ms"] = min(firsts) // _NS_PER_MS
+        if lasts and not self.ended_unix_ms:
+            update["ended_unix_ms"] = max(lasts) // _NS_PER_MS
+        return self.model_copy(update=update)
+
+    def summaries(self, folder: Path) -> list[SegmentSummary]:
+        """Returns what its segments contain, as they were when they became final."""
+        return [
+            SegmentSummary(
+                path=folder / each.name,
+                size=each.size,
+                sha256=each.sha256,
+                messages=each.messages,
+                channels=tuple(
+                    ChannelSummary(topic.name, topic.type, topic.offered_qos, each.counts[index])
+                    for index, topic in enumerate(self.topics)
+                    if index in each.counts
+                ),
+                first_ns=each.first_ns,
+                last_ns=each.last_ns,
+                gaps=each.gaps,
+            )
+            for each in self.segments
+        ]
+
+    def write(self, folder: Path) -> None:
+        """Writes it to a recording's folder.
+
+        Raises:
+            OSError: the disk is full or fails; the former one is as it was.
+        """
+        replace_file(folder / MANIFEST, self.model_dump_json(indent=1, exclude_defaults=True).encode())
+
+
+class DamagedManifestError(Exception):
+    """A manifest that can't be read; the text says why."""
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Returns the manifest of a recording's folder.
+
+    Raises:
+        DamagedManifestError: it is missing, unreadable, or another recording's.
+    """
+    try:
+        with (folder / MANIFEST).open("rb") as file:
+            manifest = Manifest.model_validate_json(file.read(_MAX_BYTES))
+    except OSError as error:
+        raise DamagedManifestError(f"{error.strerror}") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise DamagedManifestError(f"{where}: {first['msg']}" if where else first["msg"]) from error
+    if manifest.id != folder.name:
+        raise DamagedManifestError(f"it is that of {manifest.id}")
+    return manifest
+
+
+def file_of(name: str, content: bytes) -> File:
+    """Returns what is known of a file with this content."""
+    return File(name=name, size=len(content), sha256=hashlib.sha256(content).hexdigest())
+
+
+def bounded(gaps: list[Gap]) -> list[Gap]:
+    """Returns at most 1000 gaps; the last one stands for all further ones."""
+    if len(gaps) <= MAX_GAPS:
+        return gaps
+    kept, rest = gaps[: MAX_GAPS - 1], gaps[MAX_GAPS - 1 :]
+    counts = [gap.messages for gap in rest]
+    return [
+        *kept,
+        Gap(
+            topic="",
+            cause=rest[0].cause,
+            began_ns=min(gap.began_ns for gap in rest),
+            ended_ns=max(gap.ended_ns for gap in rest),
+            messages=None if None in counts else sum(count or 0 for count in counts),
+        ),
+    ]

@@ -1,0 +1,157 @@
+"""The folders of the robot's own experiments (run bundles): listed and exported as recordings, never changed.
+
+A bundle is a folder with a `manifest.yaml`. Its ID here is "run-" and the folder's name, or a hash of the
+name where that has other characters than IDs may have.
+"""
+
+import hashlib
+import os
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from recorder.store.manifest import RecordingState
+
+MAX_FILES: Final = 10_000
+_MAX_BUNDLES: Final = 10_000
+_MANIFEST: Final = "manifest.yaml"
+_MANIFEST_BYTES: Final = 1024 * 1024
+_PREFIX: Final = "run-"
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]{1,60}")
+_STATE: Final = re.compile(
+    rb"^(?:state|status)\s*:\s*[\"']?(complete|in_progress|incomplete)\b", re.MULTILINE
+)
+_STATES: Final = {
+    b"complete": RecordingState.COMPLETE,
+    b"in_progress": RecordingState.RECORDING,
+    b"incomplete": RecordingState.RECOVERED,
+}
+_MAX_NAME: Final = 255
+"""Of a file below its bundle, as requests are limited; one with a longer name is not listed."""
+
+
+@dataclass(frozen=True, slots=True)
+class BundleFile:
+    """A file of a bundle; `changed_ns` is its modification time, which stands for its content."""
+
+    name: str
+    size: int
+    changed_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A folder of an experiment; instants in ns since 1970-01-01 UTC, from the times of its files."""
+
+    id: str
+    folder: Path
+    state: RecordingState
+    files: tuple[BundleFile, ...]
+    began_ns: int
+    ended_ns: int
+
+    @property
+    def size(self) -> int:
+        """Bytes of its files."""
+        return sum(file.size for file in self.files)
+
+    @property
+    def final(self) -> bool:
+        """Whether nothing more is written to it."""
+        return self.state is not RecordingState.RECORDING
+
+    def file(self, name: str) -> BundleFile | None:
+        """Returns the file with this name; None if it has none."""
+        return next((file for file in self.files if file.name == name), None)
+
+
+class RunBundles:
+    """Finds bundles in the configured folders. Its methods read the disk: they are for threads.
+
+    Args:
+        folders: that hold bundles. One that does not exist has none.
+    """
+
+    def __init__(self, folders: Sequence[Path]) -> None:
+        self._folders = tuple(folders)
+        self._sums: dict[tuple[Path, int, int], bytes] = {}
+
+    def all(self) -> list[Bundle]:
+        """Returns all bundles, without those that can't be read."""
+        found: dict[str, Bundle] = {}
+        for folder in self._candidates():
+            try:
+                bundle = _read(folder)
+            except OSError:
+                continue  # Gone, or another user's.
+            found.setdefault(bundle.id, bundle)
+            if len(found) >= _MAX_BUNDLES:
+                break
+        return list(found.values())
+
+    def get(self, bundle_id: str) -> Bundle | None:
+        """Returns a bundle; None if there is no such."""
+        for folder in self._candidates():
+            if _id_of(folder.name) == bundle_id:
+                try:
+                    return _read(folder)
+                except OSError:
+                    return None
+        return None
+
+    def sha256(self, bundle: Bundle, file: BundleFile) -> bytes:
+        """Returns the sum of a file's content, 32 bytes; reads the file the first time.
+
+        Raises:
+            OSError: the disk fails, or the file has gone.
+        """
+        path = bundle.folder / file.name
+        key = (path, file.size, file.changed_ns)
+        if key not in self._sums:
+            if len(self._sums) >= MAX_FILES:
+                self._sums.clear()
+            with path.open("rb") as content:
+                self._sums[key] = hashlib.file_digest(content, "sha256").digest()
+        return self._sums[key]
+
+    def _candidates(self) -> Iterator[Path]:
+        for parent in self._folders:
+            try:
+                entries = sorted(parent.iterdir())
+            except OSError:
+                continue
+            yield from (each for each in entries if not each.is_symlink() and (each / _MANIFEST).is_file())
+
+
+def _id_of(name: str) -> str:
+    if _PLAIN.fullmatch(name):
+        return f"{_PREFIX}{name}"
+    return f"{_PREFIX}{hashlib.sha256(os.fsencode(name)).hexdigest()[:32]}"
+
+
+def _read(folder: Path) -> Bundle:
+    with (folder / _MANIFEST).open("rb") as file:
+        stated = _STATE.search(file.read(_MANIFEST_BYTES))
+    files = sorted(_files(folder), key=lambda each: each.name)[:MAX_FILES]
+    times = [each.changed_ns for each in files]
+    return Bundle(
+        id=_id_of(folder.name),
+        folder=folder,
+        state=_STATES[stated[1]] if stated else RecordingState.RECOVERED,
+        files=tuple(files),
+        began_ns=min(times, default=0),
+        ended_ns=max(times, default=0),
+    )
+
+
+def _files(folder: Path) -> Iterator[BundleFile]:
+    for directory, _, names in os.walk(folder):
+        for name in names:
+            path = Path(directory) / name
+            status = path.lstat()
+            relative = path.relative_to(folder).as_posix()
+            if stat.S_ISREG(status.st_mode) and relative.isprintable() and len(relative) <= _MAX_NAME:
+                yield BundleFile(relative, status.st_size, status.st_mtime_ns)

@@ -1,0 +1,149 @@
+"""Making whole what was cut off: unfinished segments, and recordings that never ended. For a thread."""
+
+import logging
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from recorder.mcap.reading import summarise
+from recorder.mcap.records import PART
+from recorder.mcap.recovery import recover
+from recorder.mcap.rosbag2 import metadata
+from recorder.store.catalogue import Catalogue, segments_in
+from recorder.store.folder import DATA, METADATA, replace_file
+from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason, file_of
+from recorder.store.ring import RingSegment, link_next
+from recorder.values import Gap, GapCause
+
+_log = logging.getLogger(__name__)
+_NS_PER_MS: Final = 1_000_000
+_EMPTY_BYTES: Final = 1024 * 1024
+"""More than the definitions of a segment's types take."""
+
+
+def whole(folder: Path, manifest: Manifest) -> Manifest:
+    """Returns the manifest with all segments that the folder has, after unfinished ones have got their index.
+
+    Raises:
+        OSError: the disk is full or fails; what has been made whole by then stays so.
+    """
+    for part in list(segments_in(folder, PART)):
+        name = f"{DATA}/{part.name.removesuffix(PART)}"
+        summary = recover(part)
+        if summary is None:
+            put_aside(part)
+            continue
+        _log.info("recovered %s: %d messages", summary.path, summary.messages)
+        manifest = manifest.with_segment(name, summary)
+    known = {segment.name for segment in manifest.segments}
+    for path in segments_in(folder):
+        name = f"{DATA}/{path.name}"
+        if name not in known and (summary := summarise(path)):
+            manifest = manifest.with_segment(name, summary)
+    return manifest
+
+
+def put_aside(part: Path) -> None:
+    """Deletes an unfinished segment without a message; a long one, whose damage hides them, is kept aside."""
+    if part.stat().st_size <= _EMPTY_BYTES:
+        part.unlink()
+        return
+    aside = part.with_suffix(".damaged")
+    _log.warning("%s can't be recovered and is kept as %s", part, aside.name)
+    part.rename(aside)
+
+
+def ended(folder: Path, manifest: Manifest, state: RecordingState, reason: StopReason) -> Manifest:
+    """Returns the manifest of a recording that has ended, and writes rosbag2's file beside its segments.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    text = metadata(manifest.summaries(folder)).encode()
+    replace_file(folder / METADATA, text)
+    update = {"state": state, "stop_reason": reason, "metadata": file_of(METADATA, text)}
+    return _until_next_messages(manifest.model_copy(update=update)).spanning()
+
+
+def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> Manifest | None:
+    """Makes every recording whole that a former process has left open.
+
+    Args:
+        catalogue: as loaded.
+        ring: what was left of the ring.
+        boot_id: of the computer now.
+
+    Returns:
+        The recording that is to go on: it ran during the same boot.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    goes_on: Manifest | None = None
+    segments = list(ring)
+    for manifest in sorted(catalogue.all.values(), key=lambda each: each.id):
+        folder = catalogue.folder_of(manifest)
+        if not manifest.state.open and not any(segments_in(folder, PART)):
+            continue
+        found = whole(folder, manifest)
+        if manifest.window_ns:
+            found = _with_ring(folder, found, segments)
+        running = manifest.state is RecordingState.RECORDING and manifest.kind is Kind.MANUAL
+        if running and manifest.boot_id == boot_id and boot_id:
+            if goes_on:
+                _interrupted(catalogue, goes_on)
+            goes_on = found
+            catalogue.write(found)
+        elif manifest.state.open:
+            _interrupted(catalogue, found)
+        else:
+            catalogue.write(ended(folder, found, found.state, found.stop_reason or StopReason.ERROR))
+    return goes_on
+
+
+def _interrupted(catalogue: Catalogue, manifest: Manifest) -> None:
+    cut = manifest if manifest.window_ns else with_interruption(manifest, None)
+    folder = catalogue.folder_of(manifest)
+    catalogue.write(ended(folder, cut, RecordingState.RECOVERED, StopReason.INTERRUPTED))
+
+
+def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
+    """Returns the manifest with a gap from its newest message on.
+
+    Args:
+        manifest: of a recording that was cut off.
+        until_ns: when it goes on, by the calendar clock; None: never, and nobody knows how much is missing.
+    """
+    lasts = [each.last_ns for each in manifest.segments if each.last_ns is not None]
+    began_ns = max(lasts, default=manifest.started_unix_ms * _NS_PER_MS)
+    ended_ns = began_ns if until_ns is None else max(began_ns, until_ns)
+    gap = Gap("", GapCause.INTERRUPTED, began_ns, ended_ns, None)
+    return manifest.model_copy(update={"gaps": (*manifest.gaps, gap)})
+
+
+def _until_next_messages(manifest: Manifest) -> Manifest:
+    """Returns the manifest with each interruption lasting until the first message after it.
+
+    What is published while the recorder opens its files, and before it has subscribed, is missing, too.
+    """
+    firsts = sorted(each.first_ns for each in manifest.segments if each.first_ns is not None)
+    gaps = []
+    for gap in manifest.gaps:
+        next_ns = next((first_ns for first_ns in firsts if first_ns > gap.began_ns), 0)
+        longer = gap.cause is GapCause.INTERRUPTED and next_ns > gap.ended_ns
+        gaps.append(replace(gap, ended_ns=next_ns) if longer else gap)
+    return manifest.model_copy(update={"gaps": tuple(gaps)})
+
+
+def _with_ring(folder: Path, manifest: Manifest, ring: list[RingSegment]) -> Manifest:
+    """Returns a snapshot's manifest with what its window has in the ring, linked."""
+    assert manifest.window_ns, "only snapshots have one"  # noqa: S101  # the caller has looked
+    offset_ns = time.monotonic_ns() - time.time_ns()
+    from_ns, until_ns = (instant + offset_ns for instant in manifest.window_ns)
+    known = {segment.sha256 for segment in manifest.segments}
+    for segment in ring:
+        if segment.overlaps(from_ns, until_ns) and segment.summary.sha256 not in known:
+            manifest = link_next(folder, manifest, segment)
+    return manifest

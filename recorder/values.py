@@ -1,0 +1,129 @@
+"""Values that the recorder's packages share: channels, samples, losses, and what a finished segment contains.
+
+Times in nanoseconds count from 1970-01-01 UTC by the calendar clock, unless a name says monotonic.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+VIDEO_TOPIC: Final = "/preview/video"
+"""Topic of the preview's video in recordings. No node publishes it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """One topic with one message type. Compared by identity: a topic with another type is a new channel."""
+
+    topic: str
+    """ROS name: "/odom"."""
+    type: str
+    """ROS name: "nav_msgs/msg/Odometry"."""
+    schema: bytes
+    """Definition of the type and of those it contains; empty if unknown."""
+    schema_encoding: str
+    """As in the MCAP registry: "ros2msg"; empty if the definition is unknown."""
+    offered_qos: str
+    """What the publishers offer, as the YAML that rosbag2 keeps in "offered_qos_profiles"."""
+    latched: bool
+    """Whether the publishers are transient local: each segment begins with the newest messages."""
+    presets: frozenset[str]
+    """Names of the presets that record it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One message, as received."""
+
+    channel: Channel
+    data: bytes
+    """CDR with its encapsulation header of 4 bytes."""
+    log_time_ns: int
+    """When it was received."""
+    publish_time_ns: int
+    """When it was published, by the publisher's clock."""
+    sequence: int
+    """Its number among those of its publisher; 0 if the middleware does not number messages."""
+    monotonic_ns: int
+    """When it was received, by CLOCK_MONOTONIC."""
+
+
+class GapCause(Enum):
+    """Why messages are missing."""
+
+    MIDDLEWARE = "middleware"
+    """They were lost before the recorder could take them."""
+    QUEUE = "queue"
+    """The recorder's own queue was full."""
+    INTERRUPTED = "interrupted"
+    """The recorder was not running, or the end of a file was damaged."""
+    VIDEO = "video"
+    """Frames could not be taken from the preview."""
+    DISK = "disk"
+    """The disk refused to write."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Messages that are missing, in order with those that are not."""
+
+    channel: Channel | None
+    """Whose; None if of the video or of all channels."""
+    cause: GapCause
+    began_ns: int
+    ended_ns: int
+    """The same as the begin where only the number is known."""
+    messages: int | None
+    """How many; None if unknown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A named set of texts that a file keeps beside its messages (an MCAP metadata record)."""
+
+    name: str
+    values: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSummary:
+    """One channel of a finished segment."""
+
+    topic: str
+    type: str
+    offered_qos: str
+    messages: int
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A loss as a file keeps it: with the topic's name instead of the channel."""
+
+    topic: str
+    """Empty if of the video or of all channels."""
+    cause: GapCause
+    began_ns: int
+    ended_ns: int
+    messages: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentSummary:
+    """What a finished segment contains."""
+
+    path: Path
+    size: int
+    """In bytes."""
+    sha256: str
+    """Of its content, 64 hexadecimal digits."""
+    messages: int
+    channels: tuple[ChannelSummary, ...]
+    """In the order of their first messages."""
+    first_ns: int | None
+    """Earliest log time; None without messages."""
+    last_ns: int | None
+    """Latest log time."""
+    gaps: tuple[Gap, ...]
+    """In the order in which they were recorded."""

@@ -1,0 +1,1 @@
+"""Video of the preview's encoder as messages of a recording."""

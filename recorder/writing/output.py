@@ -1,0 +1,250 @@
+"""One sequence of segments: a recording's, or the ring's. Used by the writer's thread alone."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from recorder.mcap.records import PART
+from recorder.mcap.writer import SegmentWriter
+from recorder.values import VIDEO_TOPIC, Channel, GapCause, Loss, Note, Sample, SegmentSummary
+from recorder.writing.queue import Item
+
+CLOCK_STEP_NS: Final = 500_000_000
+"""A calendar clock that steps by more than this begins a new segment."""
+_NS_PER_S: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What an output takes, and how it is cut into segments.
+
+    Attributes:
+        directory: of the segments.
+        name: of a segment's file, by its number.
+        first: the number of its first segment.
+        preset: what it records.
+        with_video: whether it records the video, too.
+        max_bytes, max_s: the longest segment.
+    """
+
+    directory: Path
+    name: Callable[[int], str]
+    first: int
+    preset: str
+    with_video: bool
+    max_bytes: int
+    max_s: float
+
+    def selects(self, channel: Channel) -> bool:
+        """Returns whether the messages of a channel belong here."""
+        return self.with_video if channel.topic == VIDEO_TOPIC else self.preset in channel.presets
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What every segment begins with: the newest notes, and the newest messages of latched topics."""
+
+    notes: Sequence[Note] = ()
+    latched: Sequence[Sample] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """A segment that is final; instants of CLOCK_MONOTONIC in ns, from opening to closing."""
+
+    path: Path
+    number: int
+    began_ns: int
+    ended_ns: int
+    summary: SegmentSummary
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far an output has come.
+
+    Attributes:
+        part: the segment that is being written; None when there is none.
+        part_bytes: its size so far.
+        bytes: of all segments.
+        messages, frames: written to all segments.
+        lost: messages lost; None if that is unknown.
+        gaps: how many losses were recorded.
+        numbered: whether all messages so far were numbered.
+    """
+
+    part: Path | None = None
+    part_bytes: int = 0
+    bytes: int = 0
+    messages: int = 0
+    frames: int = 0
+    lost: int | None = 0
+    gaps: int = 0
+    numbered: bool = True
+
+
+class Output:
+    """Writes what a shape selects to one segment after the other.
+
+    Args:
+        shape: what it takes.
+        head: returns what every segment begins with.
+        closed: called with each segment that has become final.
+
+    Attributes:
+        progress: as of the newest flush; replaced as a whole, for other threads.
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        head: Callable[[], Head],
+        closed: Callable[["Output", Closed], None],
+    ) -> None:
+        self.shape = shape
+        self.progress = Progress()
+        self._head = head
+        self._closed = closed
+        self._number = shape.first
+        self._segment: SegmentWriter | None = None
+        self._path = Path()
+        self._began_ns = 0
+        self._clock_offset_ns = 0
+        self._closed_bytes = 0
+        self._messages = 0
+        self._frames = 0
+        self._lost: int | None = 0
+        self._gaps = 0
+        self._numbered = True
+        self._fresh = True
+        """Whether nothing but its head is in the present segment."""
+
+    def open(self) -> None:
+        """Opens the next segment.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        now_ns, calendar_ns = time.monotonic_ns(), time.time_ns()
+        self._path = self.shape.directory / self.shape.name(self._number)
+        self._began_ns = now_ns
+        self._clock_offset_ns = calendar_ns - now_ns
+        pair = Note("clock", {"monotonic_ns": str(now_ns), "unix_ns": str(calendar_ns)})
+        head = self._head()
+        part = self._path.with_name(self._path.name + PART)
+        self._segment = SegmentWriter(part, head=(pair, *head.notes))
+        self._fresh = True
+        for sample in head.latched:
+            if self.shape.selects(sample.channel):
+                # As of now: its own instant may lie hours before the segment.
+                self._segment.write(replace(sample, log_time_ns=calendar_ns, monotonic_ns=now_ns))
+                self._messages += 1
+        self._report()
+
+    def write(self, item: Item) -> None:
+        """Writes a message, a loss or a note, if it belongs here.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        match item:
+            case Sample():
+                if self.shape.selects(item.channel):
+                    self._write(item)
+            case Loss():
+                if item.channel is None or self.shape.selects(item.channel):
+                    self._lose(item)
+            case Note():
+                self._opened.note(item)
+
+    def flush(self) -> None:
+        """Writes what is buffered to the disk, and begins a new segment when the present one is long enough.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        segment = self._opened
+        segment.flush()
+        age_ns = time.monotonic_ns() - self._began_ns
+        if age_ns >= self.shape.max_s * _NS_PER_S and not self._fresh:
+            self.rotate()
+        self._report()
+
+    def rotate(self) -> None:
+        """Makes the present segment final and opens the next one.
+
+        Raises:
+            OSError: the disk is full or fails.
+        """
+        self.close()
+        self.open()
+
+    def close(self) -> None:
+        """Makes the present segment final.
+
+        Raises:
+            OSError: the disk is full or fails; the segment stays as it is.
+        """
+        summary = self._opened.finish()
+        self._segment = None
+        self._closed_bytes += summary.size
+        self._report()
+        final = Closed(summary.path, self._number, self._began_ns, time.monotonic_ns(), summary)
+        self._number += 1
+        self._closed(self, final)
+
+    def abandon(self) -> None:
+        """Lets go of the present segment after an error; its file is left for recovery."""
+        if self._segment:
+            self._segment.abandon()
+            self._segment = None
+
+    @property
+    def _opened(self) -> SegmentWriter:
+        if self._segment is None:
+            self.open()
+        assert self._segment is not None, "open() raises or opens"  # noqa: S101  # for the type checker
+        return self._segment
+
+    def _write(self, sample: Sample) -> None:
+        segment = self._opened
+        offset_ns = sample.log_time_ns - sample.monotonic_ns
+        if abs(offset_ns - self._clock_offset_ns) > CLOCK_STEP_NS:
+            self.rotate()
+            # By the sample's own pair: more of the old clock's may wait in the queue.
+            self._clock_offset_ns = offset_ns
+            segment = self._opened
+        elif segment.size >= self.shape.max_bytes:
+            self.rotate()
+            segment = self._opened
+        segment.write(sample)
+        self._fresh = False
+        self._messages += 1
+        if sample.channel.topic == VIDEO_TOPIC:
+            self._frames += 1
+        elif not sample.sequence:
+            self._numbered = False
+
+    def _lose(self, loss: Loss) -> None:
+        self._opened.loss(loss)
+        self._fresh = False
+        self._gaps += 1
+        if loss.messages is None and loss.cause is not GapCause.VIDEO:
+            self._lost = None
+        elif self._lost is not None:
+            self._lost += loss.messages or 0
+
+    def _report(self) -> None:
+        size = self._segment.size if self._segment else 0
+        self.progress = Progress(
+            part=self._path if self._segment else None,
+            part_bytes=size,
+            bytes=self._closed_bytes + size,
+            messages=self._messages,
+            frames=self._frames,
+            lost=self._lost,
+            gaps=self._gaps,
+            numbered=self._numbered,
+        )

@@ -1,0 +1,94 @@
+"""Between what takes messages and what writes them: bounded in bytes, with a rule when it is full."""
+
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from recorder.values import Channel, GapCause, Loss, Note, Sample
+
+Item = Sample | Loss | Note
+_OVERHEAD_BYTES: Final = 256
+"""Of a message's objects in memory, roughly."""
+
+
+class SampleQueue:
+    """Takes messages from any thread and hands them to one that writes.
+
+    When it is full, the new messages are dropped, and one Loss for each of their channels follows as soon
+    as the writer has caught up. Losses of others are merged by channel and cause meanwhile, and of the
+    notes with one name the newest is kept: neither grows without bound.
+
+    Args:
+        max_bytes: what waits at most.
+
+    Attributes:
+        dropped: messages dropped so far.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._items: deque[Item] = deque()
+        self._bytes = 0
+        self._losses: dict[tuple[Channel | None, GapCause], Loss] = {}
+        self._notes: dict[str, Note] = {}
+        self._changed = threading.Condition()
+        self._woken = False
+        self.dropped = 0
+
+    def put(self, items: Sequence[Item]) -> None:
+        """Appends items in order; never waits."""
+        with self._changed:
+            for item in items:
+                self._put(item)
+            self._changed.notify()
+
+    def wake(self) -> None:
+        """Ends a `take` that waits, or the next one."""
+        with self._changed:
+            self._woken = True
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> list[Item]:
+        """Returns what waits, in order; empty after `timeout_s` without anything, or after `wake`."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._items or self._losses or self._woken, timeout_s)
+            self._woken = False
+            taken = [*self._items, *self._notes.values(), *self._losses.values()]
+            self._items.clear()
+            self._notes.clear()
+            self._losses.clear()
+            self._bytes = 0
+        return taken
+
+    def _put(self, item: Item) -> None:
+        size = _OVERHEAD_BYTES + (len(item.data) if isinstance(item, Sample) else 0)
+        # One message may be larger than the whole queue.
+        if not self._items or self._bytes + size <= self._max_bytes:
+            self._items.append(item)
+            self._bytes += size
+        elif isinstance(item, Sample):
+            self.dropped += 1
+            at_ns = item.log_time_ns
+            self._merge(Loss(item.channel, GapCause.QUEUE, at_ns, at_ns, 1))
+        elif isinstance(item, Loss):
+            self._merge(item)
+        else:
+            self._notes[item.name] = item
+
+    def _merge(self, loss: Loss) -> None:
+        key = loss.channel, loss.cause
+        before = self._losses.get(key)
+        self._losses[key] = merged(before, loss) if before else loss
+
+
+def merged(first: Loss, second: Loss) -> Loss:
+    """Returns one loss for two of the same channel and cause, which spans both."""
+    unknown = first.messages is None or second.messages is None
+    return replace(
+        first,
+        began_ns=min(first.began_ns, second.began_ns),
+        ended_ns=max(first.ended_ns, second.ended_ns),
+        messages=None if unknown else (first.messages or 0) + (second.messages or 0),
+    )

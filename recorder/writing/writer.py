@@ -1,0 +1,158 @@
+"""The thread that writes: the only one that touches segments."""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+from typing import Final, Protocol, TypeVar
+
+from recorder.values import Note, Sample
+from recorder.writing.output import Head, Output
+from recorder.writing.queue import Item, SampleQueue
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+
+FLUSH_S: Final = 0.5
+"""Between two flushes to the disk: a power cut costs at most this and what the flush itself takes."""
+_JOIN_S: Final = 10.0
+_MAX_NOTES: Final = 32
+
+
+class Latched(Protocol):
+    """Keeps the newest messages of latched topics."""
+
+    def take(self, sample: Sample) -> None:
+        """Takes a message of a latched topic."""
+
+    def samples(self) -> Iterable[Sample]:
+        """Returns the messages that a late subscriber would get."""
+
+
+class Writer:
+    """Takes items from the queue and writes each to the outputs that select it.
+
+    Outputs are added, rotated and closed by this thread, too, after everything that was queued before. An
+    output that the disk fails is removed and reported; the others go on.
+
+    Args:
+        queue: what is written.
+        latched: what the head of each segment repeats.
+        failed: called, by this thread, with an output that was removed and the disk's error.
+    """
+
+    def __init__(
+        self, queue: SampleQueue, latched: Latched, failed: Callable[[Output, OSError], None]
+    ) -> None:
+        self._queue = queue
+        self._latched = latched
+        self._failed = failed
+        self._outputs: list[Output] = []
+        self._notes: dict[str, Note] = {}
+        """The newest of each name: what still holds when a segment begins."""
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name="writer")
+
+    def start(self) -> None:
+        """Starts the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends the thread after it has written what is queued; outputs must have been closed."""
+        self._stopping = True
+        self._queue.wake()
+        self._thread.join(_JOIN_S)
+
+    def add(self, output: Output) -> "Future[None]":
+        """Opens an output; the future fails with the disk's OSError."""
+
+        def job() -> None:
+            try:
+                output.open()
+            except OSError:
+                output.abandon()
+                raise
+            self._outputs.append(output)
+
+        return self._submit(job)
+
+    def rotate(self, output: Output) -> "Future[None]":
+        """Makes an output's present segment final and opens the next one; does nothing after a failure."""
+        return self._submit(lambda: self._each(Output.rotate, output))
+
+    def remove(self, output: Output) -> "Future[bool]":
+        """Closes an output; the future has whether that went well. A failure is reported like any other."""
+
+        def job() -> bool:
+            self._each(Output.close, output)
+            if output not in self._outputs:
+                return False
+            self._outputs.remove(output)
+            return True
+
+        return self._submit(job)
+
+    def head(self) -> Head:
+        """Returns what the head of a segment repeats."""
+        return Head(tuple(self._notes.values()), tuple(self._latched.samples()))
+
+    @property
+    def alive(self) -> bool:
+        """Whether the thread runs; a defect ends it."""
+        return self._thread.is_alive()
+
+    def _submit(self, work: Callable[[], _T]) -> "Future[_T]":
+        future: Future[_T] = Future()
+
+        def job() -> None:
+            try:
+                future.set_result(work())
+            except OSError as error:
+                future.set_exception(error)
+
+        self._jobs.append(job)
+        self._queue.wake()
+        return future
+
+    def _run(self) -> None:
+        flush_at_s = time.monotonic() + FLUSH_S
+        while not (self._stopping and not self._jobs):
+            # Before the items: what was put before a job was submitted is written before the job.
+            jobs = len(self._jobs)
+            for item in self._queue.take(0.0 if jobs else max(0.0, flush_at_s - time.monotonic())):
+                self._write(item)
+            for _ in range(jobs):
+                self._jobs.popleft()()
+            if time.monotonic() >= flush_at_s:
+                self._each(Output.flush, *self._outputs)
+                flush_at_s = time.monotonic() + FLUSH_S
+
+    def _write(self, item: Item) -> None:
+        if isinstance(item, Sample):
+            if item.channel.latched:
+                self._latched.take(item)
+        elif isinstance(item, Note) and (item.name in self._notes or len(self._notes) < _MAX_NOTES):
+            self._notes[item.name] = item
+        for output in tuple(self._outputs):
+            try:
+                output.write(item)
+            except OSError as error:
+                self._drop(output, error)
+
+    def _each(self, work: Callable[[Output], None], *outputs: Output) -> None:
+        for output in outputs:
+            if output not in self._outputs:
+                continue
+            try:
+                work(output)
+            except OSError as error:
+                self._drop(output, error)
+
+    def _drop(self, output: Output, error: OSError) -> None:
+        _log.error("%s can't be written: %s", output.shape.directory, error.strerror)
+        self._outputs.remove(output)
+        output.abandon()
+        self._failed(output, error)

@@ -1,0 +1,184 @@
+"""What the disk does to a recorder: full, damaged, strange, shared with another one."""
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from common.errors import PreconditionError, TooMuchError, UserError
+from recorder.lifecycle import State
+from recorder.requests import StartOptions
+from recorder.store.lock import folder_lock
+from recorder.store.manifest import Copy, CopyState, Manifest, RecordingState, StopReason
+from tests.support.recorder_in_process import Running, Source, running_recorder
+
+MIB = 1024 * 1024
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 32 MiB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=32m", "tmpfs", str(disk)], capture_output=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip("this user can't mount a file system")
+    yield disk
+    subprocess.run(["umount", "--lazy", str(disk)], check=True)
+
+
+def fill(disk: Path, leave: int) -> Path:
+    """Fills a file system up to some free bytes."""
+    ballast = disk / "ballast"
+    free = int(subprocess.check_output(["df", "--output=avail", "-B1", disk], text=True).split()[1])
+    with ballast.open("wb") as file:
+        file.write(b"\0" * max(free - leave, 0))
+    return ballast
+
+
+async def recorded(running: Running, size: int = 1000) -> Manifest:
+    """A finished recording."""
+    await running.recorder.start(f"start-{size}", StartOptions())
+    Source(running.queue).send(10, size=size // 10)
+    done = (await running.recorder.stop(f"stop-{size}", "")).recording
+    assert done
+    return done
+
+
+async def test_a_disk_full_before_the_start_refuses_it(small_disk: Path) -> None:
+    async with running_recorder(small_disk / "root") as running:
+        fill(small_disk, 2 * MIB)
+        with pytest.raises(TooMuchError, match="no room"):
+            await running.recorder.start("1", StartOptions())
+        assert running.recorder.phase.state is State.IDLE
+
+
+async def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_written(small_disk: Path) -> None:
+    async with running_recorder(small_disk / "root") as running:
+        await running.recorder.start("1", StartOptions())
+        source = Source(running.queue)
+        source.send(100, size=1000)
+        await running.written(100)
+        ballast = fill(small_disk, 100_000)
+        source.send(100, size=20_000)
+        await running.until(lambda: running.recorder.running is None)
+        cut = running.recorder.newest
+        assert cut
+        assert cut.stop_reason is StopReason.DISK
+        assert cut.messages >= 100
+        assert running.recorder.disk_short
+        assert "disk" in running.recorder.last_error
+        # With room again it records again, by itself.
+        ballast.unlink()
+        await running.until(lambda: running.recorder.phase.state is State.IDLE)
+        await running.until(lambda: not running.recorder.get(cut.id).state.open)
+        assert (await running.recorder.start("2", StartOptions())).recording
+
+
+async def test_a_disk_full_at_the_end_leaves_a_recording_that_opens(small_disk: Path) -> None:
+    async with running_recorder(small_disk / "root") as running:
+        await running.recorder.start("1", StartOptions())
+        Source(running.queue).send(50, size=1000)
+        await running.written(50)
+        ballast = fill(small_disk, 0)
+        stopped = await running.recorder.stop("2", "")
+        assert stopped.recording
+        ballast.unlink()
+        await running.until(lambda: running.recorder.phase.state is State.IDLE)
+        done = running.recorder.get(stopped.recording.id)
+        assert done.state in (RecordingState.COMPLETE, RecordingState.FAULTED)
+        assert done.messages == 50
+        assert done.metadata
+
+
+async def test_room_is_made_in_the_order_of_retention(small_disk: Path) -> None:
+    room = {"min_free_bytes": 8 * MIB}
+    async with running_recorder(small_disk / "root", room=room) as running:
+        oldest = await recorded(running, MIB)
+        copied = await recorded(running, MIB + 1)
+        pinned = await recorded(running, MIB + 2)
+        waiting = await recorded(running, MIB + 3)
+        await running.recorder.set_copy(copied.id, Copy(state=CopyState.VERIFIED))
+        await running.recorder.set_copy(waiting.id, Copy(state=CopyState.QUEUED))
+        await running.recorder.pin("pin", pinned.id, pinned=True)
+        ballast = fill(small_disk, 11 * MIB + MIB // 2)
+        await running.recorder.start("a", StartOptions())
+        assert not running.recorder.has(copied.id)
+        assert running.recorder.has(oldest.id)
+        await running.recorder.stop("b", "")
+        ballast.unlink()
+        fill(small_disk, 6 * MIB)
+        with pytest.raises(TooMuchError):
+            await running.recorder.start("c", StartOptions())
+        assert {each.id for each in running.recorder.recordings} == {pinned.id, waiting.id}
+
+
+async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    folder = tmp_path / "recordings" / done.id
+    (folder / "manifest.json").write_text('{"id": 7', encoding="utf-8")
+    async with running_recorder(tmp_path) as running:
+        found = running.recorder.get(done.id)
+        assert found.messages == 10
+        assert found.state is RecordingState.RECOVERED
+        assert found.pinned  # It might have been.
+        assert (folder / "manifest.json.damaged").read_text(encoding="utf-8") == '{"id": 7'
+
+
+async def test_what_is_not_ours_is_neither_listed_nor_deleted(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    recordings = tmp_path / "recordings"
+    strange = [
+        recordings / "notes.txt",
+        recordings / "..hidden" / "file",
+        recordings / "20260101T000000Z-zzzzzz" / "manifest.json",
+        recordings / "20260101T000000Z-abcdef" / "nothing-of-ours",
+        recordings / done.id / "data" / "my-notes.txt",
+    ]
+    for path in strange:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("mine", encoding="utf-8")
+    (recordings / "20260101T000000Z-aaaaaa").symlink_to(tmp_path / "elsewhere")
+    async with running_recorder(tmp_path) as running:
+        assert [each.id for each in running.recorder.recordings] == [done.id]
+        await running.recorder.delete("1", done.id, b"", force=False)
+    assert all(path.read_text(encoding="utf-8") == "mine" for path in strange)
+    assert [path.name for path in (recordings / done.id / "data").iterdir()] == ["my-notes.txt"]
+
+
+async def test_a_second_recorder_on_the_folder_is_refused(tmp_path: Path) -> None:
+    with (
+        folder_lock(tmp_path),
+        pytest.raises(UserError, match=r"another recorder .process [0-9]+. uses the folder"),
+        folder_lock(tmp_path),
+    ):
+        pass
+
+
+async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_ends(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        await running.recorder.start("1", StartOptions())
+        done = (await running.recorder.stop("2", "")).recording
+        assert done
+    # As a recorder leaves it that was killed.
+    cut = done.model_copy(update={"state": RecordingState.RECORDING, "stop_reason": None, "ended_unix_ms": 0})
+    folder = tmp_path / "recordings" / done.id
+    cut.write(folder)
+    async with running_recorder(tmp_path) as running:
+        assert running.recorder.running
+        assert running.recorder.running.id == done.id
+        with pytest.raises(PreconditionError):
+            await running.recorder.start("3", StartOptions())
+    ended = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
+    assert ended.stop_reason is StopReason.SHUTDOWN
+    assert [gap.cause.name for gap in ended.gaps] == ["INTERRUPTED"]
+    cut.write(folder)
+    async with running_recorder(tmp_path, boot_id="another") as running:
+        assert running.recorder.running is None
+        found = running.recorder.get(done.id)
+        assert (found.state, found.stop_reason) == (RecordingState.RECOVERED, StopReason.INTERRUPTED)

@@ -1,0 +1,221 @@
+"""The intake on a real graph: real rclpy over Fast DDS."""
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+from std_msgs.msg import Int32, String
+
+from recorder.intake.intake import intake
+from recorder.mcap.rosbag2 import FILE_NAME, metadata
+from recorder.mcap.writer import SegmentWriter
+from recorder.values import Sample
+from tests.integration.recorder.conftest import Everything, Taken
+from tests.support.talker import Talker, talking
+from tests.support.waiting import wait_until
+
+ROOT = Path(__file__).parents[3]
+
+
+def subscribed(publisher: Any) -> None:
+    wait_until(lambda: publisher.get_subscription_count() > 0, "a subscription")
+
+
+def test_what_is_published_arrives_with_numbers_and_times(talker: Talker, taken: Taken) -> None:
+    publisher = talker.publisher("/odom", Odometry)
+    subscribed(publisher)
+    for _ in range(50):
+        publisher.publish(Odometry())
+    wait_until(lambda: len(taken.samples("/odom")) == 50, "50 messages")
+    samples = taken.samples("/odom")
+    assert [each.sequence for each in samples] == list(range(1, 51))
+    assert all(each.publish_time_ns <= each.log_time_ns for each in samples)
+    assert [each.monotonic_ns for each in samples] == sorted(each.monotonic_ns for each in samples)
+    (channel,) = taken.channels("/odom")
+    assert channel.type == "nav_msgs/msg/Odometry"
+    assert channel.presets == {"everything"}
+    assert not channel.latched
+    assert not taken.intake.problems
+
+
+def test_independent_readers_decode_what_was_taken(talker: Talker, taken: Taken, tmp_path: Path) -> None:
+    publisher = talker.publisher("/odom", Odometry)
+    subscribed(publisher)
+    for number in range(20):
+        message = Odometry()
+        message.pose.pose.position.x = float(number)
+        message.child_frame_id = "base_link"
+        publisher.publish(message)
+    wait_until(lambda: len(taken.samples("/odom")) == 20, "20 messages")
+    writer = SegmentWriter(tmp_path / "000000.mcap.part")
+    for sample in taken.samples("/odom"):
+        writer.write(sample)
+    segment = writer.finish()
+    (tmp_path / FILE_NAME).write_text(metadata([segment]))
+    with segment.path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        decoded = [message for *_, message in reader.iter_decoded_messages()]
+    assert [each.pose.pose.position.x for each in decoded] == list(range(20))
+    assert {each.child_frame_id for each in decoded} == {"base_link"}
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Reader(tmp_path) as bag:
+        values = [store.deserialize_cdr(data, each.msgtype) for each, _, data in bag.messages()]
+    assert [each.pose.pose.position.x for each in values] == list(range(20))  # type: ignore[attr-defined]
+
+
+def test_latched_messages_reach_an_intake_that_comes_late(talker: Talker) -> None:
+    latched = {"durability": DurabilityPolicy.TRANSIENT_LOCAL, "depth": 1}
+    publisher = talker.publisher("/robot_description", String, **latched)
+    publisher.publish(String(data="first"))
+    publisher.publish(String(data="second"))
+    items: list[Any] = []
+    with intake({"everything": Everything()}, items.extend) as running:
+        running.want(frozenset({"everything"}))
+        wait_until(lambda: items, "the latched message")
+    (sample,) = [each for each in items if isinstance(each, Sample)]
+    assert sample.channel.latched
+    assert b"second" in sample.data
+
+
+def test_qos_follows_publishers_that_join_later(talker: Talker, taken: Taken) -> None:
+    """A reliable subscription would never hear the best-effort publisher."""
+    reliable = talker.publisher("/chatter", String)
+    subscribed(reliable)
+    best_effort = QoSProfile(reliability=ReliabilityPolicy.BEST_EFFORT, depth=100)
+    sensor = talker.node.create_publisher(String, "/chatter", best_effort)
+    subscribed(sensor)
+    for number in range(200):
+        reliable.publish(String(data=f"r{number}"))
+        sensor.publish(String(data=f"s{number}"))
+        threading.Event().wait(0.01)
+    wait_until(lambda: len(taken.samples("/chatter")) == 400, "400 messages, none of them twice")
+    assert len({each.data for each in taken.samples("/chatter")}) == 400
+
+
+def test_a_topic_with_another_type_is_another_channel(talker: Talker, taken: Taken) -> None:
+    text = talker.publisher("/value", String)
+    subscribed(text)
+    text.publish(String(data="one"))
+    wait_until(lambda: taken.samples("/value"), "the text")
+    talker.fall_silent("/value", String)
+    number = talker.publisher("/value", Int32)
+    subscribed(number)
+    number.publish(Int32(data=2))
+    wait_until(lambda: len(taken.samples("/value")) == 2, "the number")
+    assert [each.type for each in taken.channels("/value")] == ["std_msgs/msg/String", "std_msgs/msg/Int32"]
+
+
+def test_of_two_types_at_a_time_one_is_recorded(talker: Talker, taken: Taken) -> None:
+    text = talker.publisher("/value", String)
+    subscribed(text)
+    with talking("second") as second:
+        second.publisher("/value", Int32)
+        wait_until(lambda: "/value" in taken.intake.problems, "a problem")
+        text.publish(String(data="one"))
+        wait_until(lambda: taken.samples("/value"), "the text")
+    assert "std_msgs/msg/String alone" in taken.intake.problems["/value"]
+
+
+def test_a_type_that_is_not_installed_is_a_problem_with_a_remedy(talker: Talker, taken: Taken) -> None:
+    publisher = talker.publisher("/odom", Odometry)
+    # The registry of installed packages is what the other machine has and this one lacks.
+    with patch("recorder.intake.schemas.share_directory", lambda _package: None):
+        wait_until(lambda: "/odom" in taken.intake.problems, "a problem")
+        assert "apt install ros-$ROS_DISTRO-nav-msgs" in taken.intake.problems["/odom"]
+    subscribed(publisher)
+    wait_until(lambda: not taken.intake.problems, "no problem")
+
+
+def test_only_what_is_wanted_is_subscribed(talker: Talker, taken: Taken) -> None:
+    publisher = talker.publisher("/odom", Odometry)
+    subscribed(publisher)
+    taken.intake.want(frozenset({"nothing"}))
+    wait_until(lambda: publisher.get_subscription_count() == 0, "no subscription")
+    taken.intake.want(frozenset({"everything"}))
+    subscribed(publisher)
+    publisher.publish(Odometry())
+    wait_until(lambda: taken.samples("/odom"), "a message")
+
+
+def test_a_peer_whose_name_is_not_text_costs_the_others_nothing(talker: Talker, taken: Taken) -> None:
+    command = [sys.executable, "-m", "tests.support.undecodable_peer", "/theirs"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as peer:
+        assert peer.stdout
+        assert "ready" in peer.stdout.readline()
+        publisher = talker.publisher("/odom", Odometry)
+        subscribed(publisher)
+        publisher.publish(Odometry())
+        wait_until(lambda: taken.samples("/odom"), "a message")
+        wait_until(lambda: taken.samples("/theirs"), "a message of the peer itself")
+        assert peer.stdin
+        peer.stdin.close()
+        peer.wait(10)
+
+
+@pytest.mark.parametrize(
+    ("hz", "size", "count"), [(1000, 60, 3000), (5, 8_000_000, 10)], ids=["1 kHz", "8 MB"]
+)
+def test_taken_and_counted_lost_are_what_was_published(taken: Taken, hz: int, size: int, count: int) -> None:
+    received, lost = taken_and_lost(taken, hz, size, count)
+    assert received + lost == count
+    assert received > 0
+
+
+def test_what_a_stalled_intake_loses_is_counted(
+    ros_domain: int,  # noqa: ARG001  # for its effect
+) -> None:
+    """The thread is held up for a second in which more comes than the queue holds."""
+    items: list[Any] = []
+    stalled = threading.Event()
+
+    def put(taken: Any) -> None:
+        items.extend(taken)
+        if len(items) > 200 and not stalled.is_set():
+            stalled.set()
+            threading.Event().wait(1.0)
+
+    with intake({"everything": Everything()}, put) as running:
+        running.want(frozenset({"everything"}))
+        received, lost = taken_and_lost(Taken(running, items), 1000, 60, 3000)
+    assert stalled.is_set()
+    assert received + lost == 3000
+    assert lost > 100
+
+
+def taken_and_lost(taken: Taken, hz: int, size: int, count: int) -> tuple[int, int]:
+    """Has another process publish, and returns the numbers when they add up to what it has published."""
+    command = [
+        sys.executable,
+        "-m",
+        "tests.support.publisher_program",
+        "/data",
+        str(hz),
+        str(size),
+        str(count),
+    ]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as publisher:
+        assert publisher.stdout
+        assert publisher.stdin
+        (published,) = json.loads(publisher.stdout.readline())
+        assert published == count
+        wait_until(
+            lambda: len(taken.samples("/data")) + taken.lost("/data") >= published,
+            "taken and lost are what was published",
+        )
+        publisher.stdin.close()
+    return len(taken.samples("/data")), taken.lost("/data")

@@ -1,0 +1,96 @@
+"""The real program between real publishers and a real disk; other programs judge what it leaves."""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.rosbag2 import Reader
+
+from omniseer.gateway.v1 import recording_pb2 as pb
+from tests.support.running_recorder import RecorderProgram, recorder_program
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.ros
+
+TOPIC = "/odom"
+
+
+def read(program: RecorderProgram, made: pb.Recording) -> list[int]:
+    """The numbers in the messages of a recording, by an independent reader of its final files."""
+    folder = program.root / "recordings" / made.id
+    numbers = []
+    for file in made.files:
+        if file.name.endswith(".mcap"):
+            with (folder / file.name).open("rb") as content:
+                reader = make_reader(content, decoder_factories=[DecoderFactory()])
+                decoded = reader.iter_decoded_messages(topics=[TOPIC])
+                numbers += [each.decoded_message.data for each in decoded]
+    return numbers
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> None:
+    from std_msgs.msg import Int64  # noqa: PLC0415
+
+    from tests.support.publishing import publishing  # noqa: PLC0415
+
+    with recorder_program(tmp_path) as program, publishing(TOPIC, Int64) as talker:
+        started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1", label="drive"))
+        wait_until(lambda: talker.heard, "the recorder has subscribed")
+        talker.publish(200)
+        stopped = program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
+        made = program.recording(started.recording.id)
+        assert stopped.recording.state == made.state == pb.RECORDING_STATE_COMPLETE
+        assert read(program, made) == list(range(1, 201))
+        assert made.messages_lost == 0
+        folder = program.root / "recordings" / made.id / "data"
+        assert program.stop() == 0
+    with Reader(folder) as bag:
+        assert bag.topics[TOPIC].msgtype == "std_msgs/msg/Int64"
+        assert bag.topics[TOPIC].msgcount == 200
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_killed_while_it_records_it_goes_on_with_the_same_recording(tmp_path: Path) -> None:
+    """What is lost by it is measured in test_kill.py."""
+    from std_msgs.msg import Int64  # noqa: PLC0415
+
+    from tests.support.publishing import publishing  # noqa: PLC0415
+
+    with recorder_program(tmp_path) as program, publishing(TOPIC, Int64) as talker:
+        started = program.call("StartRecording", pb.StartRecordingRequest(request_id="1"))
+        recording_id = started.recording.id
+
+        def arrives(before: int) -> bool:
+            """Not by the subscriptions: those of the killed one are announced for some seconds still."""
+            talker.publish(1)
+            return program.state.status.messages_written > before
+
+        wait_until(partial(arrives, 0), "messages arrive")
+        program.kill()
+        program.start()
+        wait_until(lambda: program.state.status.recording_id == recording_id, "it goes on")
+        before = program.state.status.messages_written
+        wait_until(partial(arrives, before), "messages arrive again", 60)
+        program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
+        made = program.recording(recording_id)
+        assert made.state == pb.RECORDING_STATE_COMPLETE
+        causes = {gap.cause for gap in made.gaps}
+        assert pb.RECORDING_GAP_CAUSE_INTERRUPTED in causes
+        found = read(program, made)
+        assert found == sorted(set(found))
+        assert len([file for file in made.files if file.name.endswith(".mcap")]) >= 2
+
+
+@pytest.mark.usefixtures("ros_domain")
+def test_a_second_recorder_on_the_folder_ends_with_one_sentence(tmp_path: Path) -> None:
+    with recorder_program(tmp_path) as program:
+        other = RecorderProgram(tmp_path / "other", {"root": str(program.root)})
+        other.directory.mkdir()
+        with pytest.raises(AssertionError, match="another recorder"):
+            other.start()
+        assert other.process
+        assert other.process.wait(5) == 1
+        assert other.log.read_text(encoding="utf-8").count("\n") == 1

@@ -1,0 +1,67 @@
+"""`robot-recorder recover` on what a recorder has left that was cut off."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from common.errors import UserError
+from recorder.cli import app
+from recorder.mcap.reading import summarise
+from recorder.recover_disk import recover_below
+from recorder.requests import StartOptions
+from recorder.store.folder import SEGMENT
+from recorder.store.lock import folder_lock
+from recorder.store.manifest import Manifest, RecordingState, StopReason
+from tests.support.recorder_in_process import Source, running_recorder
+
+
+async def cut_off(root: Path) -> Path:
+    """A folder of recordings as a power cut leaves it; returns the folder of its one recording."""
+    async with running_recorder(root) as running:
+        await running.recorder.start("1", StartOptions())
+        Source(running.queue).send(50)
+        await running.written(50)
+        open_manifest = running.recorder.running
+        assert open_manifest
+        folder = running.recorder.folder_of(open_manifest)
+        part = next((folder / "data").glob("*.part"))
+        content = part.read_bytes()
+    for file in (folder / "data").iterdir():
+        file.unlink()
+    part.write_bytes(content[:-3])
+    open_manifest.write(folder)
+    return folder
+
+
+async def test_a_disk_is_made_whole_without_a_service(tmp_path: Path) -> None:
+    folder = await cut_off(tmp_path)
+    printed = CliRunner().invoke(app, ["recover", str(tmp_path), "--json"])
+    assert printed.exit_code == 0, printed.output
+    (found,) = json.loads(printed.stdout)
+    assert found["file"].endswith(".mcap")
+    assert 0 < found["messages"] <= 50
+    manifest = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
+    assert (manifest.state, manifest.stop_reason) == (RecordingState.RECOVERED, StopReason.INTERRUPTED)
+    assert manifest.messages == found["messages"]
+    assert (folder / "data" / "metadata.yaml").exists()
+    again = CliRunner().invoke(app, ["recover", str(tmp_path)])
+    assert "nothing was cut off" in again.output
+
+
+async def test_one_file_is_enough(tmp_path: Path) -> None:
+    folder = await cut_off(tmp_path)
+    (found,) = recover_below(next((folder / "data").glob("*.part")))
+    assert SEGMENT.fullmatch(f"data/{Path(found.file).name}")
+    summary = summarise(Path(found.file))
+    assert summary
+    assert summary.messages == found.messages > 0
+
+
+def test_what_is_in_use_or_missing_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    with folder_lock(tmp_path), pytest.raises(UserError, match="another recorder"):
+        recover_below(tmp_path)
+    with pytest.raises(UserError, match="does not exist"):
+        recover_below(tmp_path / "nowhere")

@@ -1,0 +1,281 @@
+"""RecorderService over a real socket: every method, its errors, and exports."""
+
+import asyncio
+import hashlib
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import google_crc32c
+import grpc
+import pytest
+
+from common import bind, rpc
+from common.refusal import refusal_in
+from omniseer.gateway.v1 import fault_pb2
+from omniseer.gateway.v1 import recording_pb2 as pb
+from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
+from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
+from recorder.rpc.servicer import RecorderServicer
+from recorder.store.run_bundles import RunBundles
+from tests.support.recorder_in_process import Running, Source, running_recorder
+
+KIB = 1024
+
+
+@dataclass
+class Served:
+    """A recorder behind its socket."""
+
+    stub: Any
+    running: Running
+
+    async def recorded(self, size: int = 1000, messages: int = 10) -> pb.Recording:
+        """A finished recording, with its files."""
+        await self.stub.StartRecording(pb.StartRecordingRequest(request_id=f"start {size}", label="a"))
+        Source(self.running.queue).send(messages, size=size // messages)
+        stopped = await self.stub.StopRecording(pb.StopRecordingRequest(request_id=f"stop {size}"))
+        asked = pb.GetRecordingRequest(recording_id=stopped.recording.id)
+        found: pb.Recording = (await self.stub.GetRecording(asked)).recording
+        return found
+
+
+@asynccontextmanager
+async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
+    async with running_recorder(root / "root", **values) as running:
+        server = rpc.new_server()
+        bundles = RunBundles(running.settings.run_bundles)
+        RecorderServicer(running.recorder, bundles, running.settings).register(server)
+        socket = root / "recorder.sock"
+        bind.bind_unix(server, socket)
+        await server.start()
+        try:
+            async with grpc.aio.insecure_channel(f"unix:{socket}") as channel:
+                yield Served(pb_grpc.RecorderServiceStub(channel), running)
+        finally:
+            await server.stop(None)
+
+
+async def exported(stub: Any, **request: Any) -> tuple[pb.ExportHeader, bytes]:
+    """The header and the bytes of an export, in which every chunk has been checked."""
+    header, content, offset = pb.ExportHeader(), b"", request.get("offset", 0)
+    async for part in stub.ExportRecording(pb.ExportRecordingRequest(**request)):
+        if part.HasField("header"):
+            header = part.header
+            continue
+        chunk = part.chunk
+        assert chunk.offset == offset + len(content)
+        assert 0 < len(chunk.data) <= 256 * KIB
+        assert chunk.crc32c == google_crc32c.value(chunk.data)
+        content += chunk.data
+    return header, content
+
+
+async def refused(call: Any) -> tuple[grpc.StatusCode, str]:
+    with pytest.raises(grpc.aio.AioRpcError) as caught:
+        await call
+    error = caught.value
+    return error.code(), refusal_in(error.trailing_metadata()).reason
+
+
+async def test_a_recording_from_start_to_deletion(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        states = robot.stub.WatchState(recorder_pb.WatchStateRequest())
+        assert (await anext(aiter(states))).status.state == pb.RECORDER_STATE_IDLE
+        made = await robot.recorded()
+        assert made.state == pb.RECORDING_STATE_COMPLETE
+        assert made.messages_written == 10
+        assert made.messages_lost == 0
+        assert [file.name for file in made.files] == ["data/000000.mcap", "data/metadata.yaml"]
+        assert all(file.final and len(file.sha256) == 32 for file in made.files)
+        pinned = await robot.stub.PinRecording(
+            pb.PinRecordingRequest(request_id="pin", recording_id=made.id, pinned=True)
+        )
+        assert pinned.recording.pinned
+        delete: dict[str, Any] = {"recording_id": made.id, "expected_sha256": made.sha256}
+        kept = robot.stub.DeleteRecording(pb.DeleteRecordingRequest(request_id="1", **delete))
+        assert await refused(kept) == (grpc.StatusCode.FAILED_PRECONDITION, "RECORDING_PINNED")
+        await robot.stub.DeleteRecording(pb.DeleteRecordingRequest(request_id="2", force=True, **delete))
+        asked = robot.stub.GetRecording(pb.GetRecordingRequest(recording_id=made.id))
+        assert await refused(asked) == (grpc.StatusCode.NOT_FOUND, "RECORDING_NOT_FOUND")
+
+
+async def test_a_running_recording_shows_what_is_final(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        started = await robot.stub.StartRecording(pb.StartRecordingRequest(request_id="1"))
+        Source(robot.running.queue).send(10)
+        await robot.running.written(10)
+        asked = pb.GetRecordingRequest(recording_id=started.recording.id)
+        running = (await robot.stub.GetRecording(asked)).recording
+        assert running.state == pb.RECORDING_STATE_RECORDING
+        assert running.sha256 == b""
+        assert [(file.name, file.final) for file in running.files] == [("data/000000.mcap", False)]
+        request = pb.ExportRecordingRequest(recording_id=running.id, file="data/000000.mcap")
+        call = robot.stub.ExportRecording(request)
+        assert await refused(anext(aiter(call))) == (
+            grpc.StatusCode.FAILED_PRECONDITION,
+            "FILE_NOT_FINAL",
+        )
+
+
+async def test_an_export_goes_on_where_it_was_cut(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        made = await robot.recorded(2_000_000)
+        file = made.files[0]
+        name = {"recording_id": made.id, "file": file.name}
+        header, whole = await exported(robot.stub, **name)
+        assert (header.size, header.sha256) == (file.size, file.sha256)
+        assert hashlib.sha256(whole).digest() == file.sha256
+        cut = 1_000_001
+        _, rest = await exported(robot.stub, **name, offset=cut, expected_sha256=file.sha256)
+        assert whole[cut:] == rest
+        assert (await exported(robot.stub, **name, offset=file.size))[1] == b""
+        changed = exported(robot.stub, **name, expected_sha256=b"x" * 32)
+        assert await refused(changed) == (grpc.StatusCode.ABORTED, "RECORDING_CHANGED")
+        beyond = exported(robot.stub, **name, offset=file.size + 1)
+        assert await refused(beyond) == (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["../manifest.json", "manifest.json", "/etc/passwd", "data/../manifest.json", "data/000001.mcap", "data"],
+)
+async def test_no_name_leads_out_of_the_recording(tmp_path: Path, file: str) -> None:
+    async with served(tmp_path) as robot:
+        made = await robot.recorded()
+        call = exported(robot.stub, recording_id=made.id, file=file)
+        assert await refused(call) == (grpc.StatusCode.NOT_FOUND, "RECORDING_NOT_FOUND")
+        for hostile in ("..", ".", "/", "../recordings/" + made.id, "\0", made.id + "/"):
+            call = exported(robot.stub, recording_id=hostile, file=made.files[0].name)
+            assert await refused(call) == (grpc.StatusCode.NOT_FOUND, "RECORDING_NOT_FOUND")
+
+
+async def test_bytes_that_the_disk_has_changed_never_arrive_whole(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        made = await robot.recorded(600_000)
+        path = tmp_path / "root" / "recordings" / made.id / made.files[0].name
+        with path.open("r+b") as file:
+            file.seek(300_000)
+            file.write(b"damaged")
+        received: list[bytes] = []
+
+        async def export() -> None:
+            request = pb.ExportRecordingRequest(recording_id=made.id, file=made.files[0].name)
+            async for part in robot.stub.ExportRecording(request):
+                received.append(part.chunk.data)  # noqa: PERF401  # it ends with an error
+
+        assert await refused(export()) == (grpc.StatusCode.DATA_LOSS, "RECORDING_DAMAGED")
+        assert sum(map(len, received)) < made.files[0].size
+        path.unlink()
+        call = exported(robot.stub, recording_id=made.id, file=made.files[0].name)
+        assert await refused(call) == (grpc.StatusCode.DATA_LOSS, "RECORDING_DAMAGED")
+
+
+async def test_a_recording_deleted_while_it_is_exported(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        made = await robot.recorded(3_000_000)
+        request = pb.ExportRecordingRequest(
+            recording_id=made.id, file=made.files[0].name, max_bytes_per_s=1_000_000
+        )
+        call = robot.stub.ExportRecording(request)
+        parts = aiter(call)
+        await anext(parts)
+        await anext(parts)
+        await robot.stub.DeleteRecording(pb.DeleteRecordingRequest(request_id="1", recording_id=made.id))
+
+        async def rest() -> None:
+            async for _ in parts:
+                pass
+
+        assert await refused(rest()) == (grpc.StatusCode.ABORTED, "RECORDING_DELETED")
+
+
+@pytest.mark.timed
+async def test_an_export_keeps_its_rate(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        made = await robot.recorded(1_000_000)
+        began_s = asyncio.get_running_loop().time()
+        await exported(robot.stub, recording_id=made.id, file=made.files[0].name, max_bytes_per_s=500_000)
+        took_s = asyncio.get_running_loop().time() - began_s
+        assert 1.5 < took_s < 4
+
+
+async def test_pages(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        ids = [(await robot.recorded(1000 + number)).id for number in range(5)]
+        found, token = [], ""
+        while True:
+            page = await robot.stub.ListRecordings(pb.ListRecordingsRequest(page_size=2, page_token=token))
+            assert not any(each.files for each in page.recordings)
+            found += [each.id for each in page.recordings]
+            if not (token := page.next_page_token):
+                break
+        assert sorted(found) == sorted(ids)
+        assert page.status.recordings == 5
+        bad = robot.stub.ListRecordings(pb.ListRecordingsRequest(page_token="nonsense"))
+        assert await refused(bad) == (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")
+
+
+async def test_run_bundles_are_listed_and_exported_and_never_changed(tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    bundle = runs / "2026-01-01 first run"
+    (bundle / "video").mkdir(parents=True)
+    (bundle / "manifest.yaml").write_text("run_id: 1\nstate: complete\n", encoding="utf-8")
+    (bundle / "video" / "source.ts").write_bytes(b"ts" * 1000)
+    (bundle / "video" / "outside").symlink_to("/etc/passwd")
+    async with served(tmp_path, run_bundles=[str(runs), str(tmp_path / "missing")]) as robot:
+        (listed,) = (await robot.stub.ListRecordings(pb.ListRecordingsRequest())).recordings
+        assert (listed.kind, listed.label) == (pb.RECORDING_KIND_RUN_BUNDLE, bundle.name)
+        asked = pb.GetRecordingRequest(recording_id=listed.id)
+        whole = (await robot.stub.GetRecording(asked)).recording
+        assert [file.name for file in whole.files] == ["manifest.yaml", "video/source.ts"]
+        _, content = await exported(robot.stub, recording_id=listed.id, file="video/source.ts")
+        assert content == b"ts" * 1000
+        for name in ("video/outside", "../../etc/passwd", "video"):
+            call = exported(robot.stub, recording_id=listed.id, file=name)
+            assert await refused(call) == (grpc.StatusCode.NOT_FOUND, "RECORDING_NOT_FOUND")
+        delete = pb.DeleteRecordingRequest(request_id="1", recording_id=listed.id, force=True)
+        readonly = (grpc.StatusCode.FAILED_PRECONDITION, "RECORDING_READ_ONLY")
+        assert await refused(robot.stub.DeleteRecording(delete)) == readonly
+        pin = pb.PinRecordingRequest(request_id="2", recording_id=listed.id, pinned=True)
+        assert await refused(robot.stub.PinRecording(pin)) == readonly
+    assert (bundle / "video" / "source.ts").exists()
+
+
+async def test_snapshots_and_incidents(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        call = robot.stub.TriggerSnapshot(pb.TriggerSnapshotRequest(request_id="1"))
+        assert await refused(call) == (grpc.StatusCode.FAILED_PRECONDITION, "NO_RING")
+    async with served(tmp_path, ring={"preset": "all"}) as robot:
+        Source(robot.running.queue).send(10)
+        request = pb.TriggerSnapshotRequest(request_id="1", pre_s=5, post_s=0)
+        made = await robot.stub.TriggerSnapshot(request, metadata=[("x-caller", "ann")])
+        assert made.recording.trigger == "ann"
+        wrong = robot.stub.TriggerSnapshot(pb.TriggerSnapshotRequest(request_id="2", preset="odometry"))
+        assert await refused(wrong) == (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")
+        fault = recorder_pb.ReportFaultRequest(fault_id="a.b", severity=fault_pb2.FAULT_SEVERITY_ERROR)
+        incident = await robot.stub.ReportFault(fault)
+        assert incident.recording_id
+        queued = pb.RecordingCopy(state=pb.RECORDING_COPY_STATE_QUEUED)
+        copy = recorder_pb.SetCopyRequest(recording_id=incident.recording_id, copy=queued)
+        await robot.stub.SetCopy(copy)
+        asked = pb.GetRecordingRequest(recording_id=incident.recording_id)
+        assert (await robot.stub.GetRecording(asked)).recording.copy.state == queued.state
+
+
+async def test_a_start_that_makes_no_sense(tmp_path: Path) -> None:
+    async with served(tmp_path) as robot:
+        for request, expected in (
+            (pb.StartRecordingRequest(request_id=""), (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST")),
+            (
+                pb.StartRecordingRequest(request_id="1", preset="../all"),
+                (grpc.StatusCode.INVALID_ARGUMENT, "INVALID_REQUEST"),
+            ),
+            (
+                pb.StartRecordingRequest(request_id="1", with_video=True),
+                (grpc.StatusCode.FAILED_PRECONDITION, "NO_VIDEO"),
+            ),
+        ):
+            assert await refused(robot.stub.StartRecording(request)) == expected

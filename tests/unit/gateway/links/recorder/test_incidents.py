@@ -1,0 +1,89 @@
+"""Which faults are reported to the recorder, and for how long that is tried."""
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+from common.errors import PreconditionError, RecorderUnreachableError
+from common.reasons import Reason
+from gateway.links.recorder.incidents import EXPIRED_S, Incidents
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.faults.recording import OWN
+
+FAULT = Fault(Condition("vision.silent", Severity.ERROR, "vision", "it is silent", "look"), 1.0, 1.0, None, 1)
+
+
+class Calls:
+    """A recorder that can be away."""
+
+    def __init__(self) -> None:
+        self.reported: list[str] = []
+        self.error: Exception | None = None
+        self.tried = asyncio.Event()
+
+    async def report_fault(self, fault: Condition) -> str:
+        self.tried.set()
+        if self.error:
+            raise self.error
+        self.reported.append(fault.fault_id)
+        return ""
+
+
+def of(fault_id: str, **more: Any) -> Fault:
+    return replace(FAULT, condition=replace(FAULT.condition, fault_id=fault_id, **more))
+
+
+async def turns() -> None:
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
+async def test_each_error_is_reported_once_while_it_lasts() -> None:
+    calls: Any = Calls()
+    incidents = Incidents(calls)
+    running = asyncio.create_task(incidents.run())
+    warning = of("preview.fallback", severity=Severity.WARNING)
+    own = of("recording.disk", component=OWN)
+    for _ in range(3):
+        incidents.take([FAULT, warning, own, replace(of("old"), cleared_s=2.0)])
+        await turns()
+    assert calls.reported == ["vision.silent"]
+    incidents.take([])
+    incidents.take([FAULT, replace(warning, condition=replace(warning.condition, severity=Severity.ERROR))])
+    await turns()
+    assert sorted(calls.reported[1:]) == ["preview.fallback", "vision.silent"]
+    running.cancel()
+
+
+async def test_a_recorder_that_is_away_gets_it_later_but_not_too_late() -> None:
+    calls: Any = Calls()
+    calls.error, now = RecorderUnreachableError("gone"), [100.0]
+    incidents = Incidents(calls, lambda: now[0])
+    running = asyncio.create_task(incidents.run())
+    incidents.take([FAULT])
+    await asyncio.wait_for(calls.tried.wait(), 5)
+    calls.error = None
+    calls.tried.clear()
+    await asyncio.wait_for(calls.tried.wait(), 5)
+    await turns()
+    assert (calls.reported, incidents.expired) == (["vision.silent"], 0)
+    calls.error = RecorderUnreachableError("gone")
+    incidents.take([FAULT, of("odometry.silent")])
+    now[0] += EXPIRED_S + 1
+    await turns()
+    assert (calls.reported, incidents.expired) == (["vision.silent"], 1)
+    running.cancel()
+
+
+async def test_a_refusal_is_not_repeated() -> None:
+    calls: Any = Calls()
+    calls.error = PreconditionError("no ring", Reason.NO_RING)
+    incidents = Incidents(calls)
+    running = asyncio.create_task(incidents.run())
+    incidents.take([FAULT])
+    await turns()
+    calls.error = None
+    incidents.take([FAULT])
+    await turns()
+    assert calls.reported == []
+    running.cancel()

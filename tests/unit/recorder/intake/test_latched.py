@@ -1,0 +1,70 @@
+"""Which messages a segment's head repeats."""
+
+from dataclasses import replace
+
+import pytest
+
+from recorder.intake import latched
+from recorder.intake.latched import MAX_MESSAGES, LatchedCache
+from recorder.values import Channel, Sample
+from tests.support.segments import STRING, string_sample
+
+MAP = replace(STRING, topic="/map", latched=True)
+TF = replace(STRING, topic="/tf_static", latched=True)
+
+
+def sample(number: int, text: str, channel: Channel = TF) -> Sample:
+    return replace(string_sample(number, text), channel=channel)
+
+
+def kept(*samples: Sample) -> list[Sample]:
+    cache = LatchedCache()
+    for each in samples:
+        cache.take(each)
+    return list(cache.samples())
+
+
+def test_of_one_publisher_the_newest_stays() -> None:
+    newest = sample(3, "c")
+    assert kept(sample(1, "a"), sample(2, "b"), newest) == [newest]
+
+
+def test_of_several_publishers_the_newest_of_each_stays() -> None:
+    base, arm, lidar = sample(1, "base"), sample(1, "arm"), sample(1, "lidar")
+    assert kept(base, arm, lidar) == [base, arm, lidar]
+
+
+def test_a_publisher_that_repeats_itself_drives_out_no_other() -> None:
+    base, arm = sample(1, "base"), sample(1, "arm")
+    repeated = [sample(number, "base") for number in range(2, 200)]
+    assert kept(base, arm, *repeated) == [arm, repeated[-1]]
+
+
+def test_one_that_changes_replaces_its_own() -> None:
+    arm = sample(1, "arm")
+    assert kept(sample(7, "a"), arm, sample(8, "b"), sample(9, "c")) == [arm, sample(9, "c")]
+
+
+def test_channels_are_kept_apart() -> None:
+    one, other = sample(1, "a", MAP), sample(2, "b", TF)
+    assert kept(one, other) == [one, other]
+
+
+def test_a_flood_of_publishers_is_bounded() -> None:
+    assert len(kept(*(sample(1, f"{number}") for number in range(1000)))) == MAX_MESSAGES
+
+
+def test_bytes_are_bounded_but_each_channel_keeps_its_newest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(latched, "MAX_BYTES", 3000)
+    maps = [sample(1, f"{number}" * 500, MAP) for number in range(9)]
+    tf = sample(1, "small")
+    found = kept(tf, *maps)
+    assert found[0] == tf
+    assert found[-1] == maps[-1]
+    assert sum(len(each.data) for each in found) <= 3000
+    huge = sample(1, "x" * 10_000, MAP)
+    assert kept(tf, huge) == [tf, huge]
+
+
+def test_without_numbers_the_only_one_is_replaced() -> None:
+    assert kept(sample(0, "a"), sample(0, "b")) == [sample(0, "b")]

@@ -1,0 +1,127 @@
+"""Counting what is missing by numbers, with nothing but numbers to go by."""
+
+from collections.abc import Hashable, Sequence
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from recorder.intake.loss import LossCounter
+
+
+def lost(counter: LossCounter, publishers: frozenset[Hashable] | None) -> int:
+    found = counter.collect(publishers)
+    return found.messages if found else 0
+
+
+ONE: frozenset[Hashable] = frozenset({"a"})
+
+
+@pytest.fixture
+def counter() -> LossCounter:
+    counter = LossCounter()
+    counter.collect(ONE)
+    return counter
+
+
+def take(counter: LossCounter, numbers: Sequence[int]) -> None:
+    for number in numbers:
+        counter.take(number, at_ns=number * 10)
+
+
+def test_a_gap_is_counted_once_with_the_times_around_it(counter: LossCounter) -> None:
+    take(counter, [5, 6, 9, 10])
+    found = counter.collect(ONE)
+    assert found
+    assert (found.messages, found.began_ns, found.ended_ns) == (2, 60, 90)
+    assert counter.collect(ONE) is None
+
+
+def test_what_came_before_the_first_message_is_not_lost(counter: LossCounter) -> None:
+    take(counter, [1000, 1001])
+    assert lost(counter, ONE) == 0
+
+
+def test_a_message_that_comes_late_is_not_lost(counter: LossCounter) -> None:
+    take(counter, [1, 2, 5, 4, 6, 3])
+    assert lost(counter, ONE) == 0
+
+
+def test_a_repeated_number_changes_nothing(counter: LossCounter) -> None:
+    take(counter, [1, 2, 2, 3])
+    assert lost(counter, ONE) == 0
+
+
+def test_a_restarted_publisher_has_lost_nothing(counter: LossCounter) -> None:
+    take(counter, range(1, 101))
+    take(counter, range(1, 51))
+    assert lost(counter, frozenset({"b"})) == 0
+    take(counter, [51, 53])
+    assert lost(counter, frozenset({"b"})) == 1
+
+
+def test_a_publisher_that_joins_has_lost_nothing(counter: LossCounter) -> None:
+    take(counter, [1, 2, 700, 3, 701])
+    assert lost(counter, frozenset({"a", "b"})) == 0
+    take(counter, [4, 702, 5, 703])
+    assert lost(counter, frozenset({"a", "b"})) == 0
+    take(counter, [4 + 10, 704 + 10])
+    assert lost(counter, frozenset({"a", "b"})) == 8 + 10
+
+
+def test_a_number_that_starts_again_after_its_greatest_is_a_restart(counter: LossCounter) -> None:
+    take(counter, [2**63 - 2, 2**63 - 1, 1, 2])
+    assert lost(counter, ONE) == 0
+
+
+def test_where_messages_have_no_numbers_nothing_is_counted(counter: LossCounter) -> None:
+    take(counter, [0, 0, 0])
+    assert lost(counter, ONE) == 0
+
+
+def test_without_knowledge_of_the_publishers_nothing_is_counted(counter: LossCounter) -> None:
+    take(counter, [1, 5])
+    assert lost(counter, None) == 0
+
+
+def test_memory_is_bounded_and_the_count_exact(counter: LossCounter) -> None:
+    take(counter, range(1, 200_001, 2))
+    assert lost(counter, ONE) == 99_999
+
+
+def counted_and_lost(beginnings: Sequence[int], dropped: Sequence[bool], order: Random) -> tuple[int, int]:
+    """Lets as many publishers send in any order; the first and the last message of each arrives."""
+    publishers: frozenset[Hashable] = frozenset(range(len(beginnings)))
+    counter = LossCounter()
+    counter.collect(publishers)
+    newest = list(beginnings)
+    for number in beginnings:
+        counter.take(number, 0)
+    for at, drop in enumerate(dropped, 1):
+        chosen = order.randrange(len(newest))
+        newest[chosen] += 1
+        if not drop:
+            counter.take(newest[chosen], at)
+    for number in newest:
+        counter.take(number + 1, 10_000)
+    return lost(counter, publishers), sum(dropped)
+
+
+DROPPED = st.lists(st.booleans(), max_size=200)
+ORDER = st.randoms(use_true_random=False)
+
+
+@settings(deadline=None)
+@given(dropped=DROPPED, apart=st.permutations([1, 1_000, 20_000]), count=st.integers(1, 3), order=ORDER)
+def test_taken_and_lost_are_what_was_published(
+    dropped: list[bool], apart: list[int], count: int, order: Random
+) -> None:
+    counted, missing = counted_and_lost(apart[:count], dropped, order)
+    assert counted == missing
+
+
+@settings(deadline=None)
+@given(sent=st.integers(0, 200), beginnings=st.lists(st.integers(1, 20), min_size=1, max_size=4), order=ORDER)
+def test_where_nothing_was_lost_nothing_is_counted(sent: int, beginnings: list[int], order: Random) -> None:
+    assert counted_and_lost(beginnings, [False] * sent, order) == (0, 0)

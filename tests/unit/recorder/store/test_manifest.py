@@ -1,0 +1,98 @@
+"""Manifests: what they keep, and what is no manifest."""
+
+from pathlib import Path
+
+import pytest
+
+from recorder.store.manifest import (
+    MAX_GAPS,
+    DamagedManifestError,
+    Kind,
+    Manifest,
+    RecordingState,
+    bounded,
+    read_manifest,
+)
+from recorder.values import VIDEO_TOPIC, ChannelSummary, Gap, GapCause, SegmentSummary
+
+ID = "20260101T000000Z-abcdef"
+SEGMENT = {"name": "data/000000.mcap", "size": 1, "sha256": "0" * 64}
+
+
+def manifest(**values: object) -> Manifest:
+    return Manifest.model_validate(
+        {"id": ID, "kind": Kind.MANUAL, "state": RecordingState.COMPLETE, **values}
+    )
+
+
+def summary(messages: int = 3, gaps: tuple[Gap, ...] = ()) -> SegmentSummary:
+    channels = (
+        ChannelSummary("/odom", "nav_msgs/msg/Odometry", "", messages),
+        ChannelSummary(VIDEO_TOPIC, "foxglove_msgs/msg/CompressedVideo", "", 2),
+    )
+    return SegmentSummary(Path("x"), 100, "0" * 64, messages + 2, channels, 5, 9_000_000, gaps)
+
+
+def gap(at_ns: int, messages: int | None = 1, cause: GapCause = GapCause.MIDDLEWARE) -> Gap:
+    return Gap("/odom", cause, at_ns, at_ns, messages)
+
+
+def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
+    folder = tmp_path / ID
+    folder.mkdir()
+    made = manifest(label="a", pinned=True).with_segment("data/000000.mcap", summary(gaps=(gap(1),)))
+    made.write(folder)
+    assert read_manifest(folder) == made
+    assert made.summaries(folder)[0].channels == summary().channels
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b'{"id": "../../etc"}',
+        b"\xff\xfe",
+        manifest(id="20260101T000000Z-000000").model_dump_json().encode(),
+        manifest(segments=[SEGMENT]).model_dump_json().replace("data/", "../../").encode(),
+    ],
+)
+def test_what_is_no_manifest_of_this_recording_is_damaged(tmp_path: Path, content: bytes) -> None:
+    folder = tmp_path / ID
+    folder.mkdir()
+    (folder / "manifest.json").write_bytes(content)
+    with pytest.raises(DamagedManifestError):
+        read_manifest(folder)
+
+
+def test_counts_add_up_and_topics_are_named_once() -> None:
+    made = manifest()
+    for number in range(3):
+        made = made.with_segment(f"data/{number:06d}.mcap", summary(messages=number))
+    made = made.with_segment("data/000002.mcap", summary(messages=10))  # In place of the former one.
+    assert (made.messages, made.video_frames, len(made.topics)) == (0 + 1 + 10 + 6, 6, 2)
+    assert made.next_number == 3
+    assert made.before(1).messages == 2
+    assert made.spanning().ended_unix_ms == 9
+
+
+def test_lost_messages_are_unknown_where_a_part_is() -> None:
+    known = manifest(gaps=[gap(1, 2), gap(2, 3), gap(3, None, GapCause.INTERRUPTED)])
+    assert known.lost == 5
+    assert manifest(gaps=[gap(1, 2), gap(2, None)]).lost is None
+    assert manifest(numbered=False).lost is None
+
+
+def test_gaps_beyond_the_bound_become_one() -> None:
+    kept = bounded([gap(at) for at in range(MAX_GAPS + 500)])
+    assert len(kept) == MAX_GAPS
+    assert sum(each.messages or 0 for each in kept) == MAX_GAPS + 500
+    assert kept[-1].ended_ns == MAX_GAPS + 499
+
+
+def test_the_sum_changes_with_the_files_and_with_nothing_else() -> None:
+    made = manifest().with_segment("data/000000.mcap", summary())
+    assert made.sha256 == made.model_copy(update={"pinned": True, "label": "b"}).sha256
+    assert made.sha256 != made.with_segment("data/000001.mcap", summary()).sha256
+    assert made.model_copy(update={"state": RecordingState.RECORDING}).sha256 == b""

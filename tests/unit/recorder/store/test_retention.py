@@ -1,0 +1,50 @@
+"""What goes first, and what never goes."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from recorder.store.retention import Keepable, in_order
+
+keepables = st.lists(
+    st.builds(
+        Keepable,
+        name=st.uuids().map(str),
+        ended_ns=st.integers(0, 100),
+        ring=st.booleans(),
+        open=st.booleans(),
+        pinned=st.booleans(),
+        to_copy=st.booleans(),
+        copied=st.booleans(),
+    ),
+    unique_by=lambda each: each.name,
+    max_size=30,
+)
+
+
+@given(keepables)
+def test_what_is_open_pinned_or_still_to_be_copied_never_goes(candidates: list[Keepable]) -> None:
+    for each in in_order(candidates):
+        assert not any((each.open, each.pinned, each.to_copy))
+
+
+@given(keepables, st.integers(0, 40))
+def test_there_is_room_whenever_something_may_go(candidates: list[Keepable], needed: int) -> None:
+    """Each takes a unit of room; deleting in order makes enough, or nothing that may go is left."""
+    left, freed = list(candidates), 0
+    for each in in_order(candidates):
+        if freed >= needed:
+            break
+        left.remove(each)
+        freed += 1
+    assert freed >= needed or not any(not (each.open or each.pinned or each.to_copy) for each in left)
+    assert freed <= needed
+
+
+@given(keepables)
+def test_the_ring_first_then_copies_then_the_oldest(candidates: list[Keepable]) -> None:
+    order = in_order(candidates)
+    groups = [0 if each.ring else 1 if each.copied else 2 for each in order]
+    assert groups == sorted(groups)
+    for group in range(3):
+        ages = [each.ended_ns for each, its in zip(order, groups, strict=True) if its == group]
+        assert ages == sorted(ages)

@@ -1,0 +1,40 @@
+"""Answers that outlive a restart."""
+
+from pathlib import Path
+
+import pytest
+
+from common.errors import InvalidRequestError
+from recorder.store.state_file import REMEMBERED_S, Answer, StateFile
+
+
+def answer(at_s: float = 1000.0) -> Answer:
+    return Answer(method="StartRecording", recording_id="a", message="done", at_s=at_s)
+
+
+def test_an_answer_is_given_again_for_ten_minutes_after_a_restart_too(tmp_path: Path) -> None:
+    before = StateFile(tmp_path)
+    before.remember("1", answer())
+    before.measure("driving", 1_000_000)
+    before.write()
+    after = StateFile(tmp_path)
+    after.load()
+    assert after.answered("StartRecording", "1", 1000.0 + REMEMBERED_S - 1) == answer()
+    assert after.answered("StartRecording", "1", 1000.0 + REMEMBERED_S) is None
+    assert after.answered("StartRecording", "2", 1000.0) is None
+    assert after.bytes_per_minute == {"driving": 1_000_000}
+
+
+def test_an_id_stands_for_one_method() -> None:
+    state = StateFile(Path())
+    state.remember("1", answer())
+    with pytest.raises(InvalidRequestError, match="was used for StartRecording"):
+        state.answered("StopRecording", "1", 1000.0)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b'{"answers": 7}'])
+def test_a_damaged_file_counts_as_empty(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "state.json").write_bytes(content)
+    state = StateFile(tmp_path)
+    state.load()
+    assert state.answered("StartRecording", "1", 0.0) is None

@@ -1,0 +1,68 @@
+"""The queue: order, its bound, and what becomes of what does not fit."""
+
+import threading
+import time
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from recorder.values import Channel, GapCause, Loss, Note, Sample
+from recorder.writing.queue import Item, SampleQueue
+
+ODOM, SCAN = (
+    Channel(topic, "std_msgs/msg/String", b"", "", "", latched=False, presets=frozenset())
+    for topic in ("/odom", "/scan")
+)
+
+
+def sample(of: Channel = ODOM, at_ns: int = 0, size: int = 100) -> Sample:
+    return Sample(of, bytes(size), at_ns, at_ns, at_ns, at_ns)
+
+
+def test_what_was_put_comes_out_in_order() -> None:
+    queue = SampleQueue(10_000)
+    loss = Loss(ODOM, GapCause.MIDDLEWARE, 1, 2, 3)
+    items: list[Item] = [sample(at_ns=1), Note("a", {}), loss, sample(SCAN, 4)]
+    queue.put(items)
+    assert queue.take(0) == items
+    assert queue.take(0) == []
+
+
+@given(st.lists(st.tuples(st.sampled_from([ODOM, SCAN]), st.integers(0, 2000)), max_size=60))
+def test_nothing_vanishes_without_a_loss(sent: list[tuple[Channel, int]]) -> None:
+    queue = SampleQueue(5000)
+    queue.put([sample(of, at, size) for at, (of, size) in enumerate(sent)])
+    taken = queue.take(0)
+    for of in (ODOM, SCAN):
+        arrived = sum(isinstance(each, Sample) and each.channel is of for each in taken)
+        losses = [each for each in taken if isinstance(each, Loss) and each.channel is of]
+        assert len(losses) <= 1, "one for each channel"
+        assert arrived + sum(each.messages or 0 for each in losses) == sum(to is of for to, _ in sent)
+    assert queue.dropped == len(sent) - sum(isinstance(each, Sample) for each in taken)
+
+
+def test_a_message_larger_than_the_queue_passes_alone() -> None:
+    queue = SampleQueue(1000)
+    queue.put([sample(size=100_000), sample(at_ns=7)])
+    taken = queue.take(0)
+    assert taken[1] == Loss(ODOM, GapCause.QUEUE, 7, 7, 1)
+
+
+def test_losses_and_notes_of_a_full_queue_are_merged() -> None:
+    queue = SampleQueue(300)
+    queue.put([sample()])
+    queue.put([Loss(ODOM, GapCause.MIDDLEWARE, at, at + 1, 2) for at in range(1000)])
+    queue.put([Note("clock", {"n": str(n)}) for n in range(1000)])
+    _, note, loss = queue.take(0)
+    assert note == Note("clock", {"n": "999"})
+    assert loss == Loss(ODOM, GapCause.MIDDLEWARE, 0, 1000, 2000)
+
+
+def test_a_wake_ends_the_wait() -> None:
+    queue = SampleQueue(1000)
+    timer = threading.Timer(0.05, queue.wake)
+    timer.start()
+    began_s = time.monotonic()
+    assert queue.take(10) == []
+    assert time.monotonic() - began_s < 5
+    timer.join()
