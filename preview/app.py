@@ -43,26 +43,27 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)
     bind.bind_unix(server, settings.socket)
-    await server.start()
-    srt = settings.srt
-    _log.info(
-        "serving on %s; viewers reach the listener at %s, UDP port %d",
-        settings.socket,
-        srt.reached_at,
-        srt.port,
-    )
-    trials = asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials")
-    try:
-        async with _video_tap(settings.video_tap.socket, supervisor):
+    # The tap first: where the server answers, the whole service is up.
+    async with _video_tap(settings.video_tap.socket, supervisor):
+        await server.start()
+        srt = settings.srt
+        _log.info(
+            "serving on %s; viewers reach the listener at %s, UDP port %d",
+            settings.socket,
+            srt.reached_at,
+            srt.port,
+        )
+        trials = asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials")
+        try:
             await supervisor.run(stop)
-    except HungError as error:
-        _end_process(error)
-    finally:
-        await server.stop(rpc.STOP_GRACE_S)
-        trials.cancel()
-        await asyncio.gather(trials, return_exceptions=True)
-        await prober.close()
-        settings.socket.unlink(missing_ok=True)
+        except HungError as error:
+            _end_process(error)
+        finally:
+            await server.stop(rpc.STOP_GRACE_S)
+            trials.cancel()
+            await asyncio.gather(trials, return_exceptions=True)
+            await prober.close()
+            settings.socket.unlink(missing_ok=True)
 
 
 def _video_tap(path: Path | None, supervisor: Supervisor) -> AbstractAsyncContextManager[None]:

@@ -143,7 +143,9 @@ class Runner:
         """Hands each access unit to a recording from now on; None: to none."""
         if self._access_units:
             self._access_units.close()
-        self._access_units = AccessUnits(self._parts.encoded_pad, take) if take else None
+        self._access_units = None
+        if take and not self._ended.done():
+            self._access_units = AccessUnits(self._parts.encoded_pad, take)
         self._controller.set_floor(self._floor_kbps)
 
     def request_key_frame(self, newest_pts: int | None) -> bool:

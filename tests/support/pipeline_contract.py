@@ -156,6 +156,16 @@ class PipelineContract:
         assert await (await pipeline.stop())
         assert events.counts == counts
 
+    async def test_a_recording_that_comes_while_it_is_stopped_gets_nothing(self) -> None:
+        units = list[AccessUnit]()
+        pipeline = self.build(plan_of(LIVE), Events())
+        await pipeline.start()
+        stopped = await pipeline.stop()
+        pipeline.record(units.append)
+        assert await stopped
+        pipeline.record(None)
+        assert not units
+
     async def test_nothing_is_reported_once_it_is_being_stopped(self) -> None:
         events = Events()
         pipeline = self.build(plan_of(LIVE), events)
