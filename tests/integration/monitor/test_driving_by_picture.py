@@ -72,7 +72,7 @@ def test_the_robot_moves_while_a_fresh_picture_is_shown(robot: DrivenRobot, prev
 
 
 def it_moves(window: MonitorWindow, robot: DrivenRobot) -> None:
-    """Holds until the base moves; each time that the robot is inhibited, or the hold lapses, releases first."""
+    """Holds until the base moves; releases first whenever the robot is inhibited, or the hold has lapsed."""
     for _ in range(ATTEMPTS):
         until(lambda: view(window).ready, "the robot may be driven", 40)
         QTest.keyPress(window, Qt.Key.Key_W)
