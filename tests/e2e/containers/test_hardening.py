@@ -15,7 +15,7 @@ USERS = {"gateway": 10001, "preview": 10002, "robot": 10001}
 GROUP = 10000
 WRITABLE = {
     "gateway": {"/tmp", "/dev/shm"},
-    "preview": {"/tmp", "/run/robot-gateway", "/dev/shm"},
+    "preview": {"/tmp", "/run/robot-gateway", "/run/robot-video", "/dev/shm"},
     "robot": {"/tmp", "/dev/shm"},
 }
 _LISTENING = "0A"

@@ -35,9 +35,13 @@ async def copied(port: int, folder: Path, options: ExportOptions | None = None) 
 
 def partly(double: RecorderDouble, after: int) -> Callable[[ExportProgress], None]:
     """Has the recorder rest once so many bytes have arrived; the test then acts, and lets it go on."""
+    rested = False
 
     def progress(now: ExportProgress) -> None:
-        if now.done >= after and not now.cuts:
+        nonlocal rested
+        # Only once: what had arrived by then comes here while the test acts.
+        if now.done >= after and not rested:
+            rested = True
             double.flowing.clear()
 
     return progress

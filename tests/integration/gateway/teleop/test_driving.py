@@ -63,6 +63,11 @@ async def in_phase(session: DriveSession, phase: DrivePhase) -> None:
     await eventually(present, lambda seen: seen is phase, phase.value)
 
 
+async def comes_to_rest(robot: DrivenRobot) -> None:
+    """The robot's answer may overtake what it published: that comes by another thread of this process."""
+    await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
+
+
 async def test_a_hold_moves_the_robot_and_a_release_stops_it(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
@@ -74,7 +79,7 @@ async def test_a_hold_moves_the_robot_and_a_release_stops_it(
         assert (teleop.phase, teleop.holder, teleop.stop) == (DrivePhase.DRIVING, "127.0.0.1", None)
         session.release()
         await in_phase(session, DrivePhase.ARMED)
-        assert not robot.base.moves
+        await comes_to_rest(robot)
     await eventually(lambda: teleop_of(client), lambda it: not it.holder, "no one drives any more")
     assert not robot.base.moves, "the last message is zero"
     assert all(abs(each.vx_mps) <= SPEED_MPS + 1e-6 for each in robot.base.heard)
@@ -90,7 +95,7 @@ async def test_a_session_that_is_left_by_an_error_stops_the_robot(
 
     with pytest.raises(ZeroDivisionError):
         await fails()
-    await eventually(lambda: is_at_rest(robot.base), bool, "the base is at rest")
+    await comes_to_rest(robot)
     assert (await teleop_of(client)).stop is None, "that was a release, not a loss"
 
 
@@ -101,7 +106,7 @@ async def test_hands_that_no_longer_report_are_a_release(
         await in_motion(session, robot.base, SPEED_MPS)
         # From here on the program holds no more, and does not release either.
         await in_phase(session, DrivePhase.ARMED)
-        assert not robot.base.moves
+        await comes_to_rest(robot)
 
 
 async def test_anyone_may_stop_and_only_that_stop_is_reset(
@@ -111,7 +116,7 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         await in_motion(session, robot.base, SPEED_MPS)
         stopped = await client.stop_robot("a child on the track")
         assert stopped.stop.reason == "a child on the track"
-        assert not robot.base.moves or await is_at_rest(robot.base)
+        await comes_to_rest(robot)
         assert (await client.stop_robot("again")).stop.stop_id == stopped.stop.stop_id
         await in_phase(session, DrivePhase.STOPPED)
         session.hold(SPEED_MPS)
