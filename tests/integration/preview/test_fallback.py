@@ -95,6 +95,7 @@ def test_software_on_a_robot_with_hardware_is_a_visible_fault(tmp_path: Path) ->
     ],
 )
 @pytest.mark.timed
+@pytest.mark.alone
 def test_an_encoder_that_fails_at_the_start_is_passed_over(tmp_path: Path, fault: str, words: str) -> None:
     keeps_the_outage(tmp_path, partial(fails_at_the_start, fault, words))
 
@@ -120,6 +121,7 @@ def fails_at_the_start(fault: str, words: str, directory: Path) -> float:
     ],
 )
 @pytest.mark.timed
+@pytest.mark.alone
 def test_a_viewer_gets_frames_again(tmp_path: Path, fault: str, words: str) -> None:
     keeps_the_outage(tmp_path, partial(fails_later, fault, words))
 
@@ -158,6 +160,7 @@ def test_an_encoder_that_hangs_ends_the_process_when_the_preview_is_disabled(tmp
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_a_driver_that_hangs_in_a_profile_change_blocks_nothing(tmp_path: Path) -> None:
     keeps_the_outage(tmp_path, hangs_in_a_profile_change)
 
@@ -183,6 +186,7 @@ def hangs_in_a_profile_change(directory: Path) -> float:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_a_driver_that_hangs_when_a_viewer_joins_blocks_nothing(tmp_path: Path) -> None:
     keeps_the_outage(tmp_path, hangs_when_a_viewer_joins)
 
@@ -202,6 +206,7 @@ def hangs_when_a_viewer_joins(directory: Path) -> float:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_a_driver_that_hangs_when_the_bit_rate_follows_the_link_blocks_nothing(tmp_path: Path) -> None:
     keeps_the_outage(tmp_path, hangs_when_the_bit_rate_follows)
 
