@@ -107,8 +107,8 @@ async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
 async def test_overlapping_snapshots_share_what_is_on_the_disk(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
         source = Source(running.queue)
-        source.send(50)
         await running.until(lambda: running.recorder.ring_part_bytes > 0)
+        source.send(50)
         first = await running.recorder.snapshot("1", SnapshotOptions(pre_s=10, post_s=1), "someone")
         second = await running.recorder.snapshot("2", SnapshotOptions(pre_s=10, post_s=1), "another")
         assert first.recording

@@ -30,7 +30,7 @@ from console.client import (
 from console.client.error_table import error_from
 from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
-from tests.support.driven_robot import BY_EYE, DrivenRobot, in_motion, is_at_rest
+from tests.support.driven_robot import BY_EYE, DrivenRobot, held, in_motion, is_at_rest
 from tests.support.eventually import eventually
 from tests.support.running_gateway import raw_unary
 
@@ -119,14 +119,14 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         await comes_to_rest(robot)
         assert (await client.stop_robot("again")).stop.stop_id == stopped.stop.stop_id
         await in_phase(session, DrivePhase.STOPPED)
-        session.hold(SPEED_MPS)
-        await asyncio.sleep(0.05)
-        for stop_id in (stopped.stop.stop_id, stopped.stop.stop_id + 1):
-            # While the driver holds; and not the stop that there is.
-            session.hold(SPEED_MPS)
-            with pytest.raises(Refused) as refused:
-                await client.reset_stop(stop_id)
-            assert refused.value.reason == Reason.STOP_NOT_RESET
+        session.release()  # The hold has lapsed meanwhile.
+        async with held(session, SPEED_MPS):
+            await asyncio.sleep(0.05)
+            for stop_id in (stopped.stop.stop_id, stopped.stop.stop_id + 1):
+                # While the driver holds; and not the stop that there is.
+                with pytest.raises(Refused) as refused:
+                    await client.reset_stop(stop_id)
+                assert refused.value.reason == Reason.STOP_NOT_RESET
         session.release()
         await asyncio.sleep(0.1)
         await client.reset_stop(stopped.stop.stop_id)
