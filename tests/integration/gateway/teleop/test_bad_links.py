@@ -27,7 +27,7 @@ from tests.support.promise import keeps_async
 from tests.support.tcp_link import TcpLink, needs_tun
 from tests.support.udp_link import Impairment
 
-pytestmark = [pytest.mark.ros, pytest.mark.timed, needs_tun]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone, needs_tun]
 SPEED_MPS = 0.1
 ONE_WAY_S = 0.01
 LOSS = 0.03

@@ -15,7 +15,7 @@ from tests.support.calendar_clock import CalendarClock
 from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_robot, held, in_motion
 from tests.support.promise import keeps_async
 
-pytestmark = [pytest.mark.ros, pytest.mark.timed]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 SPEED_MPS = 0.1
 HOUR_S = 3600
 STEPS_S = (HOUR_S, 0, -HOUR_S)

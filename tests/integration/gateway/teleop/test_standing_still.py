@@ -17,7 +17,7 @@ from tests.support.driven_robot import BY_EYE, DrivenRobot, available, driven_ro
 from tests.support.eventually import eventually
 from tests.support.promise import keeps_async
 
-pytestmark = [pytest.mark.ros, pytest.mark.timed]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 SPEED_MPS = 0.1
 BLOCKED_S = 1.0
 BLOCKS_ITS_LOOP = f"import signal, time; signal.signal(signal.SIGUSR1, lambda *_: time.sleep({BLOCKED_S}))"

@@ -34,7 +34,7 @@ from tests.support.guarded_program import Guarded, guarded_program
 from tests.support.promise import keeps_async
 from tests.support.running_drive import Base
 
-pytestmark = [pytest.mark.ros, pytest.mark.timed]
+pytestmark = [pytest.mark.ros, pytest.mark.timed, pytest.mark.alone]
 ROOT = Path(__file__).parents[4]
 SPEED_MPS = 0.1
 FROZEN_S = 0.3
@@ -166,7 +166,6 @@ async def test_a_lost_gateway_stops_in_time(
     await keeps_async(promised_s, "s of motion after the gateway was lost", measure)
 
 
-@pytest.mark.alone
 async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRobot) -> None:
     async def measure() -> float:
         async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
