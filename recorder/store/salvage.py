@@ -114,7 +114,7 @@ def with_interruption(manifest: Manifest, until_ns: int | None) -> Manifest:
 
     Args:
         manifest: of a recording that was cut off.
-        until_ns: when it goes on, by the calendar clock; None: never, and nobody knows how much is missing.
+        until_ns: when it goes on, by the calendar clock; None: never, and how much is missing is unknown.
     """
     lasts = [each.last_ns for each in manifest.segments if each.last_ns is not None]
     began_ns = max(lasts, default=manifest.started_unix_ms * _NS_PER_MS)

@@ -12,7 +12,6 @@ from recorder.values import VIDEO_TOPIC, Channel, GapCause, Loss, Note, Sample
 from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 
-TOPIC: Final = VIDEO_TOPIC
 FRAME_ID: Final = "preview"
 STREAM_NOTE: Final = "video_stream"
 CLOCK_NOTE: Final = "video_clock"
@@ -45,7 +44,7 @@ def channel(presets: frozenset[str]) -> Channel:
         presets: names of those that record it.
     """
     return Channel(
-        topic=TOPIC,
+        topic=VIDEO_TOPIC,
         type=message.TYPE,
         schema=message.SCHEMA,
         schema_encoding="ros2msg",

@@ -4,32 +4,22 @@ Run with the gateway's address; prints "driving" when the robot moves.
 """
 
 import asyncio
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import AbstractContextManager
+from subprocess import Popen
 from typing import Final
 
 from console.client import AsyncGatewayClient, DriveOptions, DrivePhase, Supervision
+from tests.support.module_program import module_program
 
-_ROOT: Final = Path(__file__).parents[2]
 SPEED_MPS: Final = 0.1
 _ATTEMPT: Final = 100
 """Holds without motion after which the driver releases and holds anew, as a busy machine may need."""
 
 
-@contextmanager
-def driver(target: str) -> Iterator["subprocess.Popen[str]"]:
+def driver(target: str) -> AbstractContextManager[Popen[str]]:
     """A driver in a process of its own; the robot moves when the block begins."""
-    command = [sys.executable, "-m", "tests.support.driver_program", target]
-    with subprocess.Popen(command, cwd=_ROOT, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout
-            assert process.stdout.readline() == "driving\n"
-            yield process
-        finally:
-            process.kill()
+    return module_program("tests.support.driver_program", target, says="driving")
 
 
 async def drive(target: str) -> None:

@@ -9,11 +9,11 @@ process of the service: it has an instance id of its own and counts from 0.
 import asyncio
 import sys
 import uuid
-from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager
 from enum import StrEnum
 from pathlib import Path
-from subprocess import PIPE, Popen
+from subprocess import Popen
 from typing import Any
 
 import grpc
@@ -25,6 +25,7 @@ from omniseer.preview.v1.preview_service_pb2_grpc import (
     PreviewServiceServicer,
     add_PreviewServiceServicer_to_server,
 )
+from tests.support.module_program import module_program
 
 SIGN_OF_LIFE_S = 0.5
 
@@ -140,17 +141,11 @@ async def serve_double(socket: Path, double: PreviewDouble) -> grpc.aio.Server:
     return server
 
 
-@contextmanager
-def double_process(socket: Path, behaviour: Behaviour = Behaviour.WORKS) -> Iterator[Popen[str]]:
-    """A double in a process of its own, to be stopped and killed; serving when this returns."""
-    command = [sys.executable, "-m", "tests.support.preview_double", str(socket), behaviour]
-    with Popen(command, stdout=PIPE, text=True) as process:
-        try:
-            assert process.stdout
-            assert process.stdout.readline() == "serving\n"
-            yield process
-        finally:
-            process.kill()
+def double_process(
+    socket: Path, behaviour: Behaviour = Behaviour.WORKS
+) -> AbstractContextManager[Popen[str]]:
+    """A double in a process of its own, to be stopped and killed; serving when the block begins."""
+    return module_program("tests.support.preview_double", str(socket), behaviour, says="serving")
 
 
 async def _main() -> None:

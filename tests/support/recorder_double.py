@@ -10,11 +10,11 @@ import hashlib
 import sys
 import time
 import uuid
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator
+from contextlib import AbstractContextManager, asynccontextmanager
 from functools import lru_cache
 from pathlib import Path
-from subprocess import PIPE, Popen
+from subprocess import Popen
 from typing import Any, Final
 
 import google_crc32c
@@ -36,6 +36,7 @@ from omniseer.recorder.v1.recorder_service_pb2_grpc import (
     RecorderServiceServicer,
     add_RecorderServiceServicer_to_server,
 )
+from tests.support.module_program import module_program
 
 CHUNK_BYTES: Final = 256 * 1024
 PRESET: Final = "driving"
@@ -357,22 +358,14 @@ async def serving_recorder(socket: Path, double: RecorderDouble) -> AsyncIterato
         await server.stop(0)
 
 
-@contextmanager
-def recorder_process(socket: Path, megabytes: int = 0) -> Iterator[Popen[str]]:
-    """A double in a process of its own, to be stopped and killed; serving when this returns.
+def recorder_process(socket: Path, megabytes: int = 0) -> AbstractContextManager[Popen[str]]:
+    """A double in a process of its own, to be stopped and killed; serving when the block begins.
 
     Args:
         socket: where it serves.
         megabytes: size of the one recording that it has, "bulk", in one file "data/000000.mcap".
     """
-    command = [sys.executable, "-m", "tests.support.recorder_double", str(socket), str(megabytes)]
-    with Popen(command, stdout=PIPE, text=True) as process:
-        try:
-            assert process.stdout
-            assert process.stdout.readline() == "serving\n"
-            yield process
-        finally:
-            process.kill()
+    return module_program("tests.support.recorder_double", str(socket), str(megabytes), says="serving")
 
 
 async def _main() -> None:

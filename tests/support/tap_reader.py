@@ -76,7 +76,7 @@ class TapRecording:
 
 
 class BareReader:
-    """A reader that reads only when it is told to.
+    """A reader that reads only on request.
 
     Args:
         path: of the tap's socket.

@@ -1,8 +1,8 @@
 """What can't be reconciled: the operators' calls, which the recorder answers, and reports of faults."""
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import AsyncGenerator, AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
 from typing import Final
 
 import grpc
@@ -58,14 +58,8 @@ class RecorderCalls:
         timeout_s = _LONGER_S.get(method, _ANSWER_WITHIN_S)
         if remaining_s is not None:
             timeout_s = min(timeout_s, remaining_s)
-        try:
+        with _domain_errors():
             return await self._connected().call(method, request, timeout_s, _metadata(caller))
-        except grpc.aio.AioRpcError as error:
-            raise refused(error) from None
-        except asyncio.CancelledError:
-            if _is_cancelled():
-                raise
-            raise unreachable(_GONE) from None
 
     async def export(self, request: bytes, caller: str) -> AsyncGenerator[bytes]:
         """Passes an export on: yields its responses, serialised, each as it is taken.
@@ -75,14 +69,9 @@ class RecorderCalls:
         """
         stream = self._connected().export(request, _metadata(caller))
         try:
-            async for response in stream:
-                yield response
-        except grpc.aio.AioRpcError as error:
-            raise refused(error) from None
-        except asyncio.CancelledError:
-            if _is_cancelled():
-                raise
-            raise unreachable(_GONE) from None
+            with _domain_errors():
+                async for response in stream:
+                    yield response
         finally:
             stream.cancel()
 
@@ -92,16 +81,10 @@ class RecorderCalls:
         Raises:
             DomainError: the recorder refuses, or does not answer.
         """
-        try:
+        with _domain_errors():
             return await self._connected().report_fault(
                 fault.fault_id, fault.severity, fault.message, _ANSWER_WITHIN_S
             )
-        except grpc.aio.AioRpcError as error:
-            raise refused(error) from None
-        except asyncio.CancelledError:
-            if _is_cancelled():
-                raise
-            raise unreachable(_GONE) from None
 
     def _connected(self) -> RecorderClient:
         if self._client is None:
@@ -111,6 +94,19 @@ class RecorderCalls:
 
 def _metadata(caller: str) -> tuple[tuple[str, str], ...]:
     return (request_id.HEADER, request_id.current()), (_CALLER, caller)
+
+
+@contextmanager
+def _domain_errors() -> Iterator[None]:
+    """Turns the errors of a call into the gateway's own; a task that is cancelled stays cancelled."""
+    try:
+        yield
+    except grpc.aio.AioRpcError as error:
+        raise refused(error) from None
+    except asyncio.CancelledError:
+        if _is_cancelled():
+            raise
+        raise unreachable(_GONE) from None
 
 
 def _is_cancelled() -> bool:

@@ -4,11 +4,8 @@ import asyncio
 import os
 import signal
 import statistics
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,6 +28,7 @@ from tests.support.driven_robot import (
 )
 from tests.support.eventually import eventually
 from tests.support.guarded_program import Guarded, guarded_program
+from tests.support.module_program import module_program
 from tests.support.promise import keeps_async
 from tests.support.running_drive import Base
 
@@ -44,23 +42,6 @@ WATCHERS, STOPS = 100, 60
 THAWS = 3
 
 
-@contextmanager
-def program(module: str, *arguments: str, says: str) -> Iterator["subprocess.Popen[str]"]:
-    """A test's program in a process of its own, which has said that it is ready when the block begins."""
-    command = [sys.executable, "-m", module, *arguments]
-    environment = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT / 'proto/python'}"}
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment)
-    try:
-        assert process.stdout
-        assert process.stdout.readline() == f"{says}\n"
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-        if process.stdout:
-            process.stdout.close()
-
-
 async def stopped_after_s(
     robot: DrivenRobot,
     target: str,
@@ -70,7 +51,7 @@ async def stopped_after_s(
     """How long the base moves after a fault, also if the fault ends; both get the driver's process ID."""
     async with available(robot):
         pass
-    with program("tests.support.driver_program", target, says="driving") as process:
+    with module_program("tests.support.driver_program", target, says="driving") as process:
         await eventually(lambda: moves(robot), bool, "the base moves")
         began_s = time.monotonic()
         fault(process.pid)
@@ -169,7 +150,7 @@ async def test_a_lost_gateway_stops_in_time(
 async def test_a_stop_takes_50_ms_beside_watchers_and_a_flooder(robot: DrivenRobot) -> None:
     async def measure() -> float:
         async with available(robot) as operator, AsyncGatewayClient(robot.target) as viewer:
-            with program("tests.support.status_siege", robot.target, str(WATCHERS), says="ready"):
+            with module_program("tests.support.status_siege", robot.target, str(WATCHERS), says="ready"):
                 took_s = [max(await stop_by(viewer, operator, robot.base)) for _ in range(STOPS)]
         return statistics.quantiles(took_s, n=100)[98]
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.video_tap import Header, Kind, MalformedRecordError
-from recorder.values import GapCause, Loss, Note, Sample
-from recorder.video.stream import CLOCK_NOTE, STREAM_NOTE, TOPIC, Item, Now, Stream, channel
+from recorder.values import VIDEO_TOPIC, GapCause, Loss, Note, Sample
+from recorder.video.stream import CLOCK_NOTE, STREAM_NOTE, Item, Now, Stream, channel
 
 S = 1_000_000_000
 NOW = Now(monotonic_ns=1000 * S, calendar_ns=1_800_000_000 * S)
@@ -57,7 +57,7 @@ def test_an_access_unit_is_stamped_by_both_clocks() -> None:
     run = Run()
     (sample,) = samples(run.unit(at_ns=NOW.monotonic_ns - 5))
     assert sample.channel is CHANNEL
-    assert (sample.channel.topic, sample.channel.presets) == (TOPIC, frozenset({"driving"}))
+    assert (sample.channel.topic, sample.channel.presets) == (VIDEO_TOPIC, frozenset({"driving"}))
     assert sample.publish_time_ns == NOW.calendar_ns - 5
     assert (sample.log_time_ns, sample.monotonic_ns) == (run.now.calendar_ns, run.now.monotonic_ns)
 
