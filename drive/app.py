@@ -1,7 +1,6 @@
 """Assembles the guard and the worker, each of them a process."""
 
 import logging
-import os
 import signal
 import sys
 import time
@@ -15,6 +14,7 @@ from drive.config import DriveSettings
 from drive.endpoint import Endpoint
 from drive.guard import Guard, worker_heartbeats, worker_kills, worker_stops
 from drive.machine import OnLoss, State
+from drive.real_time import lock_memory, raise_priority
 from drive.stop_file import StopFile, Stops, read_stops
 from drive.transport import use_udp
 from drive.values import Latch
@@ -24,8 +24,6 @@ from drive.worker import Worker, new_instance_id
 _log = logging.getLogger(__name__)
 
 _STOP_FILE: Final = "stop.json"
-_REAL_TIME: Final = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-"""Not for the children: a worker that starts has no deadline to keep."""
 _WORKER_PRIORITY: Final = 10
 _GUARD_PRIORITY: Final = 11
 """Above the worker's, which it has to end."""
@@ -48,7 +46,8 @@ def serve(settings: DriveSettings, config_file: Path | None) -> int:
         guard = Guard(command, velocities, settings.on_loss, stop_file, read_stops(path))
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: guard.stop())
-        _raise_priority(_GUARD_PRIORITY)
+        raise_priority(_GUARD_PRIORITY)
+        lock_memory()
         code = guard.run()
     stop_file.close()
     return code
@@ -77,7 +76,8 @@ def work(settings: DriveSettings) -> None:
         # A terminal sends SIGINT to the worker, too; the guard decides.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, stop)
-        _raise_priority(_WORKER_PRIORITY)
+        raise_priority(_WORKER_PRIORITY)
+        lock_memory()
         _log.info("listening on %s", settings.socket)
         worker.run()
     if worker.orphaned:
@@ -97,18 +97,3 @@ def _keep_loss(settings: DriveSettings, state: State) -> None:
         stop_file = StopFile(settings.state_dir / _STOP_FILE)
         stop_file.keep(Stops(latch.stop_id, latch))
         stop_file.close()
-
-
-def _raise_priority(priority: int) -> None:
-    """Asks for real-time priority, which RLIMIT_RTPRIO (`ulimit -r`) permits without privileges.
-
-    For all threads: this one waits for locks of the middleware's, and for the interpreter's lock.
-    """
-    for task in Path("/proc/self/task").iterdir():
-        try:
-            os.sched_setscheduler(int(task.name), _REAL_TIME, os.sched_param(priority))
-        except ProcessLookupError:
-            continue  # It has ended meanwhile.
-        except OSError as error:
-            _log.info("without real-time priority: %s", error.strerror)
-            return

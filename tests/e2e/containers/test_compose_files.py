@@ -46,9 +46,9 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert services[name]["pids_limit"] <= 256
 
 
-def test_real_time_priority_takes_no_privilege() -> None:
+def test_real_time_priority_and_locked_memory_take_no_privilege() -> None:
     drive = config("realtime", profile="drive")["services"]["drive"]
-    assert drive["ulimits"]["rtprio"] == 20
+    assert drive["ulimits"] == {"rtprio": 20, "memlock": -1}
     assert drive["oom_score_adj"] < 0
 
 
