@@ -184,8 +184,8 @@ class Guard:
                     self._take_beat(beat, watch)
                 except DecodeError:
                     return "the worker sends what is no heartbeat, and is killed"
-            elif watch.silent(time.monotonic_ns()):
-                return "no heartbeat of the worker: it is killed"
+            elif watch.silent(now_ns := time.monotonic_ns()):
+                return f"no heartbeat of the worker for {(now_ns - watch.heard_ns) // MS} ms: it is killed"
             if self._end_by_ns is not None and time.monotonic_ns() >= self._end_by_ns:
                 return "the worker does not end, and is killed"
 

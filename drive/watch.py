@@ -20,10 +20,12 @@ class Watch:
     Attributes:
         deadline_ns: when the worker has been silent for too long.
         began: whether there has been a heartbeat.
+        heard_ns: when the last heartbeat came; before the first, when the process was started.
         leased: whether a driver had the lease, or a stop was latched, at the last heartbeat.
     """
 
     deadline_ns: int
+    heard_ns: int
     began: bool = False
     leased: bool = False
     _excused: bool = False
@@ -31,11 +33,12 @@ class Watch:
     @classmethod
     def started(cls, now_ns: int) -> "Watch":
         """Returns the watch of a process that has just been started."""
-        return cls(now_ns + START_NS)
+        return cls(now_ns + START_NS, now_ns)
 
     def beat(self, now_ns: int, *, leased: bool) -> None:
         """Records a heartbeat."""
         self.began, self.leased, self._excused = True, leased, False
+        self.heard_ns = now_ns
         self.deadline_ns = now_ns + (DRIVING_NS if leased else RESTING_NS)
 
     def silent(self, now_ns: int) -> bool:

@@ -111,14 +111,22 @@ def viewing(target: str) -> Iterator[Viewer]:
 async def seen(
     scene: Scene, profile: PreviewProfile = PreviewProfile.BALANCED
 ) -> AsyncIterator[tuple[AsyncGatewayClient, Viewer]]:
-    """A client and a viewer that shows the robot's picture."""
+    """A client and a viewer that shows the robot's picture; no stop is latched."""
     scene.camera.go_on()
-    with viewing(scene.target) as viewer:
+    with viewing(scene.target) as viewer, scene.base.explaining():
         async with AsyncGatewayClient(scene.target) as client:
+            await unlatched(client)
             await client.enable_preview(profile)
             await eventually(lambda: running(client), bool, "the preview runs", PATIENCE_S)
             await eventually(lambda: age_ms(viewer), lambda it: it < 300, "a young picture", PATIENCE_S)
             yield client, viewer
+
+
+async def unlatched(client: AsyncGatewayClient) -> None:
+    """Resets a stop that an earlier test has left."""
+    teleop = (await client.status()).teleop
+    if teleop and teleop.stop:
+        await client.reset_stop(teleop.stop.stop_id)
 
 
 def by_picture(viewer: Viewer) -> DriveOptions:
