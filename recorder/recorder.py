@@ -302,11 +302,12 @@ class Recorder:
             self._fault(f"the folder of recordings can't be read or written: {error.strerror}")
             return
         self._loaded = True
-        self._move(event)
         await self._housekeeping.measure()
-        await self._open_ring()
+        self._move(event)
         if goes_on:
+            # At once: no client may see an idle recorder between the two.
             await self._go_on(goes_on)
+        await self._open_ring()
 
     def _load(self) -> Manifest | None:
         """Reads the disk; in a thread."""

@@ -302,6 +302,7 @@ def test_readers_are_limited_and_have_nothing_to_say(preview: Tapped) -> None:
 
 
 @pytest.mark.timed
+@pytest.mark.alone
 def test_the_tap_adds_a_tenth_of_the_previews_cpu_time_at_most(tmp_path: Path) -> None:
     settings = {
         "source": {"kind": "gst", "description": "videotestsrc is-live=true pattern=ball"},
