@@ -41,6 +41,9 @@ COMMANDS_PER_S: Final = 50
 MAX_UNACKNOWLEDGED: Final = 10
 """Commands on their way on one lane; what would queue behind them is too old to count."""
 LANES: Final = 2
+_LANES_S: Final = 2.5
+"""How long the opening waits for all lanes: a lost first packet of a connection comes again after 1 s, and
+when that is lost, too, in another attempt (RFC 6298 2.1)."""
 _FAREWELL_S: Final = 0.3
 """How long the end of a session waits for its last release to arrive."""
 _FIRST_PAUSE_S: Final = 0.1
@@ -127,7 +130,7 @@ class DriveSession:
         self.state: DriveState | None = None
 
     async def __aenter__(self) -> Self:
-        """Opens the session.
+        """Opens the session; on a bad network, with one lane after _LANES_S, the others as soon as they open.
 
         Raises:
             GatewayError: The robot refuses, or does not answer.
@@ -146,6 +149,8 @@ class DriveSession:
             ),
             asyncio.create_task(self._send(), name="drive commands"),
         ]
+        # One lane alone stands still whenever a packet is lost, and stops the robot without need.
+        await self._changes.wait_until(lambda: self._open_lanes == LANES or self._error is not None, _LANES_S)
         return self
 
     async def __aexit__(
@@ -394,6 +399,7 @@ class DriveSession:
         """
         on_their_way = OnTheirWay()
         self._open_lanes += 1
+        self._changes.notify_all()
         writer = asyncio.create_task(self._write(lane, on_their_way), name="drive lane, commands")
         try:
             while True:

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from console.client import AsyncGatewayClient, DriveOptions, DriveSession, GatewayError, Supervision
+from console.client import (
+    AsyncGatewayClient,
+    DriveOptions,
+    DrivePhase,
+    DriveSession,
+    GatewayError,
+    Supervision,
+)
 from drive.config import DriveSettings
 from tests.support.driving import BEHIND_THE_MUX
 from tests.support.eventually import eventually
@@ -95,7 +102,7 @@ def driven_robot(
 
 
 async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None:
-    """Holds anew until the base has motion; a busy machine may take several attempts."""
+    """Holds anew until base and driver have motion; a busy machine may take several attempts."""
     attempts = 0
 
     async def moves() -> bool:
@@ -105,9 +112,9 @@ async def in_motion(session: DriveSession, base: Base, speed_mps: float) -> None
             await session.ready(within_s=15)
         attempts += 1
         session.hold(speed_mps)
-        return base.moves
+        return base.moves and session.state is not None and session.state.phase is DrivePhase.DRIVING
 
-    await eventually(moves, bool, "the base moves")
+    await eventually(moves, bool, "the base moves, and the driver knows")
 
 
 @asynccontextmanager

@@ -4,6 +4,7 @@ One robot serves all tests of a module: each begins with a driver's own session 
 """
 
 import asyncio
+import socket
 import struct
 import threading
 import time
@@ -27,7 +28,11 @@ from console.client import (
     Overloaded,
     Refused,
 )
+from console.client.driving import LANES
 from console.client.error_table import error_from
+from console.client.options import ClientOptions
+from console.client.transport import GrpcTransport
+from console.credentials import Credentials
 from omniseer.gateway.v1 import robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.teleop_pb2_grpc import TeleopServiceStub
 from tests.support.driven_robot import BY_EYE, DrivenRobot, held, in_motion, is_at_rest
@@ -36,6 +41,7 @@ from tests.support.running_gateway import raw_unary
 
 pytestmark = pytest.mark.ros
 SPEED_MPS = 0.1
+PATIENCE_S = 20
 
 
 @pytest.fixture
@@ -182,7 +188,7 @@ def raw_command(sequence: int, state: Any, *, held: bool) -> Any:
 
 async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     async with client.drive(BY_EYE) as session:
-        await eventually(lambda: _lanes(session), lambda count: count == 2, "two lanes")
+        assert session.open_lanes == LANES, "from the beginning"
         await in_motion(session, robot.base, SPEED_MPS)
         # The test's own hand in the library: only there one lane can be cut.
         session._tasks[1].cancel()
@@ -193,8 +199,22 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
         assert robot.base.moves
 
 
-async def _lanes(session: DriveSession) -> int:
-    return session.open_lanes
+async def test_a_session_opens_though_its_second_lane_does_not(
+    robot: DrivenRobot, client: AsyncGatewayClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its connection is accepted, and never answered."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        session = client.drive(BY_EYE)
+        targets = iter([robot.target])
+        monkeypatch.setattr(
+            session,
+            "_connect",
+            lambda: GrpcTransport(next(targets, address), ClientOptions(), Credentials()),
+        )
+        async with asyncio.timeout(PATIENCE_S), session:
+            assert session.open_lanes == 1
+            await in_motion(session, robot.base, SPEED_MPS)
 
 
 async def test_another_driver_waits_or_takes_over(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
