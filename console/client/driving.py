@@ -137,20 +137,10 @@ class DriveSession:
         """
         self._loop = asyncio.get_running_loop()
         try:
-            lane = await self._first_lane()
+            await self._open()
         except BaseException:
             await self._close()
             raise
-        self._tasks += [
-            asyncio.create_task(self._keep_lane(lane), name="drive lane 1"),
-            *(
-                asyncio.create_task(self._keep_lane(None), name=f"drive lane {number}")
-                for number in range(2, LANES + 1)
-            ),
-            asyncio.create_task(self._send(), name="drive commands"),
-        ]
-        # One lane alone stands still whenever a packet is lost, and stops the robot without need.
-        await self._changes.wait_until(lambda: self._open_lanes == LANES or self._error is not None, _LANES_S)
         return self
 
     async def __aexit__(
@@ -337,6 +327,22 @@ class DriveSession:
         return (self._options.picture() or 0) if self._options.picture else 0
 
     # --- lanes ---
+
+    async def _open(self) -> None:
+        """Opens the first lane, and waits for the others, not for long.
+
+        One alone stands still whenever a packet is lost, and stops the robot without need.
+        """
+        lane = await self._first_lane()
+        self._tasks += [
+            asyncio.create_task(self._keep_lane(lane), name="drive lane 1"),
+            *(
+                asyncio.create_task(self._keep_lane(None), name=f"drive lane {number}")
+                for number in range(2, LANES + 1)
+            ),
+            asyncio.create_task(self._send(), name="drive commands"),
+        ]
+        await self._changes.wait_until(lambda: self._open_lanes == LANES or self._error is not None, _LANES_S)
 
     async def _first_lane(self) -> tuple[GrpcTransport, _Lane]:
         options = self._options

@@ -199,10 +199,11 @@ async def test_one_lane_may_go(robot: DrivenRobot, client: AsyncGatewayClient) -
         assert robot.base.moves
 
 
-async def test_a_session_opens_though_its_second_lane_does_not(
+@pytest.fixture
+def one_lane(
     robot: DrivenRobot, client: AsyncGatewayClient, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its connection is accepted, and never answered."""
+) -> Iterator[DriveSession]:
+    """A session whose second connection is accepted, and never answered."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         session = client.drive(BY_EYE)
@@ -212,9 +213,30 @@ async def test_a_session_opens_though_its_second_lane_does_not(
             "_connect",
             lambda: GrpcTransport(next(targets, address), ClientOptions(), Credentials()),
         )
-        async with asyncio.timeout(PATIENCE_S), session:
-            assert session.open_lanes == 1
-            await in_motion(session, robot.base, SPEED_MPS)
+        yield session
+
+
+async def test_a_session_opens_though_its_second_lane_does_not(
+    robot: DrivenRobot, one_lane: DriveSession
+) -> None:
+    async with asyncio.timeout(PATIENCE_S), one_lane as session:
+        assert session.open_lanes == 1
+        await in_motion(session, robot.base, SPEED_MPS)
+
+
+async def test_a_session_given_up_while_it_opens_leaves_no_driver(
+    client: AsyncGatewayClient, one_lane: DriveSession
+) -> None:
+    opening = asyncio.create_task(one_lane.__aenter__())
+
+    async def holder() -> str:
+        return (await client.status()).teleop.holder
+
+    await eventually(holder, bool, "the first lane has the lease")
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    await eventually(holder, lambda it: not it, "nobody has the lease")
 
 
 async def test_another_driver_waits_or_takes_over(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
