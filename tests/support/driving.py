@@ -28,7 +28,6 @@ _ROOT: Final = Path(__file__).parents[2]
 BEHIND_THE_MUX: Final = "/mecanum_drive_controller/reference"
 _END_S: Final = 10.0
 _ATTEMPTS: Final = 5
-_EXPLAINING_LINES: Final = 20
 
 
 @dataclass
@@ -288,16 +287,6 @@ class Driving:
         wait_until(
             lambda: not self.witness.motion_since(time.monotonic_ns() - 500_000_000), "the robot is at rest"
         )
-
-    @contextmanager
-    def explaining(self) -> Iterator[None]:
-        """Adds what the drive program has logged to an error."""
-        try:
-            yield
-        except BaseException as error:
-            lines = (self.directory / "drive.log").read_text(encoding="utf-8").splitlines()
-            error.add_note("\n".join(["drive.log:", *lines[-_EXPLAINING_LINES:]]))
-            raise
 
     def close(self) -> None:
         """Ends everything that was started here."""

@@ -12,10 +12,8 @@ from PySide6.QtWidgets import QApplication
 from console.client import Supervision
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
-from tests.support.driven_robot import TELEOP
-from tests.support.driving import Driving, driving
+from tests.support.driven_robot import DrivenRobot, driven_robot
 from tests.support.free import free_domain
-from tests.support.gateway_program import gateway_program
 from tests.support.qt import let_pass, until
 from tests.support.virtual_pad import VirtualPad, virtual_pad
 
@@ -26,31 +24,20 @@ LET_GO_MS = 60.0
 """From the event on this computer to a zero behind the multiplexer that no motion follows."""
 
 
-@dataclass
-class Ground:
-    """A whole robot, and a window with a gamepad before it."""
-
-    robot: Driving
-    target: str
-
-
 @pytest.fixture(scope="module")
-def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
-    directory = tmp_path_factory.mktemp("robot")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:
     with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(domain))
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with driving(directory) as robot:
-            teleop = {"socket": str(robot.socket), **TELEOP}
-            with gateway_program(directory, sources=[], teleop=teleop) as gateway:
-                yield Ground(robot, f"127.0.0.1:{gateway.port}")
+        with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
+            yield robot
 
 
 @dataclass
 class Seat:
     """A driver before the window."""
 
-    ground: Ground
+    robot: DrivenRobot
     window: MonitorWindow
     pad: VirtualPad
 
@@ -63,17 +50,17 @@ class Seat:
             let_pass(0.2)
             hold()
             let_pass(0.6)
-            if self.ground.robot.witness.moves():
+            if self.robot.base.moves:
                 return
             let_go()
-        raise AssertionError(f"it does not drive; it is {self.ground.robot.state()}")
+        raise AssertionError(f"it does not drive; it is {self.robot.teleop}")
 
     def stops_within(self, limit_ms: float, act: Callable[[], object]) -> None:
         """The act ends the motion in time."""
-        since_ns = time.monotonic_ns()
+        since_s = time.monotonic()
         act()
         let_pass(0.5)
-        found_ms = self.ground.robot.witness.zero_after_ms(since_ns)
+        found_ms = self.robot.base.stopped_after_s(since_s) * 1000
         print(f"zero after {found_ms:.1f} ms")
         assert found_ms <= limit_ms
 
@@ -93,12 +80,12 @@ class Seat:
 
 
 @pytest.fixture
-def seat(ground: Ground) -> Iterator[Seat]:
-    with virtual_pad() as pad, reading_gamepad() as reader, monitor(ground.target, pad=reader) as window:
+def seat(robot: DrivenRobot) -> Iterator[Seat]:
+    with virtual_pad() as pad, reading_gamepad() as reader, monitor(robot.target, pad=reader) as window:
         window.activateWindow()
         until(window.isActiveWindow, "the window is active")
         until(lambda: window.driving.hands.driveable, "it may be driven")
-        yield Seat(ground, window, pad)
+        yield Seat(robot, window, pad)
 
 
 def test_a_key_is_released(seat: Seat) -> None:

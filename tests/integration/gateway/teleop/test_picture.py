@@ -16,16 +16,14 @@ from console.client import (
     AsyncGatewayClient,
     DriveInhibit,
     DriveOptions,
-    DrivePhase,
     DriveSession,
     PreviewProfile,
     PreviewState,
 )
 from console.receiver.frame import Frame, PixelFormat
 from console.viewer.robot_video import RobotVideo
-from tests.support.driving import Driving, driving
+from tests.support.driven_robot import DrivenRobot, available, driven_robot, in_motion, is_at_rest
 from tests.support.eventually import eventually
-from tests.support.gateway_program import gateway_program
 from tests.support.promise import keeps_async
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
@@ -67,15 +65,10 @@ class Viewer:
 
 @dataclass
 class Scene:
-    """A robot with a camera and a base.
+    """A robot with a camera."""
 
-    Attributes:
-        target: the gateway's address.
-    """
-
-    target: str
     camera: StallingCamera
-    base: Driving
+    robot: DrivenRobot
 
 
 @pytest.fixture(scope="module")
@@ -85,16 +78,11 @@ def scene(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sce
         camera = stack.enter_context(StallingCamera())
         settings = {"source": {"kind": "gst", "description": camera.description}}
         preview = stack.enter_context(RunningPreview(directory, settings))
-        base = stack.enter_context(driving(directory))
-        gateway = stack.enter_context(
-            gateway_program(
-                directory,
-                sources=[],
-                preview={"socket": str(preview.socket)},
-                teleop={"socket": str(base.socket), "allow_insecure": True},
-            )
+        teleop = {"line_of_sight": False, "legacy_clients": False}
+        robot = stack.enter_context(
+            driven_robot(directory, preview={"socket": str(preview.socket)}, teleop=teleop)
         )
-        yield Scene(f"127.0.0.1:{gateway.port}", camera, base)
+        yield Scene(camera, robot)
 
 
 @contextmanager
@@ -113,20 +101,12 @@ async def seen(
 ) -> AsyncIterator[tuple[AsyncGatewayClient, Viewer]]:
     """A client and a viewer that shows the robot's picture; no stop is latched."""
     scene.camera.go_on()
-    with viewing(scene.target) as viewer, scene.base.explaining():
-        async with AsyncGatewayClient(scene.target) as client:
-            await unlatched(client)
+    with viewing(scene.robot.target) as viewer, scene.robot.drive.explaining():
+        async with available(scene.robot) as client:
             await client.enable_preview(profile)
             await eventually(lambda: running(client), bool, "the preview runs", PATIENCE_S)
             await eventually(lambda: age_ms(viewer), lambda it: it < 300, "a young picture", PATIENCE_S)
             yield client, viewer
-
-
-async def unlatched(client: AsyncGatewayClient) -> None:
-    """Resets a stop that an earlier test has left."""
-    teleop = (await client.status()).teleop
-    if teleop and teleop.stop:
-        await client.reset_stop(teleop.stop.stop_id)
 
 
 def by_picture(viewer: Viewer) -> DriveOptions:
@@ -139,20 +119,6 @@ async def running(client: AsyncGatewayClient) -> bool:
 
 async def age_ms(viewer: Viewer) -> float:
     return viewer.video.meter.reading().age_ms or float("inf")
-
-
-async def in_motion(scene: Scene, session: DriveSession, speed_mps: float = SPEED_MPS) -> None:
-    """Holds until the base has motion; anew, where a reason that has gone has ended the hold."""
-    await session.ready(within_s=PATIENCE_S)
-
-    async def moves() -> bool:
-        if session.state and session.state.phase is DrivePhase.INHIBITED:
-            session.release()
-        else:
-            session.hold(speed_mps)
-        return scene.base.witness.moves()
-
-    await eventually(moves, bool, "the base moves")
 
 
 async def held(session: DriveSession, for_s: float) -> set[DriveInhibit]:
@@ -170,7 +136,7 @@ async def held(session: DriveSession, for_s: float) -> set[DriveInhibit]:
 async def test_it_drives_by_what_the_viewer_shows(scene: Scene, profile: PreviewProfile) -> None:
     """No picture that the robot has sent is taken for one that it can't have sent."""
     async with seen(scene, profile) as (client, viewer), client.drive(by_picture(viewer)) as session:
-        await in_motion(scene, session)
+        await in_motion(session, scene.robot.base, SPEED_MPS)
         assert DriveInhibit.PICTURE_MISSING not in await held(session, HOLDS_S)
         assert session.state
         assert session.state.picture_age_ms is not None
@@ -181,7 +147,7 @@ async def test_it_drives_by_what_the_viewer_shows(scene: Scene, profile: Preview
 async def test_a_picture_without_a_successor_stops_the_robot_in_time(scene: Scene, fault: str) -> None:
     async def zero_after_ms() -> float:
         async with seen(scene) as (client, viewer), client.drive(by_picture(viewer)) as session:
-            await in_motion(scene, session)
+            await in_motion(session, scene.robot.base, SPEED_MPS)
             match fault:
                 case "camera silent":
                     scene.camera.stall()
@@ -191,9 +157,8 @@ async def test_a_picture_without_a_successor_stops_the_robot_in_time(scene: Scen
                     viewer.frozen = True
             reasons = await held(session, LONGER_S)
             assert reasons & {DriveInhibit.PICTURE_MISSING, DriveInhibit.PICTURE_STALE}
-            await asyncio.to_thread(scene.base.settled)
-            assert not scene.base.witness.moves(), "the last message is zero"
-            return scene.base.witness.zero_after_ms(viewer.shown_ns)
+            await eventually(lambda: is_at_rest(scene.robot.base), bool, "the last message is zero")
+            return scene.robot.base.stopped_after_s(viewer.shown_ns / 1e9) * 1000
 
     await keeps_async(PROMISED_MS, f"{fault}, ms after the capture of the last picture", zero_after_ms)
 
@@ -213,7 +178,7 @@ async def test_a_picture_that_the_robot_cant_have_sent_is_none(scene: Scene, cam
 
             missing = DriveInhibit.PICTURE_MISSING
             await eventually(inhibits, lambda it: missing in it, "refused", PATIENCE_S)
-            assert not scene.base.witness.moves()
+            assert not scene.robot.base.moves
 
 
 async def test_the_age_of_the_picture_limits_the_speed(scene: Scene) -> None:
@@ -225,11 +190,13 @@ async def test_the_age_of_the_picture_limits_the_speed(scene: Scene) -> None:
             return newest_ns - later_ns if newest_ns else None
 
         async with client.drive(DriveOptions(picture=picture)) as session:
-            await in_motion(scene, session)
-            began_ns = time.monotonic_ns()
+            await in_motion(session, scene.robot.base, SPEED_MPS)
+            began_s = time.monotonic()
             await held(session, HOLDS_S / 2)
-            moving = [speed for ns, speed in scene.base.witness.seen if ns > began_ns and speed]
-            assert max(moving) <= TRAVEL_M / (later_ns / 1e9), "as if the picture had no other age"
+            moving = [each for each in scene.robot.base.heard if each.at_s > began_s and each.moves]
+            assert not any(each.vy_mps or each.wz_rad_s for each in moving)
+            fastest_mps = max(each.vx_mps for each in moving)
+            assert fastest_mps <= TRAVEL_M / (later_ns / 1e9), "as if the picture had no other age"
             assert session.state
             assert session.state.picture_age_ms
             at_this_age_mps = TRAVEL_M / session.state.picture_age_ms * 1000
