@@ -68,7 +68,7 @@ def start(
             max_duration_s=max_s,
             max_bytes=max_mb * 1_000_000,
         )
-    session.show({"ok": True, **json_form(answer)}, answer.message)
+    session.show_answer(answer)
 
 
 @record_app.command("stop")
@@ -83,7 +83,7 @@ def stop(
     """Stop a recording. Exit code 0 as well when it has ended before."""
     with session.connect() as gateway:
         answer = gateway.stop_recording(recording_id)
-    session.show({"ok": True, **json_form(answer)}, answer.message)
+    session.show_answer(answer)
 
 
 @record_app.command("snapshot")
@@ -119,7 +119,7 @@ def snapshot(
     """Keep the last seconds, and the next ones. Ends at once; the robot completes it."""
     with session.connect() as gateway:
         answer = gateway.trigger_snapshot(label, pre_s=before, post_s=after, preset=preset)
-    session.show({"ok": True, **json_form(answer)}, answer.message)
+    session.show_answer(answer)
 
 
 @record_app.command("list")
@@ -172,7 +172,7 @@ def delete(
     with session.connect() as gateway:
         found = gateway.recording(recording_id)
         deleted = gateway.delete_recording(recording_id, expected_sha256=found.sha256, force=force)
-    session.show({"ok": True, **json_form(deleted)}, deleted.message)
+    session.show_answer(deleted)
 
 
 @record_app.command("export")
@@ -246,7 +246,7 @@ def _exported(done: ExportedRecording, recording: Recording) -> str:
 def _pin(session: Session, recording_id: str, *, pinned: bool) -> None:
     with session.connect() as gateway:
         answer = gateway.pin_recording(recording_id, pinned)
-    session.show({"ok": True, **json_form(answer)}, answer.message)
+    session.show_answer(answer)
 
 
 def _list_table(recordings: tuple[Recording, ...]) -> Table:

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import typer
 from rich.console import Console, RenderableType
@@ -15,12 +15,21 @@ from rich.console import Console, RenderableType
 from console.cli.options import GlobalOptions, JsonOption, RobotOption, TargetOption, json_requested
 from console.client import AsyncGatewayClient, GatewayClient
 from console.credentials import Credentials
+from console.presentation.json_form import json_form
 from console.printable import escaped
 from console.robots import Robot, choose, read_credentials, read_robots_file
 from console.target import parse_target
 
 # In a pipe or a file long lines are better than broken ones.
 _WIDTH_OF_A_FILE = 160
+
+
+class Answer(Protocol):
+    """A robot's answer to a call that it has carried out."""
+
+    @property
+    def message(self) -> str:
+        """For people."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +78,10 @@ class Session:
             print_json(self.out, document)
         else:
             self.out.print(view)
+
+    def show_answer(self, answer: Answer) -> None:
+        """Prints the answer as JSON, with "ok", or its message for people."""
+        self.show({"ok": True, **json_form(answer)}, answer.message)
 
 
 def standard_output() -> Console:

@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from console.cli.session import Session, with_session
-from console.presentation.json_form import json_form
 
 ReasonOption = Annotated[
     str, typer.Option("--reason", metavar="TEXT", help="Why, for people; at most 200 characters.")
@@ -20,7 +19,7 @@ def stop(session: Session, *, reason: ReasonOption = "") -> None:
     """Stop the robot until reset-stop, no matter who drives it. Needs the role of a viewer."""
     with session.connect() as gateway:
         stopped = gateway.stop_robot(reason)
-    session.show({"ok": True, **json_form(stopped)}, stopped.message)
+    session.show_answer(stopped)
 
 
 @with_session
@@ -28,4 +27,4 @@ def reset_stop(session: Session, *, stop_id: StopIdArgument) -> None:
     """Reset a stop of the robot. Nothing moves by it; a newer stop stays."""
     with session.connect() as gateway:
         done = gateway.reset_stop(stop_id)
-    session.show({"ok": True, **json_form(done)}, done.message)
+    session.show_answer(done)

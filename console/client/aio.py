@@ -287,12 +287,12 @@ class AsyncGatewayClient:
             max_duration_s=max_duration_s,
             max_bytes=max_bytes,
         )
-        return await self._change_recording(START_RECORDING, request)
+        return await self._call_recording(START_RECORDING, request)
 
     async def stop_recording(self, recording_id: str = "") -> results.RecordingAnswer:
         """Stops a recording, by default the one that runs; waits for its files, but 10 s at the most."""
         request = recording.stop_request(_request_id(), recording_id)
-        return await self._change_recording(STOP_RECORDING, request)
+        return await self._call_recording(STOP_RECORDING, request)
 
     async def trigger_snapshot(
         self,
@@ -313,12 +313,12 @@ class AsyncGatewayClient:
         request = recording.snapshot_request(
             _request_id(), pre_s=pre_s, post_s=post_s, label=label, preset=preset
         )
-        return await self._change_recording(TRIGGER_SNAPSHOT, request)
+        return await self._call_recording(TRIGGER_SNAPSHOT, request)
 
     async def list_recordings(self, page_size: int = 50, page_token: str = "") -> results.RecordingPage:
         """Returns a page of the list, the newest recording first, and the state of the recorder."""
         request = recording.list_request(page_size, page_token)
-        return await self._calls.call(LIST_RECORDINGS, request, self._options.recording_within_s)
+        return await self._call_recording(LIST_RECORDINGS, request)
 
     async def recordings(self) -> AsyncGenerator[results.Recording]:
         """Yields all recordings, the newest first; requests page after page."""
@@ -335,18 +335,18 @@ class AsyncGatewayClient:
 
     async def recording(self, recording_id: str) -> results.Recording:
         """Returns a recording with its files and gaps."""
-        request, within_s = recording.get_request(recording_id), self._options.recording_within_s
-        return (await self._calls.call(GET_RECORDING, request, within_s)).recording
+        request = recording.get_request(recording_id)
+        return (await self._call_recording(GET_RECORDING, request)).recording
 
     async def recording_thumbnail(self, recording_id: str) -> results.RecordingThumbnail:
         """Returns a coded key frame of a recording's video."""
         request = recording.thumbnail_request(recording_id)
-        return await self._calls.call(GET_THUMBNAIL, request, self._options.recording_within_s)
+        return await self._call_recording(GET_THUMBNAIL, request)
 
     async def pin_recording(self, recording_id: str, pinned: bool = True) -> results.RecordingAnswer:
         """Pins a recording, so that making room never deletes it; or ends that."""
         request = recording.pin_request(_request_id(), recording_id, pinned=pinned)
-        return await self._change_recording(PIN_RECORDING, request)
+        return await self._call_recording(PIN_RECORDING, request)
 
     async def delete_recording(
         self, recording_id: str, *, expected_sha256: bytes = b"", force: bool = False
@@ -361,7 +361,7 @@ class AsyncGatewayClient:
         request = recording.delete_request(
             _request_id(), recording_id, expected_sha256=expected_sha256, force=force
         )
-        return await self._change_recording(DELETE_RECORDING, request)
+        return await self._call_recording(DELETE_RECORDING, request)
 
     async def export_recording(
         self, recording_id: str, folder: Path, options: ExportOptions | None = None
@@ -382,7 +382,7 @@ class AsyncGatewayClient:
         found = await self.recording(recording_id)
         return await Export(self._transport, found, folder, options or ExportOptions()).run()
 
-    async def _change_recording(self, method: Method[ResultT], request: bytes) -> ResultT:
+    async def _call_recording(self, method: Method[ResultT], request: bytes) -> ResultT:
         return await self._calls.call(method, request, self._options.recording_within_s)
 
     def _connect(self) -> GrpcTransport:

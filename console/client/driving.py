@@ -482,9 +482,13 @@ def rest_reasons(
 ) -> str:
     """Returns why the robot does not move, for people; empty where there is no reason."""
     if stop:
-        why = f": {stop.reason}" if stop.reason else ""
-        return f"it is stopped by {stop.by}{why} (stop {stop.stop_id})"
+        return f"it is stopped {stopped_by(stop)} (stop {stop.stop_id})"
     return "; ".join(dict.fromkeys([*(SENTENCES[each] for each in inhibits), *problems]))
+
+
+def stopped_by(stop: StopLatch) -> str:
+    """Returns who has stopped the robot, and why, for people: by anna: a child."""
+    return f"by {stop.by}: {stop.reason}" if stop.reason else f"by {stop.by}"
 
 
 SENTENCES: Final = {

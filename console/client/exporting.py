@@ -121,13 +121,16 @@ class ExportTransport(Protocol):
 class _Partial:
     """What has arrived of a file: on the disk as NAME.part, and its digest."""
 
-    path: Path
     stream: IO[bytes]
     size: int = 0
     digest: Any = field(default_factory=hashlib.sha256)
 
     def append(self, data: bytes) -> None:
         self.stream.write(data)
+        self.count(data)
+
+    def count(self, data: bytes) -> None:
+        """Takes in what is on the disk already."""
         self.digest.update(data)
         self.size += len(data)
 
@@ -211,7 +214,7 @@ class Export:
         # Never through a link, which another user of the folder may have put there.
         descriptor = os.open(partial_path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
         with os.fdopen(descriptor, "r+b", buffering=0) as stream:
-            partial = _Partial(partial_path, stream)
+            partial = _Partial(stream)
             await self._take_present(partial, file)
             for _ in range(2):
                 await self._receive(partial, file, number)
@@ -238,8 +241,7 @@ class Export:
     async def _take_present(self, partial: _Partial, file: RecordingFile) -> None:
         """Takes what an earlier export has left."""
         while data := await asyncio.to_thread(partial.stream.read, _READ_BYTES):
-            partial.digest.update(data)
-            partial.size += len(data)
+            partial.count(data)
         if partial.size > file.size:
             partial.empty()
 

@@ -32,7 +32,7 @@ class ClientOptions:
     preview_within_s: float = 8.0
     """Deadline of a preview call: the robot may wait for the pipeline before it answers."""
     recording_within_s: float = 15.0
-    """Deadline of a call that changes a recording: a stop waits up to 10 s for the robot's disk."""
+    """Deadline of a call about recordings: a stop waits up to 10 s for the robot's disk."""
     settle_poll_s: float = 0.1
     """Polling interval of a preview that is starting or stopping."""
     connect_within_s: float = 1.0

@@ -5,7 +5,7 @@ from typing import Final
 
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
-from console.client.driving import SENTENCES
+from console.client.driving import SENTENCES, stopped_by
 from console.client.results import DriveInhibit, FaultSeverity, HealthState, SourceState, TeleopState
 
 LARGEST_SKEW_S: Final = 1.0
@@ -144,10 +144,9 @@ def driving_findings(status: SystemStatus) -> Iterator[Finding]:
     if teleop.state is TeleopState.UNKNOWN:
         return
     if teleop.stop:
-        by = f"the robot is stopped by {teleop.stop.by}"
-        why = f": {teleop.stop.reason}" if teleop.stop.reason else ""
+        what = f"the robot is stopped {stopped_by(teleop.stop)}"
         remedy = f"When it may move again, type: robotctl reset-stop {teleop.stop.stop_id}"
-        yield note("driving", f"{by}{why}", "Nothing moves until that is reset", remedy)
+        yield note("driving", what, "Nothing moves until that is reset", remedy)
         return
     for inhibit in teleop.inhibits:
         if inhibit in _INHIBITED:

@@ -2,10 +2,10 @@
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Coroutine
+from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, suppress
 from dataclasses import replace
-from typing import Any, Final, NoReturn, Protocol
+from typing import Final, NoReturn, Protocol
 
 from common.backoff import Backoff
 from console.client import (
@@ -21,6 +21,7 @@ from console.client import (
 )
 from console.monitor.driver import DriveClient
 from console.monitor.event_log import EventLine, line_of
+from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState
 from console.monitor.snapshot_events import SnapshotEvents
@@ -284,16 +285,3 @@ class Conversation:
 
     def _log(self, lines: list[EventLine]) -> None:
         self._latest.update(lambda state: replace(state, events=state.events.with_lines(lines)))
-
-
-async def first_to_end(*parts: Coroutine[Any, Any, object]) -> None:
-    """Runs coroutines until one ends, then cancels the others. Raises the error of the one that ended."""
-    tasks = [asyncio.create_task(part) for part in parts]
-    try:
-        ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in ended:
-            task.result()
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)

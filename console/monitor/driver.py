@@ -19,6 +19,7 @@ from console.client import (
     Supervision,
 )
 from console.client.results import DriveLimits, RobotStopped, StopReset, TeleopAnswer
+from console.monitor.first_to_end import first_to_end
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.steering import Steering, permitted
@@ -220,16 +221,11 @@ class Driver:
         Raises:
             GatewayError: The session has ended by itself.
         """
-        watching = asyncio.create_task(_until_lost(session))
-        ending = asyncio.create_task(self._ending.wait())
         try:
-            await asyncio.wait((watching, ending), return_when=asyncio.FIRST_COMPLETED)
+            await first_to_end(_until_lost(session), self._ending.wait())
+        except GatewayError:
             if not self._ending.is_set():
-                watching.result()
-        finally:
-            for task in (watching, ending):
-                task.cancel()
-            await asyncio.gather(watching, ending, return_exceptions=True)
+                raise
 
     def _start(self, calls: "set[asyncio.Task[None]]", call: Callable[[], Coroutine[Any, Any, None]]) -> None:
         if len(calls) < _MOST_CALLS:

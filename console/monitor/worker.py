@@ -19,9 +19,10 @@ from console.client import (
     PictureReport,
     parse_target,
 )
-from console.monitor.conversation import Conversation, RetryBackoff, RobotSession, first_to_end
+from console.monitor.conversation import Conversation, RetryBackoff, RobotSession
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
 from console.monitor.driver import Driver
+from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
 from console.monitor.viewer_feedback import ViewerFeedback

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from console.client.driving import SENTENCES
+from console.client.driving import SENTENCES, stopped_by
 from console.client.results import DriveInhibit, DrivePhase, Teleop
 from console.presentation.formatting import joined
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle
@@ -24,8 +24,7 @@ def driving_text(teleop: Teleop) -> str:
     """Returns who drives, or what keeps the robot from being driven and what to do; empty if all is said."""
     drives = f"{teleop.holder} drives" if teleop.holder else ""
     if stop := teleop.stop:
-        why = f": {stop.reason}" if stop.reason else ""
-        return joined(f"by {stop.by}{why}", drives, f"type: robotctl reset-stop {stop.stop_id}")
+        return joined(stopped_by(stop), drives, f"type: robotctl reset-stop {stop.stop_id}")
     if teleop.inhibits:
         reasons = (SENTENCES[inhibit] for inhibit in teleop.inhibits)
         holds = _MOVES_AGAIN if teleop.phase is DrivePhase.INHIBITED else ""

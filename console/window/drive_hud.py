@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from console.presentation.drive_display import DriveDisplay, SpeedBar
-from console.presentation.formatting import joined, signed
+from console.presentation.formatting import signed
 from console.presentation.severity_style import SeverityStyle
 from console.window.gauge import DIM_INK, INK
 from console.window.overlay import Overlay
@@ -40,10 +40,8 @@ class DriveHud(Overlay):
         self.shown = display
         self.setVisible(display is not None)
         if display:
-            ages = joined(display.ages)
-            self.setAccessibleName(
-                ". ".join(filter(None, (display.driver, display.phase, display.reason, ages)))
-            )
+            texts = display.driver, display.phase, display.reason, display.ages
+            self.setAccessibleName(". ".join(filter(None, texts)))
             self.resize(WIDTH_PX, round(self._height(display)))
         self.redraw()
 

@@ -50,7 +50,7 @@ class DrivePlace(QWidget):
         self._lay_out()
         self.stop_place.pressed.connect(self.stop_pressed)
         self.drive.clicked.connect(self.drive_pressed)
-        self.reset.clicked.connect(self._emit_reset)
+        self.reset.clicked.connect(self.press_reset)
         self.setVisible(False)
 
     def show_teleop(self, teleop: Teleop, view: DriverView, latch: StopLatch | None) -> None:
@@ -84,9 +84,6 @@ class DrivePlace(QWidget):
 
     def press_reset(self) -> None:
         """Resets the stop that is shown; no-op without one."""
-        self._emit_reset()
-
-    def _emit_reset(self) -> None:
         if self._latch:
             self.reset_pressed.emit(self._latch.stop_id)
 
