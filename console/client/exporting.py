@@ -126,7 +126,10 @@ class _Partial:
     digest: Any = field(default_factory=hashlib.sha256)
 
     def append(self, data: bytes) -> None:
-        self.stream.write(data)
+        rest = memoryview(data)
+        while rest:
+            # A disk that becomes full takes a part, and refuses only the next write.
+            rest = rest[self.stream.write(rest) :]
         self.count(data)
 
     def count(self, data: bytes) -> None:

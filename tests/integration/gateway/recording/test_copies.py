@@ -1,6 +1,7 @@
 """Copies to this computer, over connections that break: resumed, verified, and never outside their folder."""
 
 import asyncio
+import resource
 from collections.abc import Callable
 from pathlib import Path
 
@@ -115,6 +116,21 @@ async def test_a_part_that_is_damaged_on_this_disk_is_fetched_again(tmp_path: Pa
         await copied(robot.port, tmp_path / "to")
     assert [offset for file, offset in double.exports if file == FILE] == [CHUNK_BYTES, 0]
     assert (folder / FILE).read_bytes() == DATA
+
+
+async def test_a_disk_that_takes_only_a_part_ends_the_export_and_another_goes_on(tmp_path: Path) -> None:
+    # As a disk becomes full, the largest size of a file cuts the last write short.
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    async with recording_robot(tmp_path, robot_with()) as robot:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (len(DATA) - 1, before[1]))
+        try:
+            with pytest.raises(UserError, match="can't be written"):
+                await copied(robot.port, tmp_path / "to")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        assert not (tmp_path / "to/one" / FILE).exists()
+        await copied(robot.port, tmp_path / "to")
+    assert (tmp_path / "to/one" / FILE).read_bytes() == DATA
 
 
 async def test_chunks_that_arrive_damaged_are_fetched_again(tmp_path: Path) -> None:
