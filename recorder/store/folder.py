@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from common.private_files import sync_directory
+from common import private_files
 
 ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
 """Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
@@ -44,15 +44,12 @@ def segment_number(name: str) -> int:
 
 
 def make_directory(directory: Path) -> None:
-    """Makes a directory and its missing parents.
+    """Makes a directory and its missing parents, readable by the group.
 
     Raises:
         OSError: it can't be made.
     """
-    missing = [each for each in (directory, *directory.parents) if not each.exists()]
-    for each in reversed(missing):
-        each.mkdir(mode=_DIRECTORY_MODE, exist_ok=True)
-        sync_directory(each.parent)
+    private_files.make_directory(directory, _DIRECTORY_MODE)
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -72,4 +69,4 @@ def replace_file(path: Path, content: bytes) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-    sync_directory(path.parent)
+    private_files.sync_directory(path.parent)
