@@ -16,10 +16,11 @@ from common import private_files
 
 ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
 """Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
-SEGMENT: Final = re.compile(r"data/\d{6}\.mcap")
-"""A segment's name in a recording's folder."""
 RECORDINGS: Final = "recordings"
 DATA: Final = "data"
+SEGMENT_FILE: Final = re.compile(r"\d{6}\.mcap")
+SEGMENT: Final = re.compile(f"{DATA}/{SEGMENT_FILE.pattern}")
+"""A segment's name in a recording's folder."""
 MANIFEST: Final = "manifest.json"
 METADATA: Final = f"{DATA}/metadata.yaml"
 """rosbag2's file, beside the segments: some readers look for them nowhere else."""
@@ -41,6 +42,22 @@ def segment_name(number: int) -> str:
 def segment_number(name: str) -> int:
     """Returns which segment of its recording has this name."""
     return int(Path(name).stem)
+
+
+def files_named(directory: Path, name: re.Pattern[str], suffix: str = "") -> list[Path]:
+    """Returns the files of a directory whose names, before the suffix, match; in order, without links.
+
+    Raises:
+        OSError: the directory can't be read.
+    """
+    return sorted(
+        path
+        for path in directory.iterdir()
+        if path.name.endswith(suffix)
+        and name.fullmatch(path.name.removesuffix(suffix))
+        and path.is_file()
+        and not path.is_symlink()
+    )
 
 
 def make_directory(directory: Path) -> None:
