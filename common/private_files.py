@@ -37,7 +37,7 @@ def write_all_private(contents: Mapping[Path, bytes]) -> None:
     path = Path()
     try:
         for path, content in contents.items():
-            _make_directory(path.parent)
+            make_directory(path.parent)
             # A symbolic link stays one: its target is replaced. mkstemp creates files with mode 0600.
             target = path.resolve()
             handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
@@ -74,6 +74,22 @@ def sync_directory(directory: Path) -> None:
         os.close(handle)
 
 
+def make_directory(directory: Path, mode: int = PRIVATE_DIRECTORY) -> None:
+    """Makes a directory and its missing parents; afterwards they survive a power loss.
+
+    Args:
+        directory: the last of them.
+        mode: of those that were missing.
+
+    Raises:
+        OSError: one can't be made.
+    """
+    missing = [each for each in (directory, *directory.parents) if not each.exists()]
+    for each in reversed(missing):
+        each.mkdir(mode=mode, exist_ok=True)
+        sync_directory(each.parent)
+
+
 def make_own_directory(directory: Path) -> None:
     """Makes sure that a directory exists, belongs to this user, and is closed to all others (mode 0700).
 
@@ -82,7 +98,7 @@ def make_own_directory(directory: Path) -> None:
     Raises:
         OSError: it can't be made, is a symbolic link, or is another user's or everyone's (sticky).
     """
-    _make_directory(directory)
+    make_directory(directory)
     handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     try:
         status = os.fstat(handle)
@@ -101,7 +117,7 @@ def directory_lock(directory: Path) -> Iterator[None]:
         UserError: it can't be created, or another program holds the lock for more than 5 s.
     """
     try:
-        _make_directory(directory)
+        make_directory(directory)
         handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
         raise _unwritable(directory, error) from error
@@ -111,13 +127,6 @@ def directory_lock(directory: Path) -> Iterator[None]:
     finally:
         # Closing the descriptor releases the lock.
         os.close(handle)
-
-
-def _make_directory(directory: Path) -> None:
-    missing = [each for each in (directory, *directory.parents) if not each.exists()]
-    for each in reversed(missing):
-        each.mkdir(mode=PRIVATE_DIRECTORY, exist_ok=True)
-        sync_directory(each.parent)
 
 
 def _lock(handle: int, directory: Path) -> None:

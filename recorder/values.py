@@ -87,6 +87,10 @@ class Note:
     values: Mapping[str, str]
 
 
+Item = Sample | Loss | Note
+"""What waits to be written."""
+
+
 @dataclass(frozen=True, slots=True)
 class ChannelSummary:
     """One channel of a finished segment."""

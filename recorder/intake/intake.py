@@ -27,7 +27,7 @@ from recorder.intake.qos import is_latched, offered_qos
 from recorder.intake.schemas import ENCODING, Schemas
 from recorder.intake.source import Source
 from recorder.intake.topics import Selects, selected
-from recorder.values import Channel, Loss, Note, Sample
+from recorder.values import Channel, Item
 
 _log = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ _MAX_PROBLEMS: Final = 100
 _MAX_KNOWN: Final = 2000
 """Channels that are remembered, in case their topics come back."""
 
-Put = Callable[[Sequence[Sample | Loss | Note]], None]
+Put = Callable[[Sequence[Item]], None]
 _Key = tuple[str, str]
 """Topic and type."""
 

@@ -10,6 +10,7 @@ from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.recorder import Recorder
+from recorder.requests import Live
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
 from recorder.values import Gap, GapCause
@@ -53,12 +54,6 @@ def recording(recorder: Recorder, manifest: Manifest, *, whole: bool = False) ->
     """
     live = recorder.live(manifest)
     gaps = manifest.all_gaps
-    files = [
-        pb.RecordingFile(name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True)
-        for file in manifest.files
-    ]
-    if live.part:
-        files.append(pb.RecordingFile(name=live.part, size=live.part_bytes))
     message = pb.Recording(
         id=manifest.id,
         label=manifest.label,
@@ -84,14 +79,14 @@ def recording(recorder: Recorder, manifest: Manifest, *, whole: bool = False) ->
         trigger=manifest.trigger,
         pinned=manifest.pinned,
         copy=_copy(manifest.copied),
-        file_count=len(files),
+        file_count=len(manifest.files) + bool(live.part),
         gap_count=len(gaps),
         sha256=manifest.sha256,
     )
     if live.lost is not None:
         message.messages_lost = live.lost
     if whole:
-        message.files.extend(files[:10_000])
+        message.files.extend(_files(manifest, live)[:10_000])
         message.gaps.extend(_gap(each) for each in gaps)
     return message
 
@@ -104,7 +99,7 @@ def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recordi
         label=found.folder.name if found.folder.name.isprintable() else "",
         kind=pb.RECORDING_KIND_RUN_BUNDLE,
         state=RECORDING_STATES[found.state],
-        started_unix_ms=found.began_ns // _NS_PER_MS,
+        started_unix_ms=found.started_unix_ms,
         ended_unix_ms=found.ended_ns // _NS_PER_MS if final else 0,
         duration_ms=(found.ended_ns - found.began_ns) // _NS_PER_MS,
         size=found.size,
@@ -189,6 +184,16 @@ def copy(message: pb.RecordingCopy) -> Copy:
 
 def _copy(value: Copy) -> pb.RecordingCopy:
     return pb.RecordingCopy(state=COPY_STATES[value.state], reason=value.reason, bytes_done=value.bytes_done)
+
+
+def _files(manifest: Manifest, live: Live) -> list[pb.RecordingFile]:
+    files = [
+        pb.RecordingFile(name=file.name, size=file.size, sha256=bytes.fromhex(file.sha256), final=True)
+        for file in manifest.files
+    ]
+    if live.part:
+        files.append(pb.RecordingFile(name=live.part, size=live.part_bytes))
+    return files
 
 
 def _gap(gap: Gap) -> pb.RecordingGap:

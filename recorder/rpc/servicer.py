@@ -22,6 +22,7 @@ from recorder.recorder import Recorder
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
 from recorder.store.export import Content, Pace, UnreadableError, chunks
+from recorder.store.manifest import Manifest
 from recorder.store.run_bundles import Bundle, RunBundles
 from recorder.thumbnail import find_thumbnail
 
@@ -112,16 +113,16 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.ListRecordingsRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.ListRecordingsResponse:
         """Returns a page of the list."""
-        recordings = [mapping.recording(self._recorder, each) for each in self._recorder.recordings]
-        recordings += [mapping.bundle(each) for each in await asyncio.to_thread(self._bundles.all)]
-        recordings.sort(key=_place, reverse=True)
+        bundles = await asyncio.to_thread(self._bundles.all)
+        listed: list[Manifest | Bundle] = [*self._recorder.recordings, *bundles]
+        listed.sort(key=_place, reverse=True)
         if request.page_token:
-            recordings = _after(recordings, request.page_token)
+            listed = _after(listed, request.page_token)
         size = min(request.page_size or _PAGE, _LARGEST_PAGE)
-        page = recordings[:size]
+        page = listed[:size]
         return pb.ListRecordingsResponse(
-            recordings=page,
-            next_page_token=_token(page[-1]) if len(recordings) > size else "",
+            recordings=[self._message(each) for each in page],
+            next_page_token=_token(page[-1]) if len(listed) > size else "",
             status=mapping.status(self._recorder, self._settings),
         )
 
@@ -217,6 +218,9 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     def _recording_of(self, result: Result) -> pb.Recording | None:
         return mapping.recording(self._recorder, result.recording) if result.recording else None
 
+    def _message(self, each: Manifest | Bundle) -> pb.Recording:
+        return mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._recorder, each)
+
     async def _bundle(self, recording_id: str) -> Bundle | None:
         return (
             None
@@ -285,21 +289,21 @@ def _caller(context: grpc.aio.ServicerContext[Any, Any]) -> str:
     return str(named)[:_LONGEST_CALLER]
 
 
-def _place(each: pb.Recording) -> tuple[int, str]:
+def _place(each: Manifest | Bundle) -> tuple[int, str]:
     return each.started_unix_ms, each.id
 
 
-def _token(last: pb.Recording) -> str:
+def _token(last: Manifest | Bundle) -> str:
     return f"{last.started_unix_ms}.{last.id}"
 
 
-def _after(recordings: list[pb.Recording], token: str) -> list[pb.Recording]:
+def _after(listed: list[Manifest | Bundle], token: str) -> list[Manifest | Bundle]:
     """Returns those that follow on the page before, even if its last one has been deleted meanwhile."""
     instant, dot, last = token.partition(".")
     if not (dot and instant.isascii() and instant.isdigit() and last):
         raise InvalidRequestError("page_token is none that this robot has issued")
     place = (int(instant), last)
-    return [each for each in recordings if _place(each) < place]
+    return [each for each in listed if _place(each) < place]
 
 
 def _no_such_file(recording_id: str, name: str) -> NotFoundError:

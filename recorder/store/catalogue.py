@@ -1,7 +1,7 @@
 """All recordings on the disk, by ID: read at the start, then changed with the disk."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,8 @@ from recorder.store.folder import (
     MANIFEST,
     METADATA,
     RECORDINGS,
-    SEGMENT,
+    SEGMENT_FILE,
+    files_named,
     make_directory,
 )
 from recorder.store.manifest import (
@@ -105,7 +106,7 @@ class Catalogue:
         folder = self.folder_of(manifest)
         manifest.model_copy(update={"deleting": True}).write(folder)
         self._manifests.pop(manifest.id, None)
-        parts = list(segments_in(folder, PART))
+        parts = segments_in(folder, PART)
         for path in (*(folder / file.name for file in manifest.files), *parts, folder / METADATA):
             path.unlink(missing_ok=True)
         for name in (_DAMAGED, MANIFEST):
@@ -115,22 +116,18 @@ class Catalogue:
                 directory.rmdir()
 
 
-def segments_in(folder: Path, suffix: str = "") -> Iterator[Path]:
-    """Yields the segments in a recording's folder, in order; with PART, the unfinished ones."""
+def segments_in(folder: Path, suffix: str = "") -> list[Path]:
+    """Returns the segments in a recording's folder, in order; with PART, the unfinished ones."""
     data = folder / DATA
     if data.is_symlink() or not data.is_dir():
-        return
-    for path in sorted(data.iterdir()):
-        plain = path.name.removesuffix(suffix) if suffix else path.name
-        named = SEGMENT.fullmatch(f"{DATA}/{plain}") and path.name == plain + suffix
-        if named and path.is_file() and not path.is_symlink():
-            yield path
+        return []
+    return files_named(data, SEGMENT_FILE, suffix)
 
 
 def _rebuilt(folder: Path, why: str) -> Manifest | None:
     """Returns a manifest made from the segments; None if there are none. The damaged one is kept aside."""
-    finals = list(segments_in(folder))
-    if not finals and not any(segments_in(folder, PART)):
+    finals = segments_in(folder)
+    if not finals and not segments_in(folder, PART):
         return None
     _log.warning("the manifest of recording %s is made anew from its segments: %s", folder.name, why)
     if (folder / MANIFEST).exists():

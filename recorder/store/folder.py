@@ -12,14 +12,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from common.private_files import sync_directory
+from common import private_files
 
 ID: Final = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{6}")
 """Of recordings that the recorder makes: the start by the calendar clock in UTC, and a random part."""
-SEGMENT: Final = re.compile(r"data/\d{6}\.mcap")
-"""A segment's name in a recording's folder."""
 RECORDINGS: Final = "recordings"
 DATA: Final = "data"
+SEGMENT_FILE: Final = re.compile(r"\d{6}\.mcap")
+SEGMENT: Final = re.compile(f"{DATA}/{SEGMENT_FILE.pattern}")
+"""A segment's name in a recording's folder."""
 MANIFEST: Final = "manifest.json"
 METADATA: Final = f"{DATA}/metadata.yaml"
 """rosbag2's file, beside the segments: some readers look for them nowhere else."""
@@ -43,16 +44,29 @@ def segment_number(name: str) -> int:
     return int(Path(name).stem)
 
 
+def files_named(directory: Path, name: re.Pattern[str], suffix: str = "") -> list[Path]:
+    """Returns the files of a directory whose names, before the suffix, match; in order, without links.
+
+    Raises:
+        OSError: the directory can't be read.
+    """
+    return sorted(
+        path
+        for path in directory.iterdir()
+        if path.name.endswith(suffix)
+        and name.fullmatch(path.name.removesuffix(suffix))
+        and path.is_file()
+        and not path.is_symlink()
+    )
+
+
 def make_directory(directory: Path) -> None:
-    """Makes a directory and its missing parents.
+    """Makes a directory and its missing parents, readable by the group.
 
     Raises:
         OSError: it can't be made.
     """
-    missing = [each for each in (directory, *directory.parents) if not each.exists()]
-    for each in reversed(missing):
-        each.mkdir(mode=_DIRECTORY_MODE, exist_ok=True)
-        sync_directory(each.parent)
+    private_files.make_directory(directory, _DIRECTORY_MODE)
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -72,4 +86,4 @@ def replace_file(path: Path, content: bytes) -> None:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-    sync_directory(path.parent)
+    private_files.sync_directory(path.parent)

@@ -13,7 +13,7 @@ from common.private_files import sync_directory
 from recorder.mcap.reading import summarise
 from recorder.mcap.records import PART
 from recorder.mcap.recovery import recover
-from recorder.store.folder import make_directory, segment_name
+from recorder.store.folder import files_named, make_directory, segment_name
 from recorder.store.manifest import Manifest
 from recorder.values import SegmentSummary
 
@@ -71,7 +71,7 @@ class Ring:
         """
         make_directory(self.directory)
         self.segments = []
-        for path in self._named(""):
+        for path in files_named(self.directory, _NAME):
             self._take(path, summarise(path))
         self.recover()
 
@@ -81,7 +81,7 @@ class Ring:
         Raises:
             OSError: the directory can't be read or written.
         """
-        found = [self._take(path, recover(path)) for path in self._named(PART)]
+        found = [self._take(path, recover(path)) for path in files_named(self.directory, _NAME, PART)]
         self.segments.sort(key=lambda each: each.number)
         return [segment for segment in found if segment]
 
@@ -110,17 +110,6 @@ class Ring:
         """Returns how far back the ring reaches."""
         segments = list(self.segments)
         return now_ns - segments[0].began_ns if segments else 0
-
-    def _named(self, suffix: str) -> list[Path]:
-        """Returns the files that are segments by their names, in order."""
-        return sorted(
-            path
-            for path in self.directory.iterdir()
-            if _NAME.fullmatch(path.name.removesuffix(suffix) if suffix else path.name)
-            and path.name.endswith(suffix)
-            and path.is_file()
-            and not path.is_symlink()
-        )
 
     def _take(self, path: Path, summary: SegmentSummary | None) -> RingSegment | None:
         if summary is None or summary.first_ns is None or summary.last_ns is None:

@@ -29,6 +29,7 @@ _STATES: Final = {
     b"in_progress": RecordingState.RECORDING,
     b"incomplete": RecordingState.RECOVERED,
 }
+_NS_PER_MS: Final = 1_000_000
 _MAX_NAME: Final = 255
 """Of a file below its bundle, as requests are limited; one with a longer name is not listed."""
 
@@ -57,6 +58,11 @@ class Bundle:
     def size(self) -> int:
         """Bytes of its files."""
         return sum(file.size for file in self.files)
+
+    @property
+    def started_unix_ms(self) -> int:
+        """When it began, as recordings say it."""
+        return self.began_ns // _NS_PER_MS
 
     @property
     def final(self) -> bool:

@@ -29,7 +29,7 @@ def whole(folder: Path, manifest: Manifest) -> Manifest:
     Raises:
         OSError: the disk is full or fails; what has been made whole by then stays so.
     """
-    for part in list(segments_in(folder, PART)):
+    for part in segments_in(folder, PART):
         name = f"{DATA}/{part.name.removesuffix(PART)}"
         summary = recover(part)
         if summary is None:
@@ -85,7 +85,7 @@ def salvage(catalogue: Catalogue, ring: Iterable[RingSegment], boot_id: str) -> 
     segments = list(ring)
     for manifest in sorted(catalogue.all.values(), key=lambda each: each.id):
         folder = catalogue.folder_of(manifest)
-        if not manifest.state.open and not any(segments_in(folder, PART)):
+        if not manifest.state.open and not segments_in(folder, PART):
             continue
         found = whole(folder, manifest)
         if manifest.window_ns:

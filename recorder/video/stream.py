@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from common.video_tap import Header, Kind, MalformedRecordError, decode_object
-from recorder.values import VIDEO_TOPIC, Channel, GapCause, Loss, Note, Sample
+from recorder.values import VIDEO_TOPIC, Channel, GapCause, Item, Loss, Note, Sample
 from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 
@@ -33,8 +33,6 @@ _QOS: Final = (
     "  avoid_ros_namespace_conventions: false\n"
 )
 """What `ros2 bag play` publishes it with: reliable, volatile."""
-
-Item = Sample | Loss | Note
 
 
 def channel(presets: frozenset[str]) -> Channel:

@@ -20,7 +20,8 @@ from typing import Final, NoReturn
 
 from common.backoff import Backoff
 from common.video_tap import HEADER_BYTES, MalformedRecordError, decode_header
-from recorder.video.stream import Item, Now, Stream, channel
+from recorder.values import Item
+from recorder.video.stream import Now, Stream, channel
 
 _log = logging.getLogger(__name__)
 

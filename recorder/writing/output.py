@@ -8,8 +8,7 @@ from typing import Final
 
 from recorder.mcap.records import PART
 from recorder.mcap.writer import SegmentWriter
-from recorder.values import VIDEO_TOPIC, Channel, GapCause, Loss, Note, Sample, SegmentSummary
-from recorder.writing.queue import Item
+from recorder.values import VIDEO_TOPIC, Channel, GapCause, Item, Loss, Note, Sample, SegmentSummary
 
 CLOCK_STEP_NS: Final = 500_000_000
 """A calendar clock that steps by more than this begins a new segment."""

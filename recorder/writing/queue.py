@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from recorder.values import Channel, GapCause, Loss, Note, Sample
+from recorder.values import Channel, GapCause, Item, Loss, Note, Sample
 
-Item = Sample | Loss | Note
 _OVERHEAD_BYTES: Final = 256
 """Of a message's objects in memory, roughly."""
 

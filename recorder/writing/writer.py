@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from typing import Final, Protocol, TypeVar
 
-from recorder.values import Note, Sample
+from recorder.values import Item, Note, Sample
 from recorder.writing.output import Head, Output
-from recorder.writing.queue import Item, SampleQueue
+from recorder.writing.queue import SampleQueue
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")

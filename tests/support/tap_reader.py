@@ -9,8 +9,7 @@ from types import TracebackType
 from typing import Self
 
 from common.video_tap import HEADER_BYTES, Header, decode_header
-from recorder.values import Loss, Note, Sample
-from recorder.video.stream import Item
+from recorder.values import Item, Loss, Note, Sample
 from recorder.video.tap import Tap
 from tests.support.waiting import wait_until
 

@@ -7,7 +7,7 @@ import pytest
 
 from recorder.intake.intake import Intake, intake
 from recorder.intake.topics import Selects  # noqa: TC001
-from recorder.values import Channel, Loss, Note, Sample
+from recorder.values import Channel, Item, Loss, Sample
 from tests.support.talker import talker
 
 __all__ = ["taken", "talker"]
@@ -32,7 +32,7 @@ class Taken:
     """What the intake has handed over."""
 
     intake: Intake
-    items: list[Sample | Loss | Note] = field(default_factory=list)
+    items: list[Item] = field(default_factory=list)
 
     def samples(self, topic: str) -> list[Sample]:
         return [each for each in list(self.items) if isinstance(each, Sample) and each.channel.topic == topic]
@@ -50,7 +50,7 @@ class Taken:
 
 @pytest.fixture
 def taken(ros_domain: int) -> Iterator[Taken]:  # noqa: ARG001  # for its effect
-    items: list[Sample | Loss | Note] = []
+    items: list[Item] = []
     presets: dict[str, Selects] = {"everything": Everything(), "nothing": Nothing()}
     with intake(presets, items.extend) as running:
         running.want(frozenset({"everything"}))

@@ -112,6 +112,7 @@ async def test_a_running_recording_shows_what_is_final(tmp_path: Path) -> None:
         assert running.state == pb.RECORDING_STATE_RECORDING
         assert running.sha256 == b""
         assert [(file.name, file.final) for file in running.files] == [("data/000000.mcap", False)]
+        assert running.file_count == 1
         request = pb.ExportRecordingRequest(recording_id=running.id, file="data/000000.mcap")
         call = robot.stub.ExportRecording(request)
         assert await refused(anext(aiter(call))) == (
@@ -209,6 +210,7 @@ async def test_pages(tmp_path: Path) -> None:
         while True:
             page = await robot.stub.ListRecordings(pb.ListRecordingsRequest(page_size=2, page_token=token))
             assert not any(each.files for each in page.recordings)
+            assert {each.file_count for each in page.recordings} == {2}
             found += [each.id for each in page.recordings]
             if not (token := page.next_page_token):
                 break

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.video_tap import Header, Kind, MalformedRecordError
-from recorder.values import VIDEO_TOPIC, GapCause, Loss, Note, Sample
-from recorder.video.stream import CLOCK_NOTE, STREAM_NOTE, Item, Now, Stream, channel
+from recorder.values import VIDEO_TOPIC, GapCause, Item, Loss, Note, Sample
+from recorder.video.stream import CLOCK_NOTE, STREAM_NOTE, Now, Stream, channel
 
 S = 1_000_000_000
 NOW = Now(monotonic_ns=1000 * S, calendar_ns=1_800_000_000 * S)

@@ -6,8 +6,8 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from recorder.values import Channel, GapCause, Loss, Note, Sample
-from recorder.writing.queue import Item, SampleQueue
+from recorder.values import Channel, GapCause, Item, Loss, Note, Sample
+from recorder.writing.queue import SampleQueue
 
 ODOM, SCAN = (
     Channel(topic, "std_msgs/msg/String", b"", "", "", latched=False, presets=frozenset())
