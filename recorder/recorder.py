@@ -218,9 +218,10 @@ class Recorder:
     def live(self, manifest: Manifest) -> Live:
         """Returns how far a recording has come, including what of it is not final yet."""
         output = self._output if self._running and self._running.id == manifest.id else None
-        ended_ns = manifest.ended_monotonic_ns or time.monotonic_ns()
-        same_boot = manifest.ended_monotonic_ns or manifest.boot_id == self._boot_id
-        length_ms = (ended_ns - manifest.started_monotonic_ns) // _NS_PER_MS if same_boot else 0
+        ended_ns = manifest.ended_monotonic_ns
+        if manifest.state.open and manifest.boot_id == self._boot_id:
+            ended_ns = ended_ns or time.monotonic_ns()
+        length_ms = (ended_ns - manifest.started_monotonic_ns) // _NS_PER_MS if ended_ns else 0
         calendar_ms = manifest.ended_unix_ms - manifest.started_unix_ms
         duration_ms = max(length_ms or calendar_ms, 0)
         if output is None:

@@ -13,7 +13,7 @@ from common.errors import NotFoundError, PreconditionError, TooMuchError, UserEr
 from recorder.lifecycle import State
 from recorder.requests import StartOptions
 from recorder.store.lock import folder_lock
-from recorder.store.manifest import Copy, CopyState, Manifest, RecordingState, StopReason
+from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from tests.support.recorder_in_process import Running, Source, running_recorder
 
 MIB = 1024 * 1024
@@ -198,3 +198,17 @@ async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_en
         assert running.recorder.running is None
         found = running.recorder.get(done.id)
         assert (found.state, found.stop_reason) == (RecordingState.RECOVERED, StopReason.INTERRUPTED)
+
+
+async def test_a_snapshot_cut_off_in_this_boot_does_not_grow_afterwards(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        done = await recorded(running)
+    an_hour_ago_ns = time.monotonic_ns() - 3600 * 1_000_000_000
+    cut = {"state": RecordingState.RECORDING, "kind": Kind.SNAPSHOT, "stop_reason": None}
+    times = {"started_monotonic_ns": an_hour_ago_ns, "ended_monotonic_ns": 0, "ended_unix_ms": 0}
+    done.model_copy(update=cut | times).write(tmp_path / "recordings" / done.id)
+    async with running_recorder(tmp_path) as running:
+        found = running.recorder.get(done.id)
+        assert found.state is RecordingState.RECOVERED
+        calendar_ms = found.ended_unix_ms - found.started_unix_ms
+        assert running.recorder.live(found).duration_ms == max(calendar_ms, 0)
