@@ -1,8 +1,8 @@
 """What can't be reconciled: the operators' calls, which the recorder answers, and reports of faults."""
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Final
 
 import grpc
@@ -10,7 +10,7 @@ import grpc
 from common import request_id
 from gateway.links.recorder.refusals import refused, unreachable
 from gateway.links.recorder.wire import RecorderClient
-from gateway.links.watch import WatchConnector
+from gateway.links.watch import SharingConnector
 from gateway.status.fault import Condition
 
 _ANSWER_WITHIN_S: Final = 5.0
@@ -21,27 +21,8 @@ _CALLER: Final = "x-caller"
 """Metadata: who calls, for people."""
 
 
-class RecorderCalls:
-    """A connector for the link that uses its connection for calls as well.
-
-    Args:
-        connector: opens the connections.
-    """
-
-    def __init__(self, connector: WatchConnector[RecorderClient]) -> None:
-        self._connector = connector
-        self._client: RecorderClient | None = None
-        """None while there is no connection."""
-
-    @asynccontextmanager
-    async def connect(self) -> AsyncIterator[RecorderClient]:
-        """Yields a connection."""
-        async with self._connector.connect() as client:
-            self._client = client
-            try:
-                yield client
-            finally:
-                self._client = None
+class RecorderCalls(SharingConnector[RecorderClient]):
+    """A connector for the link that uses its connection for the operators' calls as well."""
 
     async def call(self, method: str, request: bytes, caller: str, remaining_s: float | None) -> bytes:
         """Passes a unary call on, and returns the response, both serialised.
