@@ -14,6 +14,8 @@ ResultT = TypeVar("ResultT")
 
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 1.0
+ABSENT: Final = "nothing answers on its socket"
+"""Why a service is lost that can't be reached, for people."""
 
 
 class LinkLostError(Exception):

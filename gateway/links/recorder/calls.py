@@ -10,13 +10,12 @@ import grpc
 from common import request_id
 from gateway.links.recorder.refusals import refused, unreachable
 from gateway.links.recorder.wire import RecorderClient
-from gateway.links.watch import SharingConnector
+from gateway.links.watch import ABSENT, SharingConnector
 from gateway.status.fault import Condition
 
 _ANSWER_WITHIN_S: Final = 5.0
 _LONGER_S: Final[Mapping[str, float]] = {"StartRecording": 10.0, "StopRecording": 12.0}
 """Methods that wait for the disk: a stop answers after 10 s while its files are still being finalised."""
-_GONE: Final = "nothing answers on its socket"
 _CALLER: Final = "x-caller"
 """Metadata: who calls, for people."""
 
@@ -69,7 +68,7 @@ class RecorderCalls(SharingConnector[RecorderClient]):
 
     def _connected(self) -> RecorderClient:
         if self._client is None:
-            raise unreachable(_GONE)
+            raise unreachable(ABSENT)
         return self._client
 
 
@@ -87,7 +86,7 @@ def _domain_errors() -> Iterator[None]:
     except asyncio.CancelledError:
         if _is_cancelled():
             raise
-        raise unreachable(_GONE) from None
+        raise unreachable(ABSENT) from None
 
 
 def _is_cancelled() -> bool:
