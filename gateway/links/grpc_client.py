@@ -6,7 +6,7 @@ from typing import Final
 import grpc
 
 from gateway.links.link import RefusedError
-from gateway.links.watch import LinkLostError
+from gateway.links.watch import ABSENT, LinkLostError
 
 _OPTIONS: Final = (
     # A new attempt is a new connection; gRPC's own backoff (1 s to 120 s), which it shares between the
@@ -35,7 +35,7 @@ def unix_channel(socket: Path, max_message_bytes: int = _MAX_MESSAGE_BYTES) -> g
 def lost(error: grpc.aio.AioRpcError) -> LinkLostError:
     """Returns the error of a broken stream of reports."""
     detail = f"{error.code().name} {error.details()}"
-    return LinkLostError("nothing answers on its socket" if error.code() in GONE else detail, detail)
+    return LinkLostError(ABSENT if error.code() in GONE else detail, detail)
 
 
 def failed(error: grpc.aio.AioRpcError) -> LinkLostError | RefusedError:

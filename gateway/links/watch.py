@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Coroutine
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Final, Generic, NoReturn, Protocol, TypeVar
 
 from common.backoff import Backoff
@@ -14,6 +14,8 @@ ResultT = TypeVar("ResultT")
 
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 1.0
+ABSENT: Final = "nothing answers on its socket"
+"""Why a service is lost that can't be reached, for people."""
 
 
 class LinkLostError(Exception):
@@ -62,6 +64,29 @@ class WatchConnector(Protocol[ClientT_co]):
 
     def connect(self) -> AbstractAsyncContextManager[ClientT_co]:
         """Returns a connection that closes with the block. Raises LinkLostError if it cannot be opened."""
+
+
+class SharingConnector(Generic[ClientT]):
+    """A connector for a link. A subclass uses the connection for calls of its own as well.
+
+    Args:
+        connector: opens the connections.
+    """
+
+    def __init__(self, connector: WatchConnector[ClientT]) -> None:
+        self._connector = connector
+        self._client: ClientT | None = None
+        """None while there is no connection."""
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[ClientT]:
+        """Yields a connection. Raises LinkLostError if it cannot be opened."""
+        async with self._connector.connect() as client:
+            self._client = client
+            try:
+                yield client
+            finally:
+                self._client = None
 
 
 class ServiceWatch(Generic[ClientT, ReportT]):

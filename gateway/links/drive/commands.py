@@ -6,6 +6,7 @@ from typing import Final
 
 from gateway.links.drive.state import DriveCommand
 from gateway.links.drive.wire import DriveClient, DriveConnector, command_message
+from gateway.links.watch import SharingConnector
 from gateway.status.teleop import LeaseEnd
 from omniseer.drive.v1 import drive_pb2 as pb
 
@@ -19,7 +20,7 @@ ENDS: Final = {
 """Total: a test checks it."""
 
 
-class DriveCommands:
+class DriveCommands(SharingConnector[DriveClient]):
     """A connector for the link that uses its connection for the driver's messages as well.
 
     Every method but `connect` returns at once: whether the message is on its way; False without a connection.
@@ -32,21 +33,15 @@ class DriveCommands:
     """
 
     def __init__(self, connector: DriveConnector) -> None:
-        self._connector = connector
-        self._client: DriveClient | None = None
-        """None while there is no connection."""
+        super().__init__(connector)
         self.connection = 0
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[DriveClient]:
         """Yields a connection."""
-        async with self._connector.connect() as client:
-            self._client = client
+        async with super().connect() as client:
             self.connection += 1
-            try:
-                yield client
-            finally:
-                self._client = None
+            yield client
 
     def grant(self, session_id: str, holder: str, *, line_of_sight: bool, streaming: bool) -> bool:
         """Grants the lease to a session, in place of any other."""

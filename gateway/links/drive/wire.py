@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 
 from gateway.links.drive.state import DriveCommand, DriveReport, DriveSpec
 from gateway.links.reconciler import Desired
-from gateway.links.watch import LinkLostError
+from gateway.links.watch import ABSENT, LinkLostError
 from gateway.links.wire_values import same_fields
 from gateway.status.teleop import (
     FOUND_BY_THE_GATEWAY,
@@ -28,7 +28,6 @@ from omniseer.drive.v1 import drive_pb2 as pb
 
 _MAX_PACKET_BYTES: Final = 16 * 1024
 _WELCOME_WITHIN_S: Final = 1.0
-_ABSENT: Final = "nothing answers on its socket"
 
 PHASES: Final[Mapping[int, DrivePhase]] = {pb.Phase.Value(f"PHASE_{each.name}"): each for each in DrivePhase}
 INHIBITS: Final[Mapping[int, DriveInhibit]] = {
@@ -63,7 +62,7 @@ class DriveConnector:
                 # A Unix socket connects at once, or not at all.
                 packets.connect(str(self.path))
             except OSError as error:
-                raise LinkLostError(_ABSENT, f"{self.path}: {error.strerror or error}") from None
+                raise LinkLostError(ABSENT, f"{self.path}: {error.strerror or error}") from None
             client = DriveClient(packets, self.episode_ended)
             loop = asyncio.get_running_loop()
             loop.add_reader(packets, client.read)
@@ -98,7 +97,7 @@ class DriveClient:
         except BlockingIOError:
             return False  # It does not read: it is frozen, and its own guard sees to that.
         except OSError as error:
-            self._lose(LinkLostError(_ABSENT, str(error)))
+            self._lose(LinkLostError(ABSENT, str(error)))
             return False
         return True
 
@@ -115,7 +114,7 @@ class DriveClient:
         except LinkLostError as error:
             self._lose(error)
         except OSError as error:
-            self._lose(LinkLostError(_ABSENT, str(error)))
+            self._lose(LinkLostError(ABSENT, str(error)))
 
     async def welcomed(self, within_s: float) -> None:
         """Waits for the drive program's answer to hello.

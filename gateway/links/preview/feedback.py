@@ -3,13 +3,13 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from typing import Final, NoReturn, Protocol
+from contextlib import asynccontextmanager
+from typing import Final, NoReturn, Protocol, TypeAlias
 
 from common.errors import NotRunningError
 from gateway.links.link import RefusedError, ServiceClient
 from gateway.links.preview.state import PreviewReport, PreviewSpec
-from gateway.links.watch import LinkLostError
+from gateway.links.watch import LinkLostError, SharingConnector, WatchConnector
 from gateway.status.preview import PreviewState, PreviewView
 
 _log = logging.getLogger(__name__)
@@ -33,14 +33,11 @@ class PreviewServiceClient(ServiceClient[PreviewSpec, PreviewReport], Protocol):
         """Reports the age of the oldest picture that a viewer shows."""
 
 
-class PreviewServiceConnector(Protocol):
-    """Opens connections to the preview service."""
-
-    def connect(self) -> AbstractAsyncContextManager[PreviewServiceClient]:
-        """As `Connector.connect`."""
+PreviewServiceConnector: TypeAlias = WatchConnector[PreviewServiceClient]
+"""Opens connections to the preview service."""
 
 
-class Feedback:
+class Feedback(SharingConnector[PreviewServiceClient]):
     """A connector for the link that uses its connection for the viewers' feedback as well.
 
     Args:
@@ -48,22 +45,18 @@ class Feedback:
     """
 
     def __init__(self, connector: PreviewServiceConnector) -> None:
-        self._connector = connector
-        self._client: PreviewServiceClient | None = None
-        """None while there is no connection."""
+        super().__init__(connector)
         self._age_ms = 0
         self._reported = asyncio.Event()
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[PreviewServiceClient]:
         """Yields a connection, and passes ages on while the block lasts."""
-        async with self._connector.connect() as client:
+        async with super().connect() as client:
             passing_on = asyncio.create_task(self._pass_ages_on(client), name="pictures' age")
-            self._client = client
             try:
                 yield client
             finally:
-                self._client = None
                 passing_on.cancel()
                 await asyncio.gather(passing_on, return_exceptions=True)
 

@@ -1,8 +1,8 @@
 """What can't be reconciled: the operators' calls, which the recorder answers, and reports of faults."""
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Final
 
 import grpc
@@ -10,38 +10,18 @@ import grpc
 from common import request_id
 from gateway.links.recorder.refusals import refused, unreachable
 from gateway.links.recorder.wire import RecorderClient
-from gateway.links.watch import WatchConnector
+from gateway.links.watch import ABSENT, SharingConnector
 from gateway.status.fault import Condition
 
 _ANSWER_WITHIN_S: Final = 5.0
 _LONGER_S: Final[Mapping[str, float]] = {"StartRecording": 10.0, "StopRecording": 12.0}
 """Methods that wait for the disk: a stop answers after 10 s while its files are still being finalised."""
-_GONE: Final = "nothing answers on its socket"
 _CALLER: Final = "x-caller"
 """Metadata: who calls, for people."""
 
 
-class RecorderCalls:
-    """A connector for the link that uses its connection for calls as well.
-
-    Args:
-        connector: opens the connections.
-    """
-
-    def __init__(self, connector: WatchConnector[RecorderClient]) -> None:
-        self._connector = connector
-        self._client: RecorderClient | None = None
-        """None while there is no connection."""
-
-    @asynccontextmanager
-    async def connect(self) -> AsyncIterator[RecorderClient]:
-        """Yields a connection."""
-        async with self._connector.connect() as client:
-            self._client = client
-            try:
-                yield client
-            finally:
-                self._client = None
+class RecorderCalls(SharingConnector[RecorderClient]):
+    """A connector for the link that uses its connection for the operators' calls as well."""
 
     async def call(self, method: str, request: bytes, caller: str, remaining_s: float | None) -> bytes:
         """Passes a unary call on, and returns the response, both serialised.
@@ -88,7 +68,7 @@ class RecorderCalls:
 
     def _connected(self) -> RecorderClient:
         if self._client is None:
-            raise unreachable(_GONE)
+            raise unreachable(ABSENT)
         return self._client
 
 
@@ -106,7 +86,7 @@ def _domain_errors() -> Iterator[None]:
     except asyncio.CancelledError:
         if _is_cancelled():
             raise
-        raise unreachable(_GONE) from None
+        raise unreachable(ABSENT) from None
 
 
 def _is_cancelled() -> bool:

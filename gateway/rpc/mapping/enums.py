@@ -38,16 +38,15 @@ def _by_name(domain: type[_MemberT], wire: Any, prefix: str) -> dict[_MemberT, A
     return {member: wire.Value(f"{prefix}_{member.name}") for member in domain}
 
 
+def _or_none(domain: type[_MemberT], wire: Any, prefix: str) -> Mapping[_MemberT | None, Any]:
+    """As `_by_name`, and UNSPECIFIED for None."""
+    return {None: wire.Value(f"{prefix}_UNSPECIFIED")} | _by_name(domain, wire, prefix)
+
+
 PREVIEW_STATES: Final = _by_name(PreviewState, states_pb2.PreviewState, "PREVIEW")
-PROFILES: Final[Mapping[Profile | None, Any]] = {None: preview_pb2.PREVIEW_PROFILE_UNSPECIFIED} | _by_name(
-    Profile, preview_pb2.PreviewProfile, "PREVIEW_PROFILE"
-)
-CODECS: Final[Mapping[Codec | None, Any]] = {None: preview_pb2.VIDEO_CODEC_UNSPECIFIED} | _by_name(
-    Codec, preview_pb2.VideoCodec, "VIDEO_CODEC"
-)
-DELIVERIES: Final[Mapping[Delivery | None, Any]] = {
-    None: preview_pb2.PICTURE_DELIVERY_UNSPECIFIED
-} | _by_name(Delivery, preview_pb2.PictureDelivery, "PICTURE_DELIVERY")
+PROFILES: Final = _or_none(Profile, preview_pb2.PreviewProfile, "PREVIEW_PROFILE")
+CODECS: Final = _or_none(Codec, preview_pb2.VideoCodec, "VIDEO_CODEC")
+DELIVERIES: Final = _or_none(Delivery, preview_pb2.PictureDelivery, "PICTURE_DELIVERY")
 HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")
 SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
 SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
@@ -57,15 +56,11 @@ DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")
 DRIVE_INHIBITS: Final = _by_name(DriveInhibit, teleop_pb2.DriveInhibit, "DRIVE_INHIBIT")
 RECORDER_STATES: Final = _by_name(RecorderState, recording_pb2.RecorderState, "RECORDER_STATE")
 RECORDING_CHANGES: Final = _by_name(RecordingChange, event_pb2.RecordingChange, "RECORDING_CHANGE")
-RECORDING_KINDS: Final[Mapping[RecordingKind | None, Any]] = {
-    None: recording_pb2.RECORDING_KIND_UNSPECIFIED
-} | _by_name(RecordingKind, recording_pb2.RecordingKind, "RECORDING_KIND")
-RECORDING_STATES: Final[Mapping[RecordingState | None, Any]] = {
-    None: recording_pb2.RECORDING_STATE_UNSPECIFIED
-} | _by_name(RecordingState, recording_pb2.RecordingState, "RECORDING_STATE")
-RECORDING_STOP_REASONS: Final[Mapping[RecordingStopReason | None, Any]] = {
-    None: recording_pb2.RECORDING_STOP_REASON_UNSPECIFIED
-} | _by_name(RecordingStopReason, recording_pb2.RecordingStopReason, "RECORDING_STOP_REASON")
+RECORDING_KINDS: Final = _or_none(RecordingKind, recording_pb2.RecordingKind, "RECORDING_KIND")
+RECORDING_STATES: Final = _or_none(RecordingState, recording_pb2.RecordingState, "RECORDING_STATE")
+RECORDING_STOP_REASONS: Final = _or_none(
+    RecordingStopReason, recording_pb2.RecordingStopReason, "RECORDING_STOP_REASON"
+)
 GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 _DELIVERY_OF: Final[Mapping[int, Delivery | None]] = {

@@ -1,6 +1,5 @@
 """The video tap of the real service, read by the recorder's own client, and judged by ffmpeg."""
 
-import os
 import signal
 import socket
 import statistics
@@ -13,6 +12,7 @@ from typing import Any
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from bench.processes import cpu_share
 from bench.video import stamp
 from bench.video.camera import camera
 from bench.video.foreign import environment
@@ -23,6 +23,7 @@ from recorder.values import GapCause, Sample
 from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 from recorder.video.stream import STREAM_NOTE
+from tests.support.free import udp_port_is_free
 from tests.support.judges import complaints, decoded_frames
 from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
@@ -86,11 +87,6 @@ def _read_for_ever(reader: BareReader) -> None:
         reader.record()
 
 
-def _bound(port: int) -> bool:
-    lines = Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]
-    return any(int(line.split()[1].rpartition(":")[2], 16) == port for line in lines)
-
-
 def test_it_records_while_nobody_watches_and_operators_see_no_preview(
     preview: Tapped, tmp_path: Path
 ) -> None:
@@ -100,7 +96,7 @@ def test_it_records_while_nobody_watches_and_operators_see_no_preview(
         assert list(state.reasons) == [pb.REASON_RECORDING]
         assert state.state == OFF
         assert not state.HasField("stream")
-        assert not _bound(preview.port), "there is no listener"
+        assert udp_port_is_free(preview.port), "there is no listener"
     assert recording.losses == []
     assert is_key_frame(recording.samples[0])
     decodes(recording.samples, tmp_path)
@@ -123,7 +119,7 @@ def test_viewers_come_and_go_without_a_gap(preview: Tapped, tmp_path: Path) -> N
                 watcher.wait_for_frames(10)
         preview.disable()
         preview.disabled()
-        assert not _bound(preview.port)
+        assert udp_port_is_free(preview.port)
         recording.wait_for_frames(10)
         assert preview.wait_for(lambda a: a.counters.starts, "the counters").counters.starts == 1
     assert recording.losses == []
@@ -317,23 +313,11 @@ def test_the_tap_adds_a_tenth_of_the_previews_cpu_time_at_most(tmp_path: Path) -
             def ratio() -> float:
                 ratios = []
                 for _ in range(3):
-                    without = _cpu_s(preview.process.pid)
+                    without = cpu_share(preview.process.pid, _CPU_WINDOW_S).whole
                     with TapRecording(preview.tap) as recording:
                         recording.wait_for_frames(5)
-                        ratios.append(_cpu_s(preview.process.pid) / without)
+                        ratios.append(cpu_share(preview.process.pid, _CPU_WINDOW_S).whole / without)
                 print(f"CPU with the tap against without: {ratios}")
                 return statistics.median(ratios)
 
             keeps(1.1, "CPU time with the tap against without", ratio)
-
-
-def _cpu_s(pid: int) -> float:
-    """The CPU time that a process takes in two seconds."""
-
-    def taken_s() -> float:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-    before_s = taken_s()
-    time.sleep(_CPU_WINDOW_S)
-    return taken_s() - before_s

@@ -72,7 +72,7 @@ def test_the_operators_endpoint() -> None:
     assert operator_endpoint("127.0.0.1", 0).verdict is Verdict.NOTE
 
 
-@pytest.mark.parametrize("service", [PREVIEW, DRIVE], ids=lambda service: service.check)
+@pytest.mark.parametrize("service", [PREVIEW, DRIVE, RECORDER], ids=lambda service: service.check)
 def test_the_endpoint_of_a_service(tmp_path: Path, service: Service) -> None:
     path = tmp_path / "service.sock"
     assert service.command in service_endpoint(service, path).remedy
@@ -83,19 +83,33 @@ def test_the_endpoint_of_a_service(tmp_path: Path, service: Service) -> None:
         assert service_endpoint(service, path).verdict is Verdict.GOOD
     left_over = service_endpoint(service, path)
     assert (left_over.verdict, "left over" in left_over.what) == (Verdict.WRONG, True)
+    assert f"Start {service.name} again" in left_over.remedy
     path.unlink()
     path.write_text("no socket", encoding="utf-8")
     assert service_endpoint(service, path).verdict is Verdict.WRONG
 
 
-def test_the_drive_program_is_looked_for_where_it_is_configured(tmp_path: Path) -> None:
-    config = tmp_path / "gateway.yaml"
-    teleop = f"teleop: {{socket: {tmp_path}/drive.sock, allow_insecure: true}}\n"
-    for content, checked in (("sources: []\n", False), (f"sources: []\n{teleop}", True)):
+@pytest.mark.parametrize(
+    ("check", "section", "remedy"),
+    [
+        (
+            "drive",
+            "teleop: {socket: a.sock, allow_insecure: true}",
+            "Start the drive program: robot-drive serve",
+        ),
+        ("recording", "recording: {socket: a.sock}", "Start the recorder: robot-recorder serve"),
+    ],
+    ids=["drive", "recording"],
+)
+def test_a_program_is_looked_for_where_it_is_configured(
+    tmp_path: Path, check: str, section: str, remedy: str
+) -> None:
+    config, sections = tmp_path / "gateway.yaml", section.replace("a.sock", f"{tmp_path}/a.sock")
+    for content, checked in (("sources: []\n", False), (f"sources: []\n{sections}\n", True)):
         config.write_text(content, encoding="utf-8")
         found = {finding.check: finding for finding in examine(config)}
-        assert ("drive" in found) is checked
-    assert found["drive"].verdict is Verdict.WRONG
+        assert (check in found) is checked
+    assert (found[check].verdict, found[check].remedy) == (Verdict.WRONG, remedy)
 
 
 def access_of(tmp_path: Path) -> Finding:
@@ -157,13 +171,3 @@ def test_the_doctor_asks_the_service_where_its_listener_is(tmp_path: Path, behav
     else:
         assert finding.verdict is Verdict.NOTE
         assert "unknown state" in finding.what
-
-
-def test_the_recorder_is_looked_for_where_it_is_configured(tmp_path: Path) -> None:
-    path = tmp_path / "recorder.sock"
-    assert "robot-recorder serve" in service_endpoint(RECORDER, path).remedy
-    with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(str(path))
-        listener.listen()
-        assert service_endpoint(RECORDER, path).verdict is Verdict.GOOD
-    assert "Start the recorder again" in service_endpoint(RECORDER, path).remedy
