@@ -301,9 +301,19 @@ async def test_disabling_ends_the_session(robot: DrivenRobot, client: AsyncGatew
     assert (await client.set_driving_enabled(True)).accepted
 
 
+async def may_be_driven(client: AsyncGatewayClient) -> None:
+    """Waits until a hold would move the robot, for which its drive program has to discover the base.
+
+    A single command is accepted before, and comes to its end without motion.
+    """
+    async with client.drive(BY_EYE) as session:
+        await session.ready(PATIENCE_S)
+
+
 async def test_single_commands_of_older_tools_move_slowly_and_not_for_long(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
+    await may_be_driven(client)
     for refused in ((0.36, 0.0, 0.0), (0.0, -0.36, 0.0), (0.0, 0.0, 0.81), (float("nan"), 0.0, 0.0)):
         assert not (await client.send_velocity(*refused)).accepted
     robot.base.heard.clear()
@@ -329,6 +339,7 @@ async def sent_on_a_channel_of_its_own(robot: DrivenRobot, method: str, request:
 async def test_the_bytes_of_tools_in_the_field_drive_and_every_command_ends_by_itself(
     robot: DrivenRobot, client: AsyncGatewayClient
 ) -> None:
+    await may_be_driven(client)
     enabled = await sent_on_a_channel_of_its_own(robot, "SetTeleopEnabled", b"\x08\x01")
     assert enabled.startswith(b"\x08\x01"), "accepted = 1: true"
     robot.base.heard.clear()
