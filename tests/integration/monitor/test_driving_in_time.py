@@ -14,7 +14,6 @@ from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
 from tests.support.driven_robot import TELEOP
 from tests.support.driving import Driving, driving
-from tests.support.free import free_domain
 from tests.support.gateway_program import gateway_program
 from tests.support.qt import let_pass, until
 from tests.support.virtual_pad import VirtualPad, virtual_pad
@@ -35,15 +34,15 @@ class Ground:
 
 
 @pytest.fixture(scope="module")
-def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ground]:
+def ground(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Ground]:
     directory = tmp_path_factory.mktemp("robot")
-    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(domain))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with driving(directory) as robot:
-            teleop = {"socket": str(robot.socket), **TELEOP}
-            with gateway_program(directory, sources=[], teleop=teleop) as gateway:
-                yield Ground(robot, f"127.0.0.1:{gateway.port}")
+    with driving(directory) as robot:
+        teleop = {"socket": str(robot.socket), **TELEOP}
+        with gateway_program(directory, sources=[], teleop=teleop) as gateway:
+            yield Ground(robot, f"127.0.0.1:{gateway.port}")
 
 
 @dataclass
