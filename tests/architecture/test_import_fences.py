@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-OURS = ("common", "gateway", "preview", "drive", "recorder", "console", "simrobot")
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "console", "simrobot")
+OURS = ("common", *PROGRAMS)
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,11 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
 @pytest.mark.parametrize(
     ("importer", "forbidden"),
     [
-        ("common/", ("gateway", "preview", "drive", "recorder", "console", "simrobot")),
-        ("drive/", ("gateway", "preview", "console", "simrobot", "omniseer.gateway", "grpc", "asyncio")),
-        ("gateway/", ("preview", "console", "simrobot")),
-        ("preview/", ("gateway", "console", "simrobot", "omniseer.gateway")),
-        ("console/", ("gateway", "preview", "simrobot", "omniseer.preview")),
-        ("simrobot/", ("gateway", "preview", "console")),
-        ("recorder/", ("gateway", "preview", "drive", "console", "simrobot")),
+        ("common/", PROGRAMS),
+        *((f"{one}/", tuple(other for other in PROGRAMS if other != one)) for one in PROGRAMS),
+        ("drive/", ("omniseer.gateway", "grpc", "asyncio")),
+        ("preview/", ("omniseer.gateway",)),
+        ("console/", ("omniseer.preview",)),
         ("recorder/values.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "mcap", "recorder")),
         ("recorder/intake/", (*WIRE, "omniseer", "asyncio", "mcap", "recorder.mcap", "recorder.config")),
         ("recorder/mcap/", (*HEAVY, *WIRE, "omniseer", "asyncio", "recorder.intake", "recorder.config")),
@@ -199,6 +198,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
+        ("omniseer.recorder", ("gateway/links/recorder/", "recorder/rpc/", "recorder/doctor/")),
     ],
 )
 def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) -> None:

@@ -1,10 +1,12 @@
 """Debian's ffmpeg and ffprobe as independent judges of a stream."""
 
 import json
-import os
 import subprocess
 from pathlib import Path
 from typing import Any
+
+from bench.video import stamp
+from bench.video.foreign import environment
 
 
 def complaints(recording: Path) -> str:
@@ -21,7 +23,16 @@ def decoded_frames(recording: Path) -> int:
     return int(found["streams"][0]["nb_read_frames"])
 
 
+def stamps(recording: Path) -> list[float | None]:
+    """The stamp of each decoded frame, as bench.video.stamp reads it."""
+    row = f"format=gray,crop={stamp.WIDTH_PX}:1:0:{stamp.BLOCK_PX // 2}"
+    command = ["ffmpeg", "-v", "error", "-i", str(recording), "-vf", row, "-fps_mode", "passthrough"]
+    done = subprocess.run(
+        [*command, "-f", "rawvideo", "-"], env=environment(), capture_output=True, check=True
+    )
+    rows = range(0, len(done.stdout), stamp.WIDTH_PX)
+    return [stamp.read(done.stdout[at : at + stamp.WIDTH_PX]) for at in rows]
+
+
 def _run(*command: str) -> subprocess.CompletedProcess[str]:
-    # The libraries of the ROS wheels don't concern foreign programs.
-    environment = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=60, check=False)

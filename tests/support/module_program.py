@@ -1,13 +1,10 @@
 """A module of the tests as a program in a process of its own, to be stopped, frozen and killed."""
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from subprocess import PIPE, Popen
-from typing import Final
+from subprocess import Popen
 
-_ROOT: Final = Path(__file__).parents[2]
+from tests.support.helper import first_line, helper
 
 
 @contextmanager
@@ -19,10 +16,6 @@ def module_program(module: str, *arguments: str, says: str) -> Iterator[Popen[st
         arguments: of its command line.
         says: its first line.
     """
-    with Popen([sys.executable, "-m", module, *arguments], cwd=_ROOT, stdout=PIPE, text=True) as process:
-        try:
-            assert process.stdout
-            assert process.stdout.readline() == f"{says}\n"
-            yield process
-        finally:
-            process.kill()
+    with helper(module, *arguments) as process:
+        assert first_line(process) == f"{says}\n"
+        yield process

@@ -6,9 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from tests.support.talker import talking
 
 _PERIOD_S = 0.002
 
@@ -45,13 +43,5 @@ class Publishing:
 @contextmanager
 def publishing(topic: str, message_type: Any) -> Iterator[Publishing]:
     """Reliable, and with a history that outlasts a busy machine."""
-    context = Context()
-    context.init(args=[], initialize_logging=False)
-    node = Node("publishing", context=context, use_global_arguments=False, enable_rosout=False)
-    try:
-        publisher = node.create_publisher(message_type, topic, QoSProfile(depth=1000))
-        yield Publishing(publisher, message_type)
-    finally:
-        node.destroy_node()
-        context.shutdown()
-        context.destroy()
+    with talking("publishing") as talker:
+        yield Publishing(talker.publisher(topic, message_type, depth=1000), message_type)

@@ -11,8 +11,10 @@ from typing import Any, Final
 
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
+from recorder.mcap.reading import messages
 from recorder.recorder import Recorder
 from recorder.store.folder import make_directory
+from recorder.store.manifest import Manifest
 from recorder.values import Channel, Sample
 from recorder.writing.queue import SampleQueue
 from tests.support.eventually import eventually
@@ -41,6 +43,16 @@ class Source:
             data = b"\0\1\0\0" + (len(text) + 1).to_bytes(4, "little") + text + b"\0"
             now_ns = time.time_ns() + step_ns
             self.queue.put([Sample(self.of, data, now_ns, now_ns, self.sent, time.monotonic_ns())])
+
+
+def numbers(recorder: Recorder, manifest: Manifest, topic: str = "/odom") -> list[int]:
+    """What the messages of a `Source` say that a recording has, in order."""
+    folder = recorder.folder_of(manifest)
+    return [
+        int(data[8:].partition(b".")[0])
+        for segment in manifest.segments
+        for _, data in messages(folder / segment.name, topic)
+    ]
 
 
 class _NoSources:

@@ -19,9 +19,22 @@ _ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """A domain of this test's own, in force for this process and its children; nothing leaves the machine."""
+    with _own_domain(monkeypatch) as domain:
+        yield domain
+
+
+@pytest.fixture(scope="module")
+def module_ros_domain() -> Iterator[int]:
+    """The same for the tests of a module that share a robot."""
+    with pytest.MonkeyPatch.context() as patch, _own_domain(patch) as domain:
+        yield domain
+
+
+@contextmanager
+def _own_domain(patch: pytest.MonkeyPatch) -> Iterator[int]:
     with free_domain() as domain:
-        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
-        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv("ROS_DOMAIN_ID", str(domain))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield domain
 
 

@@ -1,8 +1,6 @@
 """The real recorder as a process of its own, and its calls."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -71,7 +69,7 @@ class RecorderProgram:
     def stop(self) -> int:
         """Ends it in order; returns its exit code."""
         assert self.process
-        self.process.send_signal(signal.SIGTERM)
+        self.process.terminate()
         try:
             return self.process.wait(20)
         except subprocess.TimeoutExpired:
@@ -106,14 +104,12 @@ class RecorderProgram:
 def recorder_program(directory: Path, **settings: Any) -> Iterator[RecorderProgram]:
     """Serving when the block begins, gone when it ends."""
     program = RecorderProgram(directory, settings)
-    program.start()
     try:
+        program.start()
         yield program
     finally:
-        assert program.process
-        with suppress(ProcessLookupError):
-            os.kill(program.process.pid, signal.SIGTERM)
-        with suppress(subprocess.TimeoutExpired):
-            program.process.wait(10)
-        program.process.kill()
-        program.process.wait()
+        if program.process:
+            program.process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                program.process.wait(10)
+            program.kill()

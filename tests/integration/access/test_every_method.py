@@ -12,13 +12,13 @@ from grpc_reflection.v1alpha import reflection_pb2
 
 from common.healthcheck import state_of
 from common.reasons import Reason
-from common.refusal import refusal_in
 from gateway.access.credential import Kind
 from gateway.access.role import Role
 from gateway.rpc.calls.methods import ROLES
 from omniseer.gateway.v1 import recording_pb2, robot_gateway_pb2, teleop_pb2
 from omniseer.gateway.v1.access_pb2 import required_role
 from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway, new_robot, refuse_at_once
+from tests.support.refusals import reason_of
 from tests.support.running_gateway import raw_unary
 
 SERVICE = robot_gateway_pb2.DESCRIPTOR.services_by_name["RobotGateway"]
@@ -86,7 +86,7 @@ async def called(channel: grpc.aio.Channel, path: str, login: Login) -> tuple[gr
         else:
             await raw_unary(channel, path)(b"", metadata=metadata, timeout=10)
     except grpc.aio.AioRpcError as error:
-        return error.code(), refusal_in(error.trailing_metadata()).reason
+        return reason_of(error)
     return OK, ""
 
 

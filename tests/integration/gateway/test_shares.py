@@ -17,15 +17,12 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
     WatchSystemStatusRequest,
 )
 from tests.support.detour import detour
+from tests.support.refusals import reason_of
 from tests.support.running_gateway import Operator, raw_unary, running_gateway
 
 STATUS = "/omniseer.gateway.v1.RobotGateway/GetSystemStatus"
 HEALTH = "/grpc.health.v1.Health/Check"
 OWN_CONNECTION = (("grpc.use_local_subchannel_pool", 1),)
-
-
-def reason_of(error: grpc.aio.AioRpcError) -> tuple[grpc.StatusCode, str]:
-    return error.code(), refusal_in(error.trailing_metadata()).reason
 
 
 async def connected(stack: AsyncExitStack, operator: Operator) -> Operator:

@@ -1,7 +1,7 @@
 """From a robot's message bus to an operator's answer: commands and who gave them, components, the mode."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
@@ -18,19 +18,15 @@ from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
 from tests.support.eventually import eventually
 from tests.support.running_gateway import Operator, running_gateway
-from tests.support.talker import Talker, talking
+from tests.support.talker import Talker, talker
+
+__all__ = ["talker"]
 
 pytestmark = pytest.mark.ros
 MODE = SourceSettings(kind="mode", topic="/mission/mode", type="std_msgs/msg/String", stale_after_ms=60_000)
 SOURCES = (*(source for source in DEFAULT_SOURCES if not source.required), MODE)
 KEYBOARD, NAVIGATION = "/cmd_vel_keyboard", "/cmd_vel_nav"
 MUX = "/mecanum_drive_controller/reference"
-
-
-@pytest.fixture
-def talker(ros_domain: int) -> Iterator[Talker]:  # noqa: ARG001  # for its effect
-    with talking() as made:
-        yield made
 
 
 @pytest.fixture

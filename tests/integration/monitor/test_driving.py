@@ -16,7 +16,6 @@ from console.steering import Steering
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from tests.support.driven_robot import DrivenRobot, driven_robot
-from tests.support.free import free_domain
 from tests.support.qt import keep_screenshot, let_pass, press, until
 from tests.support.robotctl import robotctl
 
@@ -28,12 +27,12 @@ BY_EYE_MPS = 0.15
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:
-    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(domain))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
-            yield robot
+def robot(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[DrivenRobot]:
+    with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
+        yield robot
 
 
 @dataclass

@@ -14,10 +14,7 @@ from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
 from tests.support.driven_robot import DrivenRobot, driven_robot
 from tests.support.qt import keep_screenshot, let_pass, press, until
-from tests.support.ros import ros_domain
 from tests.support.running_preview import RunningPreview
-
-__all__ = ["ros_domain"]
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
 

@@ -13,7 +13,6 @@ from console.client import Supervision
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor, reading_gamepad
 from tests.support.driven_robot import DrivenRobot, driven_robot
-from tests.support.free import free_domain
 from tests.support.qt import let_pass, until
 from tests.support.virtual_pad import VirtualPad, virtual_pad
 
@@ -25,12 +24,12 @@ LET_GO_MS = 60.0
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:
-    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(domain))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
-            yield robot
+def robot(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[DrivenRobot]:
+    with driven_robot(tmp_path_factory.mktemp("robot")) as robot:
+        yield robot
 
 
 @dataclass

@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from bench.video import stamp
 from bench.video.camera import Camera, camera
 from bench.video.foreign import environment
 from common.gst import Gst
@@ -22,7 +21,7 @@ from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.pipeline import capture_clock
 from preview.pipeline.runner import Runner
 from tests.support.film import clip
-from tests.support.judges import complaints, decoded_frames
+from tests.support.judges import complaints, decoded_frames, stamps
 from tests.support.mpegts import CLOCK_LIMIT_MS, Stream, analyse
 from tests.support.pipeline_contract import LIVE, Events, plan_of
 from tests.support.promise import keeps
@@ -68,17 +67,6 @@ def captured_s(pts: int, offset_ns: int = OFFSET_NS) -> float:
     captured_ns = endpoint(offset_ns).captured_ns(pts, time.monotonic_ns())
     assert captured_ns is not None
     return captured_ns / 1e9
-
-
-def stamps(recording: Path) -> list[float | None]:
-    """The stamp of each decoded frame."""
-    row = f"format=gray,crop={stamp.WIDTH_PX}:1:0:{stamp.BLOCK_PX // 2}"
-    command = ["ffmpeg", "-v", "error", "-i", str(recording), "-vf", row, "-fps_mode", "passthrough"]
-    done = subprocess.run(
-        [*command, "-f", "rawvideo", "-"], env=environment(), capture_output=True, check=True
-    )
-    rows = range(0, len(done.stdout), stamp.WIDTH_PX)
-    return [stamp.read(done.stdout[at : at + stamp.WIDTH_PX]) for at in rows]
 
 
 def errors_ms(preview: RunningPreview, directory: Path) -> list[float]:

@@ -3,7 +3,6 @@
 import signal
 import socket
 import statistics
-import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,9 +12,7 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bench.processes import cpu_share
-from bench.video import stamp
 from bench.video.camera import camera
-from bench.video.foreign import environment
 from common.video_tap import Header, Kind, decode_object
 from omniseer.preview.v1 import preview_service_pb2 as pb
 from preview.tap import MAX_READERS, MAX_WAITING_BYTES
@@ -24,7 +21,7 @@ from recorder.video import access_unit, message
 from recorder.video.access_unit import Codec
 from recorder.video.stream import STREAM_NOTE
 from tests.support.free import udp_port_is_free
-from tests.support.judges import complaints, decoded_frames
+from tests.support.judges import complaints, decoded_frames, stamps
 from tests.support.promise import keeps
 from tests.support.running_preview import RunningPreview
 from tests.support.tap_reader import BareReader, TapRecording
@@ -149,7 +146,7 @@ def test_every_encoded_frame_is_received_and_stamped_with_its_capture(tmp_path: 
         with Tapped(tmp_path, settings) as preview, TapRecording(preview.tap) as recording:
             recording.wait_for_frames(60)
         samples, offset_ns = recording.samples, time.time_ns() - time.monotonic_ns()
-        stamped = _stamps(film_of(samples, tmp_path))
+        stamped = stamps(film_of(samples, tmp_path))
         assert len(stamped) == len(samples)
         errors = [
             (sample.publish_time_ns - offset_ns) / 1e6 - at_s * 1000
@@ -160,16 +157,6 @@ def test_every_encoded_frame_is_received_and_stamped_with_its_capture(tmp_path: 
         print(f"{len(errors)} stamps, {statistics.median(errors):.2f} ms, at most {max(errors):.2f} ms")
         assert min(errors) > -2
         assert statistics.median(errors) <= FRAME_MS
-
-
-def _stamps(film: Path) -> list[float | None]:
-    row = f"format=gray,crop={stamp.WIDTH_PX}:1:0:{stamp.BLOCK_PX // 2}"
-    command = ["ffmpeg", "-v", "error", "-i", str(film), "-vf", row, "-fps_mode", "passthrough"]
-    done = subprocess.run(
-        [*command, "-f", "rawvideo", "-"], env=environment(), capture_output=True, check=True
-    )
-    rows = range(0, len(done.stdout), stamp.WIDTH_PX)
-    return [stamp.read(done.stdout[at : at + stamp.WIDTH_PX]) for at in rows]
 
 
 def test_a_reader_that_lags_loses_frames_up_to_a_key_frame_and_the_preview_none(tmp_path: Path) -> None:

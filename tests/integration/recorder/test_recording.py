@@ -8,21 +8,9 @@ from rosbags.rosbag2 import Reader
 
 from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
-from recorder.mcap.reading import messages
-from recorder.recorder import Recorder
 from recorder.requests import SnapshotOptions, StartOptions
-from recorder.store.manifest import Kind, Manifest, RecordingState, StopReason
-from tests.support.recorder_in_process import Source, channel, running_recorder
-
-
-def numbers(recorder: Recorder, manifest: Manifest, topic: str = "/odom") -> list[int]:
-    """What the messages of a recording say, in order."""
-    folder = recorder.folder_of(manifest)
-    return [
-        int(data[8:].partition(b".")[0])
-        for segment in manifest.segments
-        for _, data in messages(folder / segment.name, topic)
-    ]
+from recorder.store.manifest import Kind, RecordingState, StopReason
+from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
 
 
 async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ import grpc
 import pytest
 
 from common import bind, rpc
-from common.refusal import refusal_in
 from omniseer.gateway.v1 import fault_pb2
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
@@ -21,6 +20,7 @@ from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.servicer import RecorderServicer
 from recorder.store.run_bundles import RunBundles
 from tests.support.recorder_in_process import Running, Source, running_recorder
+from tests.support.refusals import refused
 
 KIB = 1024
 
@@ -71,13 +71,6 @@ async def exported(stub: Any, **request: Any) -> tuple[pb.ExportHeader, bytes]:
         assert chunk.crc32c == google_crc32c.value(chunk.data)
         content += chunk.data
     return header, content
-
-
-async def refused(call: Any) -> tuple[grpc.StatusCode, str]:
-    with pytest.raises(grpc.aio.AioRpcError) as caught:
-        await call
-    error = caught.value
-    return error.code(), refusal_in(error.trailing_metadata()).reason
 
 
 async def test_a_recording_from_start_to_deletion(tmp_path: Path) -> None:

@@ -8,22 +8,16 @@ import grpc
 import pytest
 
 from common.reasons import Reason
-from common.refusal import refusal_in
 from gateway.access.role import Role
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.gateway.v1.recording_pb2_grpc import RecordingServiceStub
 from tests.support.guarded_gateway import Login, guarded_gateway, new_robot
 from tests.support.recorder_double import RecorderDouble, serving_recorder
 from tests.support.recording_gateway import RecordingRobot, reaches, recording_robot
+from tests.support.refusals import refused
 from tests.support.running_gateway import running_gateway
 
 ID = "request-1"
-
-
-async def refusal(call: Any) -> tuple[grpc.StatusCode, str]:
-    with pytest.raises(grpc.aio.AioRpcError) as caught:
-        await call
-    return caught.value.code(), refusal_in(caught.value.trailing_metadata()).reason
 
 
 async def test_a_recording_from_start_to_deletion(tmp_path: Path) -> None:
@@ -75,31 +69,31 @@ async def test_what_the_recorder_refuses_is_refused_with_its_reason(tmp_path: Pa
         def start(**more: Any) -> Any:
             return stub.StartRecording(pb.StartRecordingRequest(request_id="s", **more))
 
-        assert await refusal(start(preset="none")) == (
+        assert await refused(start(preset="none")) == (
             grpc.StatusCode.INVALID_ARGUMENT,
             Reason.INVALID_REQUEST,
         )
         double.has_video = double.has_room = double.has_ring = False
-        assert await refusal(start(with_video=True)) == (precondition, Reason.NO_VIDEO)
-        assert await refusal(start()) == (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.DISK_FULL)
+        assert await refused(start(with_video=True)) == (precondition, Reason.NO_VIDEO)
+        assert await refused(start()) == (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.DISK_FULL)
         snapshot = stub.TriggerSnapshot(pb.TriggerSnapshotRequest(request_id="t"))
-        assert await refusal(snapshot) == (precondition, Reason.NO_RING)
-        assert await refusal(delete(done.id)) == (precondition, Reason.RECORDING_PINNED)
-        assert await refusal(delete("wanted")) == (precondition, Reason.RECORDING_NOT_COPIED)
-        assert await refusal(delete(bundle.id, force=True)) == (precondition, Reason.RECORDING_READ_ONLY)
+        assert await refused(snapshot) == (precondition, Reason.NO_RING)
+        assert await refused(delete(done.id)) == (precondition, Reason.RECORDING_PINNED)
+        assert await refused(delete("wanted")) == (precondition, Reason.RECORDING_NOT_COPIED)
+        assert await refused(delete(bundle.id, force=True)) == (precondition, Reason.RECORDING_READ_ONLY)
         changed = delete(done.id, force=True, expected_sha256=b"x" * 32)
-        assert await refusal(changed) == (precondition, Reason.RECORDING_CHANGED)
+        assert await refused(changed) == (precondition, Reason.RECORDING_CHANGED)
         missing = stub.GetRecording(pb.GetRecordingRequest(recording_id="no such"))
-        assert await refusal(missing) == (grpc.StatusCode.NOT_FOUND, Reason.RECORDING_NOT_FOUND)
+        assert await refused(missing) == (grpc.StatusCode.NOT_FOUND, Reason.RECORDING_NOT_FOUND)
 
 
 async def test_a_robot_that_is_not_set_up_says_so(tmp_path: Path) -> None:
     async with running_gateway(tmp_path / "preview.sock") as operator:
         stub: Any = RecordingServiceStub(operator.channel)
         expected = (grpc.StatusCode.FAILED_PRECONDITION, Reason.RECORDING_NOT_CONFIGURED)
-        assert await refusal(stub.ListRecordings(pb.ListRecordingsRequest())) == expected
+        assert await refused(stub.ListRecordings(pb.ListRecordingsRequest())) == expected
         request = pb.ExportRecordingRequest(recording_id="a", file="b")
-        assert await refusal(stub.ExportRecording(request).read()) == expected
+        assert await refused(stub.ExportRecording(request).read()) == expected
         assert not (await operator.status()).HasField("recording")
 
 
@@ -108,13 +102,13 @@ async def test_a_recorder_that_is_gone_and_one_that_is_frozen(tmp_path: Path) ->
     async with running_gateway(tmp_path / "preview.sock", recording={"socket": socket}) as operator:
         robot = RecordingRobot(operator, RecorderDouble())
         expected = (grpc.StatusCode.UNAVAILABLE, Reason.RECORDER_UNREACHABLE)
-        assert await refusal(robot.stub.ListRecordings(pb.ListRecordingsRequest(), timeout=10)) == expected
+        assert await refused(robot.stub.ListRecordings(pb.ListRecordingsRequest(), timeout=10)) == expected
         assert await robot.state() == pb.RECORDER_STATE_UNREACHABLE
         async with serving_recorder(socket, robot.recorder):
             await reaches(robot, pb.RECORDER_STATE_IDLE)
             robot.recorder.thawed.clear()
             assert (
-                await refusal(robot.stub.ListRecordings(pb.ListRecordingsRequest(), timeout=10)) == expected
+                await refused(robot.stub.ListRecordings(pb.ListRecordingsRequest(), timeout=10)) == expected
             )
             await reaches(robot, pb.RECORDER_STATE_UNREACHABLE)
             robot.recorder.thawed.set()
@@ -137,14 +131,14 @@ async def test_force_is_for_administrators(tmp_path: Path) -> None:
             return getattr(stub, method)(request, metadata=login.metadata(), timeout=5)
 
         denied = (grpc.StatusCode.PERMISSION_DENIED, Reason.ROLE_TOO_LOW)
-        assert await refusal(call("DeleteRecording", request, logins[Role.OPERATOR])) == denied
+        assert await refused(call("DeleteRecording", request, logins[Role.OPERATOR])) == denied
         assert recording.id in double.recordings
         await call("DeleteRecording", request, logins[Role.ADMIN])
         assert recording.id not in double.recordings
         assert double.requests[-1][1]["x-caller"] == "anna"
-    done, refused = (path.read_text(encoding="utf-8") for path in (access.audit_file, access.refused_file))
+    done, denials = (path.read_text(encoding="utf-8") for path in (access.audit_file, access.refused_file))
     assert "DeleteRecording" in done
-    assert "DeleteRecording" in refused
+    assert "DeleteRecording" in denials
 
 
 async def test_a_caller_that_leaves_ends_its_call_at_the_recorder(tmp_path: Path) -> None:

@@ -6,14 +6,13 @@ from typing import Any
 
 import google_crc32c
 import grpc
-import pytest
 
 from common.reasons import Reason
-from common.refusal import refusal_in
 from omniseer.gateway.v1 import recording_pb2 as pb
 from tests.support.eventually import eventually
 from tests.support.recorder_double import CHUNK_BYTES, RecorderDouble, sha256
 from tests.support.recording_gateway import RecordingRobot, recording_robot
+from tests.support.refusals import refused
 
 FILE = "data/000000.mcap"
 DATA = bytes(range(256)) * 1024 * 5 + b"end"
@@ -32,14 +31,9 @@ def opened(robot: RecordingRobot, **more: Any) -> Any:
     return robot.stub.ExportRecording(request, timeout=30)
 
 
-async def refused(stream: Any) -> tuple[grpc.StatusCode, str]:
-    async def read_on() -> None:
-        while await stream.read() is not grpc.aio.EOF:
-            pass
-
-    with pytest.raises(grpc.aio.AioRpcError) as caught:
-        await read_on()
-    return caught.value.code(), refusal_in(caught.value.trailing_metadata()).reason
+async def to_its_end(stream: Any) -> None:
+    while await stream.read() is not grpc.aio.EOF:
+        pass
 
 
 async def test_a_file_arrives_as_it_is_from_any_offset(tmp_path: Path) -> None:
@@ -54,13 +48,19 @@ async def test_a_file_arrives_as_it_is_from_any_offset(tmp_path: Path) -> None:
 async def test_refusals_of_an_export(tmp_path: Path) -> None:
     async with recording_robot(tmp_path, robot_with(DATA)) as robot:
         beyond = opened(robot, offset=len(DATA) + 1)
-        assert await refused(beyond) == (grpc.StatusCode.INVALID_ARGUMENT, Reason.INVALID_REQUEST)
+        assert await refused(to_its_end(beyond)) == (grpc.StatusCode.INVALID_ARGUMENT, Reason.INVALID_REQUEST)
         other = opened(robot, expected_sha256=b"x" * 32)
-        assert await refused(other) == (grpc.StatusCode.ABORTED, Reason.RECORDING_CHANGED)
+        assert await refused(to_its_end(other)) == (grpc.StatusCode.ABORTED, Reason.RECORDING_CHANGED)
         robot.recorder.read_error = CHUNK_BYTES
-        assert await refused(opened(robot)) == (grpc.StatusCode.DATA_LOSS, Reason.RECORDING_DAMAGED)
+        assert await refused(to_its_end(opened(robot))) == (
+            grpc.StatusCode.DATA_LOSS,
+            Reason.RECORDING_DAMAGED,
+        )
         robot.recorder.unfinal.add(FILE)
-        assert await refused(opened(robot)) == (grpc.StatusCode.FAILED_PRECONDITION, Reason.FILE_NOT_FINAL)
+        assert await refused(to_its_end(opened(robot))) == (
+            grpc.StatusCode.FAILED_PRECONDITION,
+            Reason.FILE_NOT_FINAL,
+        )
 
 
 async def test_four_of_a_caller_and_the_place_is_free_again(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ async def test_four_of_a_caller_and_the_place_is_free_again(tmp_path: Path) -> N
         for each in streams:
             assert (await each.read()).HasField("header")
         expected = (grpc.StatusCode.RESOURCE_EXHAUSTED, Reason.TOO_MANY_EXPORTS)
-        assert await refused(opened(robot)) == expected
+        assert await refused(to_its_end(opened(robot))) == expected
         streams[0].cancel()
 
         async def another() -> bool:
@@ -110,4 +110,4 @@ async def test_a_deleted_recording_ends_its_export(tmp_path: Path) -> None:
         await stream.read()
         await robot.stub.DeleteRecording(pb.DeleteRecordingRequest(request_id="d", recording_id="one"))
         double.flowing.set()
-        assert await refused(stream) == (grpc.StatusCode.ABORTED, Reason.RECORDING_DELETED)
+        assert await refused(to_its_end(stream)) == (grpc.StatusCode.ABORTED, Reason.RECORDING_DELETED)
