@@ -5,13 +5,12 @@ from collections.abc import Iterator
 import pytest
 
 from tests.support.driving import Driving, driving
-from tests.support.free import free_domain
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driving]:
-    with free_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_DOMAIN_ID", str(domain))
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with driving(tmp_path_factory.mktemp("drive")) as made:
-            yield made
+def robot(
+    module_ros_domain: int,  # noqa: ARG001  # for its effect
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Driving]:
+    with driving(tmp_path_factory.mktemp("drive")) as made:
+        yield made

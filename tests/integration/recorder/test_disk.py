@@ -169,7 +169,7 @@ async def test_a_second_recorder_on_the_folder_is_refused(tmp_path: Path) -> Non
 async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_ends(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also where the disk is slow: nobody ever sees a recorder that is idle in between."""
+    """Also where the disk is slow: no client sees an idle recorder in between."""
     async with running_recorder(tmp_path) as running:
         await running.recorder.start("1", StartOptions())
         done = (await running.recorder.stop("2", "")).recording

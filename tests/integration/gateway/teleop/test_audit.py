@@ -23,7 +23,7 @@ SPEED_MPS = 0.1
 
 
 @pytest.fixture
-def guarded(domain: int, tmp_path: Path) -> Iterator[tuple[Guarded, Base]]:  # noqa: ARG001  # for its effect
+def guarded(module_ros_domain: int, tmp_path: Path) -> Iterator[tuple[Guarded, Base]]:  # noqa: ARG001  # for its effect
     with listening_base() as base, running_drive(tmp_path) as drive:
         teleop = {"socket": str(drive.socket), "line_of_sight": True}
         with guarded_program(tmp_path, tmp_path, teleop=teleop) as robot:

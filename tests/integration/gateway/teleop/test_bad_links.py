@@ -42,7 +42,7 @@ BLACKOUTS = 4
 
 
 @pytest.fixture(scope="module")
-def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:  # noqa: ARG001
+def robot(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:  # noqa: ARG001
     """A robot that is reached by networks."""
     with driven_robot(tmp_path_factory.mktemp("robot"), **network_settings(free_tcp_port())) as robot:
         yield robot

@@ -72,7 +72,7 @@ class Scene:
 
 
 @pytest.fixture(scope="module")
-def scene(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:  # noqa: ARG001
+def scene(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:  # noqa: ARG001
     directory = tmp_path_factory.mktemp("robot")
     with ExitStack() as stack:
         camera = stack.enter_context(StallingCamera())

@@ -30,7 +30,7 @@ STARTS_WITHIN_S = 30.0
 
 
 @pytest.fixture(scope="module")
-def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:  # noqa: ARG001
+def robot(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[DrivenRobot]:  # noqa: ARG001
     with driven_robot(tmp_path_factory.mktemp("robot"), first=BLOCKS_ITS_LOOP) as robot:
         yield robot
 
