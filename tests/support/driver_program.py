@@ -15,6 +15,8 @@ from tests.support.module_program import module_program
 SPEED_MPS: Final = 0.1
 _ATTEMPT: Final = 100
 """Holds without motion after which the driver releases and holds anew, as a busy machine may need."""
+_STEADY: Final = 25
+"""Holds with motion in a row, from which on the robot drives: a reason may end the very first ones."""
 
 
 def driver(target: str) -> AbstractContextManager[Popen[str]]:
@@ -26,7 +28,7 @@ async def drive(target: str) -> None:
     """Drives until the process ends."""
     by_eye = DriveOptions(supervision=Supervision.LINE_OF_SIGHT, input_device="test")
     async with AsyncGatewayClient(target) as client, client.drive(by_eye) as session:
-        holds, said = 0, False
+        holds, steady, said = 0, 0, False
         while True:
             session.check()
             if not said and holds % _ATTEMPT == 0:
@@ -34,10 +36,11 @@ async def drive(target: str) -> None:
                 await session.ready(within_s=15)
             session.hold(SPEED_MPS)
             holds += 1
-            if not said and session.state and session.state.phase is DrivePhase.DRIVING:
-                said = session.open_lanes == 2
-                if said:
-                    print("driving", flush=True)
+            moves = session.state is not None and session.state.phase is DrivePhase.DRIVING
+            steady = steady + 1 if moves else 0
+            if not said and steady >= _STEADY and session.open_lanes == 2:
+                said = True
+                print("driving", flush=True)
             await asyncio.sleep(0.02)
 
 

@@ -125,6 +125,8 @@ def test_viewers_that_freeze_stutter_vanish_or_die_pause_none_of_the_others(prev
         )
         link = stack.enter_context(UdpLink(preview.port))
         stack.enter_context(player(link.port))
+        # Before the watchers: srtsink listens with a backlog of one, and would refuse one of two at once.
+        viewers(preview, 6)
         watchers = [Watcher(preview.port) for _ in range(WATCHERS)]
         for watcher in watchers:
             stack.enter_context(watcher)

@@ -94,6 +94,8 @@ async def test_a_drive_program_that_is_started_again_gets_the_lease_and_moves_on
         await other.reset_stop(stop)
     await asyncio.sleep(QUIET_S)
     assert not robot.base.moves, "a reset moves nothing"
+    # The new process has to discover the base first.
+    await session.ready(STARTS_WITHIN_S)
     assert session.state is not None
     assert session.state.phase is DrivePhase.ARMED, "the same session has the lease of the new process"
     await in_motion(session, robot.base, SPEED_MPS)
