@@ -5,11 +5,10 @@ The session lives in the worker's loop, so that a window that hangs sends nothin
 """
 
 import asyncio
-from collections import deque
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, NoReturn, Protocol
+from typing import Final, NoReturn, Protocol
 
 from console.client import (
     DriveOptions,
@@ -19,14 +18,13 @@ from console.client import (
     Supervision,
 )
 from console.client.results import DriveLimits, RobotStopped, StopReset, TeleopAnswer
+from console.monitor.calls import Calls
 from console.monitor.first_to_end import first_to_end
+from console.monitor.notes import Notes
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
 from console.steering import Steering, permitted
 
-_MOST_NOTES: Final = 8
-_MOST_CALLS: Final = 4
-"""On their way at a time. A further one would say nothing that these do not say already."""
 _STOPS_END_WITHIN_S: Final = 0.5
 """How long a window that is closed waits for the confirmation of a stop."""
 
@@ -111,9 +109,8 @@ class Driver:
         self._options: DriveOptions | None = None
         """Of the session that is open, or being opened."""
         self._session: DriveSession | None = None
-        self._notes: deque[Note] = deque(maxlen=_MOST_NOTES)
-        self._calls: set[asyncio.Task[None]] = set()
-        self._stops: set[asyncio.Task[None]] = set()
+        self._notes = Notes(on_change)
+        self._calls, self._stops = Calls(on_change), Calls(on_change)
 
     # --- any thread ---
 
@@ -134,10 +131,7 @@ class Driver:
 
     def take_notes(self) -> list[Note]:
         """Returns the answers that were not taken yet."""
-        notes = []
-        while self._notes:
-            notes.append(self._notes.popleft())
-        return notes
+        return self._notes.take()
 
     def begin(self, supervision: Supervision = Supervision.PICTURE, *, take_over: bool = False) -> None:
         """Opens a session; no-op while there is one."""
@@ -169,15 +163,15 @@ class Driver:
     def stop(self, reason: str) -> None:
         """Stops the robot until a reset, no matter who drives it. Needs no session."""
         self.release()
-        self._call_soon(partial(self._start, self._stops, partial(self._stop, reason)))
+        self._call_soon(partial(self._stops.start, partial(self._stop, reason)))
 
     def reset(self, stop_id: int) -> None:
         """Resets this stop; a newer one stays."""
-        self._call_soon(partial(self._start, self._calls, partial(self._reset, stop_id)))
+        self._call_soon(partial(self._calls.start, partial(self._reset, stop_id)))
 
     def enable(self) -> None:
         """Enables driving, for all."""
-        self._call_soon(partial(self._start, self._calls, self._enable))
+        self._call_soon(partial(self._calls.start, self._enable))
 
     # --- the loop ---
 
@@ -191,10 +185,9 @@ class Driver:
                 if self._options:
                     await self._drive(self._options)
         finally:
-            if self._stops:
-                await asyncio.wait(self._stops, timeout=_STOPS_END_WITHIN_S)
-            for call in (*self._stops, *self._calls):
-                call.cancel()
+            await self._stops.wait(_STOPS_END_WITHIN_S)
+            self._stops.cancel()
+            self._calls.cancel()
 
     def _begin(self, options: DriveOptions) -> None:
         if self._options is None:
@@ -210,7 +203,7 @@ class Driver:
                 self._on_change()
                 await self._until_the_end(session)
         except GatewayError as error:
-            self._note(f"Not driving: {error}", SeverityStyle.BAD)
+            self._notes.add(f"Not driving: {error}", SeverityStyle.BAD)
         finally:
             self._session = self._options = None
             self._on_change()
@@ -227,42 +220,27 @@ class Driver:
             if not self._ending.is_set():
                 raise
 
-    def _start(self, calls: "set[asyncio.Task[None]]", call: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        if len(calls) < _MOST_CALLS:
-            task = asyncio.create_task(call())
-            calls.add(task)
-            task.add_done_callback(partial(self._ended, calls))
-            self._on_change()
-
-    def _ended(self, calls: "set[asyncio.Task[None]]", task: "asyncio.Task[None]") -> None:
-        calls.discard(task)
-        self._on_change()
-
     async def _stop(self, reason: str) -> None:
         try:
             stopped = await self._robot.client.stop_robot(reason)
         except GatewayError as error:
-            self._note(f"The robot has NOT confirmed the stop: {error}", SeverityStyle.BAD)
+            self._notes.add(f"The robot has NOT confirmed the stop: {error}", SeverityStyle.BAD)
         else:
-            self._note(f"Stopped: {stopped.message}", SeverityStyle.WARNING)
+            self._notes.add(f"Stopped: {stopped.message}", SeverityStyle.WARNING)
 
     async def _reset(self, stop_id: int) -> None:
         try:
-            self._note((await self._robot.client.reset_stop(stop_id)).message, SeverityStyle.QUIET)
+            self._notes.add((await self._robot.client.reset_stop(stop_id)).message, SeverityStyle.QUIET)
         except GatewayError as error:
-            self._note(f"Not reset: {error}", SeverityStyle.BAD)
+            self._notes.add(f"Not reset: {error}", SeverityStyle.BAD)
 
     async def _enable(self) -> None:
         try:
             answer = await self._robot.client.set_driving_enabled(True)
         except GatewayError as error:
-            self._note(f"Driving is not enabled: {error}", SeverityStyle.BAD)
+            self._notes.add(f"Driving is not enabled: {error}", SeverityStyle.BAD)
         else:
-            self._note(answer.message, SeverityStyle.QUIET if answer.accepted else SeverityStyle.BAD)
-
-    def _note(self, text: str, style: SeverityStyle) -> None:
-        self._notes.append(Note(text, style))
-        self._on_change()
+            self._notes.add(answer.message, SeverityStyle.QUIET if answer.accepted else SeverityStyle.BAD)
 
 
 async def _until_lost(session: DriveSession) -> None:
