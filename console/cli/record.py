@@ -19,7 +19,13 @@ from console.client.export_path import path_below
 from console.client.exporting import ExportedRecording
 from console.presentation.formatting import age, plural, size, wall_clock
 from console.presentation.json_form import json_form
-from console.presentation.recording import is_written, recording_state, recording_summary, remarks
+from console.presentation.recording import (
+    exported,
+    is_written,
+    recording_state,
+    recording_summary,
+    remarks,
+)
 
 record_app = typer.Typer(
     help="Record on the robot, keep its last minutes, copy recordings to this computer.",
@@ -236,7 +242,7 @@ def exported_json(done: ExportedRecording) -> dict[str, Any]:
 
 
 def _exported(done: ExportedRecording, recording: Recording) -> str:
-    text = f"{done.folder}: {plural(done.files, 'file')}, {size(done.size)}, verified"
+    text = exported(done)
     if done.not_final or is_written(recording):
         rest = plural(len(done.not_final), "file")
         text += f"\nThe recording goes on: {rest} not final yet. Later, type the same with --resume"

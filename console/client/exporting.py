@@ -285,7 +285,7 @@ class Export:
                 chunk = await stream.read(SILENT_S)
                 data = _checked(chunk, partial.size, file)
                 self._received += len(data)
-                partial.append(data)
+                await _to_the_end(partial.append, data)
                 self._report(file, number, partial.size)
         finally:
             stream.cancel()
@@ -302,6 +302,19 @@ class Export:
                 waiting,
             )
         )
+
+
+async def _to_the_end(write: Callable[[bytes], None], data: bytes) -> None:
+    """Writes in a thread: a slow disk must not keep the loop, which may be driving.
+
+    Cancelled, it waits for the end of the write, because the file is closed next.
+    """
+    writing = asyncio.ensure_future(asyncio.to_thread(write, data))
+    try:
+        await asyncio.shield(writing)
+    except asyncio.CancelledError:
+        await asyncio.wait((writing,))
+        raise
 
 
 def _checked(chunk: Any, expected_offset: int, file: RecordingFile) -> bytes:

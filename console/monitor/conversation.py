@@ -24,6 +24,7 @@ from console.monitor.event_log import EventLine, line_of
 from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState
+from console.monitor.recordings import RecordingClient
 from console.monitor.snapshot_events import SnapshotEvents
 from console.monitor.viewer_feedback import ViewerFeedback
 
@@ -40,7 +41,7 @@ _LONGEST_RETRY_AFTER_S: Final = 60.0
 _MS_PER_S: Final = 1000
 
 
-class RobotClient(DriveClient, Protocol):
+class RobotClient(DriveClient, RecordingClient, Protocol):
     """The calls of `console.client.AsyncGatewayClient` that the monitor makes."""
 
     def watch_status(

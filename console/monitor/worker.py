@@ -25,6 +25,7 @@ from console.monitor.driver import Driver
 from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
+from console.monitor.recordings import Pictures, Recordings
 from console.monitor.viewer_feedback import ViewerFeedback
 
 # One attempt is short here: the conversation retries by itself, and reports each failure.
@@ -57,9 +58,11 @@ class Worker:
         picture: returns the report on the picture that is shown; None while there is none to report.
         captured: returns when the picture that is shown was captured, in ns of the robot's monotonic clock;
             None without one.
+        pictures: makes pictures of recordings' key frames; None for none.
 
     Attributes:
         driver: drives, and stops the robot.
+        recordings: lists, changes and copies recordings.
 
     Raises:
         UserError: the target is not an address.
@@ -74,6 +77,7 @@ class Worker:
         *,
         picture: Callable[[], PictureReport | None] = lambda: None,
         captured: Callable[[], int | None] = lambda: None,
+        pictures: Pictures | None = None,
     ) -> None:
         self.target = parse_target(target)
         first = MonitorState(Link(state=LinkState.CONNECTING, since_s=time.monotonic()))
@@ -85,6 +89,7 @@ class Worker:
         self._feedback = ViewerFeedback(picture)
         self._conversation = Conversation(self._latest, retry or RetryBackoff(), self._feedback)
         self.driver = Driver(self._call_soon, on_change, captured)
+        self.recordings = Recordings(self._call_soon, on_change, lambda: self._connect(self.target), pictures)
 
     def start(self) -> None:
         """Starts the thread."""
@@ -155,7 +160,12 @@ class Worker:
 
     async def _converse(self) -> None:
         async with self._connect(self.target) as robot:
-            await first_to_end(self._conversation.run(robot), self.driver.run(robot), self._closing.wait())
+            await first_to_end(
+                self._conversation.run(robot),
+                self.driver.run(robot),
+                self.recordings.run(robot),
+                self._closing.wait(),
+            )
         # gRPC's own tasks end when its cancelled calls have. Its queue of completions is the process's: what
         # came for this loop after its end would be an error in another worker's.
         if left := asyncio.all_tasks() - {asyncio.current_task()}:

@@ -1,5 +1,6 @@
 """How recordings read for people."""
 
+from console.client.exporting import ExportedRecording
 from console.client.results import (
     Recording,
     RecordingCopyState,
@@ -9,8 +10,18 @@ from console.client.results import (
     RecordingStopReason,
 )
 from console.presentation.formatting import age, joined, plural, size
+from console.presentation.severity_style import RECORDER_STYLES, SeverityStyle
+from console.presentation.value_style import of_recorder
 
 _MS_PER_S = 1000
+
+
+def recorder_mark(status: RecordingStatus) -> tuple[str, SeverityStyle]:
+    """Returns the recorder's state in words, and its style: that of the room where this is short."""
+    room_left = of_recorder(status)
+    if room_left.style is SeverityStyle.GOOD:
+        return status.state.value, RECORDER_STYLES[status.state]
+    return joined(status.state.value, room_left.word.lower()), room_left.style
 
 
 def recording_summary(status: RecordingStatus, *, compact: bool) -> str:
@@ -38,6 +49,11 @@ def room(status: RecordingStatus) -> str:
     if status.room_s is not None:
         return f"room for {age(status.room_s * _MS_PER_S)}"
     return f"room for {size(status.room_bytes)}" if status.room_bytes else ""
+
+
+def exported(done: ExportedRecording) -> str:
+    """Returns what of a recording is on this computer now."""
+    return f"{done.folder}: {plural(done.files, 'file')}, {size(done.size)}, verified"
 
 
 def recording_state(recording: Recording) -> str:

@@ -28,13 +28,12 @@ from console.presentation.formatting import (
     quantity,
     signed,
 )
-from console.presentation.recording import recording_summary
+from console.presentation.recording import recorder_mark, recording_summary
 from console.presentation.severity_style import (
     FAULT_STYLES,
     FRESHNESS_STYLES,
     HEALTH_STYLES,
     PREVIEW_STYLES,
-    RECORDER_STYLES,
     SeverityStyle,
 )
 from console.presentation.value_style import (
@@ -265,8 +264,7 @@ def _recording(view: View) -> Iterator[Row]:
     recording = view.status.recording
     if recording is not None:
         text = recording_summary(recording, compact=view.compact)
-        style = RECORDER_STYLES[recording.state]
-        yield view.state(view.label("recording"), recording.state.value, style, text)
+        yield view.state(view.label("recording"), *recorder_mark(recording), text)
 
 
 def _motion(odometry: results.Odometry, compact: bool) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
+from console.client.results import RecorderState
 from console.presentation.severity_style import SeverityStyle
 
 
@@ -20,6 +21,7 @@ class Judgement(NamedTuple):
 
 
 GOOD: Final = Judgement(SeverityStyle.GOOD, "")
+_ROOM_UNKNOWN: Final = (RecorderState.UNKNOWN, RecorderState.UNREACHABLE, RecorderState.RECOVERING)
 _ORDER: Final = (SeverityStyle.QUIET, SeverityStyle.GOOD, SeverityStyle.WARNING, SeverityStyle.BAD)
 
 
@@ -59,6 +61,9 @@ LOSS_PERCENT: Final = Limits(2, 10, "LOSSY")
 ROUND_TRIP_MS: Final = Limits(150, 400, "SLOW")
 PICTURE_AGE_MS: Final = Limits(150, 400, "LATE")
 """An older picture hurts driving."""
+SHORT_ROOM_S: Final = 3600
+"""For recordings, at the present rate: less counts as short for the recorder, too. It is never worse than a
+warning, because the recorder may go on for ever by deleting the oldest."""
 
 
 def worst(judgements: Iterable[Judgement]) -> Judgement:
@@ -101,3 +106,16 @@ def of_video(measured: results.PreviewMeasurement) -> Judgement:
     return worst(
         (LOSS_PERCENT.judge(measured.worst_loss_percent), ROUND_TRIP_MS.judge(measured.worst_rtt_ms))
     )
+
+
+def of_recorder(recorder: results.RecordingStatus) -> Judgement:
+    """Judges whether it can record, and the room that is left."""
+    if recorder.state is RecorderState.FAULTED:
+        return Judgement(SeverityStyle.BAD, "CAN'T RECORD")
+    if recorder.state in _ROOM_UNKNOWN:
+        return GOOD
+    if not recorder.room_bytes:
+        return Judgement(SeverityStyle.WARNING, "NO ROOM")
+    if recorder.room_s is not None and recorder.room_s < SHORT_ROOM_S:
+        return Judgement(SeverityStyle.WARNING, "LOW ROOM")
+    return GOOD

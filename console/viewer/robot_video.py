@@ -14,6 +14,7 @@ from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
 from console.viewer.picture_meter import PictureMeter
 from console.viewer.session import VideoSession
+from console.viewer.thumbnails import Thumbnails
 
 _SILENT_AFTER_S: Final = 1.0
 """Silence of the robot after which its boxes are not drawn: they may be wrong by then."""
@@ -47,7 +48,12 @@ class RobotVideo:
         self._on_change = on_change
         self.recording = recording
         self.worker = Worker(
-            target, self._update_session, connecting(load), picture=self._report, captured=self._captured
+            target,
+            self._update_session,
+            connecting(load),
+            picture=self._report,
+            captured=self._captured,
+            pictures=Thumbnails(),
         )
         self.meter = PictureMeter(self.worker.clock_offset, self._delivery, self._preview)
         """Ages of the pictures; what shows them notes them here."""

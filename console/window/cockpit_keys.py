@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from console.presentation.preview_switch import PROFILES
 from console.window.keys import Key, full_screen_key
+from console.window.side_panel import TABS
 
 if TYPE_CHECKING:
     from console.window.monitor_window import MonitorWindow
@@ -27,13 +28,15 @@ def cockpit_keys(window: "MonitorWindow") -> Sequence[Key]:
     )
     tabs = (
         Key((f"Ctrl+{number}",), f"tab {title}", partial(window.show_tab, number - 1))
-        for number, title in enumerate(("Status", "Events", "Plots"), start=1)
+        for number, title in enumerate(TABS, start=1)
     )
     return (
         Key(("P",), "preview on or off", window.switch),
         *profiles,
         Key(("O",), "boxes around objects", window.toggle_boxes),
         Key(("S",), "save the picture and its status", window.save_picture),
+        Key(("C",), "record, and stop recording", window.recording.record),
+        Key(("K",), "keep the last seconds", window.recording.keep),
         Key(("T",), "drive, and end driving", window.driving.toggle),
         Key(("Shift+R",), "reset the stop that is shown", window.driving.reset),
         Key(("A",), "acknowledge all faults", window.acknowledge),

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable  # noqa: TC003  # read by the type checker alone
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QTimer
@@ -34,8 +35,9 @@ from console.window.layout import fill
 from console.window.picture_area import PictureArea
 from console.window.plot import Plots
 from console.window.preview_actions import PreviewActions
+from console.window.recording_actions import RecordingActions
 from console.window.saver import Saver
-from console.window.side_panel import SidePanel
+from console.window.side_panel import TABS, SidePanel
 from console.window.theme import COCKPIT
 from console.window.top_bar import TopBar
 from console.window.video_view import VideoView
@@ -90,6 +92,7 @@ class MonitorWindow(QWidget):
             SidePanel(),
         )
         self.driving = Driving(self, worker, self.strip, self.picture, pad)
+        self.recording = RecordingActions(worker, self.side.recordings, self.header, self.toasts)
         keys = cockpit_keys(self)
         self.picture.show_keys((*keys, *KEYS_OF_THE_HANDS))
         self.preview = self.strip.preview
@@ -102,6 +105,8 @@ class MonitorWindow(QWidget):
         self.setWindowTitle(f"Robot {worker.target}")
         chosen = window_settings.restore(self)
         self.alarm.sound_on = chosen.sound
+        if chosen.exports:
+            self.recording.folder = Path(chosen.exports)
         self._panel_open, self._picture_only = chosen.panel, False
         self.arrange()
         self.refresh()
@@ -121,6 +126,8 @@ class MonitorWindow(QWidget):
         self._show_faults(state)
         self.side.show_state(state, controls, self.alarm, now_s)
         self.driving.show_state(state)
+        self.recording.show_state(state)
+        self.side.show_recordings_tab(not self.recording.absent)
         if state.snapshot:
             self._trail.add(state.snapshot.status.odometry, state.received_s)
         self._motion = motion(state, now_s, self._motion)
@@ -176,6 +183,8 @@ class MonitorWindow(QWidget):
         if not self.side.isVisible():
             self.toggle_panel()
         self.side.show_tab(number)
+        if TABS[number] == "Recordings":
+            self.recording.say_if_absent()
 
     def search_events(self) -> None:
         """Moves to the search for events."""
@@ -231,7 +240,7 @@ class MonitorWindow(QWidget):
         """Ends driving, saves the settings, and waits for a file that is being written."""
         self.driving.close()
         self._timer.stop()
-        window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on))
+        window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on, str(self.recording.folder)))
         self.saver.job.wait(_SAVES_END_WITHIN_S)
         super().closeEvent(event)
 

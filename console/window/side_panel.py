@@ -1,4 +1,4 @@
-"""Side panel: active faults, and below them tabs with status, events and, in a narrow window, plots."""
+"""Side panel: active faults, and below them tabs: status, events, recordings, in a narrow window plots."""
 
 from typing import Final
 
@@ -27,8 +27,10 @@ from console.window.labels import set_bold, set_text
 from console.window.layout import fill
 from console.window.lines import LineList, NoteLine, StatusLine
 from console.window.plot import Plots
+from console.window.recordings_tab import RecordingsTab
 
 WIDTH_PX: Final = 300
+TABS: Final = ("Status", "Events", "Plots", "Recordings")
 _LEAST_FAULTS_PX: Final = 72
 _FAULTS_SHARE: Final = 1, 4
 """Heights of faults and tabs: fixed, so that a new fault does not move what is below."""
@@ -56,6 +58,7 @@ class SidePanel(QWidget):
         self.events_tab = EventsTab()
         self.events = self.events_tab.list
         self.plots = Plots(QBoxLayout.Direction.TopToBottom)
+        self.recordings = RecordingsTab()
         self.tabs = QTabWidget()
         self._lay_out()
 
@@ -82,6 +85,12 @@ class SidePanel(QWidget):
         """Shows or hides the tab of the plots."""
         self.tabs.setTabVisible(self.tabs.indexOf(self.plots), shown)
 
+    def show_recordings_tab(self, shown: bool) -> None:
+        """Shows or hides the tab of the recordings."""
+        number = self.tabs.indexOf(self.recordings)
+        if self.tabs.isTabVisible(number) != shown:
+            self.tabs.setTabVisible(number, shown)
+
     def _fault_line(self) -> FaultLine:
         line = FaultLine()
         line.acknowledged.connect(self.acknowledged)
@@ -93,11 +102,12 @@ class SidePanel(QWidget):
         faults = _scrolled("Faults", self.faults, self.notes)
         faults.setMinimumHeight(_LEAST_FAULTS_PX)
         status = _scrolled("Status", self.components)
-        for page, name in ((status, "Status"), (self.events_tab, "Events"), (self.plots, "Plots")):
+        pages = (status, self.events_tab, self.plots, self.recordings)
+        for page, name in zip(pages, TABS, strict=True):
             self.tabs.addTab(page, name)
         self.tabs.setDocumentMode(True)
-        self.tabs.setAccessibleName("Status, events, plots")
-        self.tabs.tabBar().setAccessibleName("Status, events, plots (Ctrl+1 to Ctrl+3)")
+        self.tabs.setAccessibleName(", ".join(TABS))
+        self.tabs.tabBar().setAccessibleName(f"{', '.join(TABS)} (Ctrl+1 to Ctrl+{len(TABS)})")
         above, below = _FAULTS_SHARE
         fill(QVBoxLayout(self), title, (faults, above), buttons, (self.tabs, below), spacing=4)
 

@@ -1,9 +1,10 @@
-"""Settings of the window that are kept between runs: place and size, side panel, alarm sound.
+"""Settings of the window that are kept between runs: place and size, side panel, sound, exports.
 
 Kept in $XDG_CONFIG_HOME/robot-gateway/monitor.ini. A missing or broken file is ignored.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QByteArray, QSettings, QSize, Qt
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 _GEOMETRY: Final = "window/geometry"
 _PANEL: Final = "window/panel"
 _SOUND: Final = "alarm/sound"
+_EXPORTS: Final = "recordings/exports"
 _FIRST_SIZE: Final = QSize(1280, 800)
 DECORATION: Final = QSize(16, 48)
 """What a desktop puts around a window, roughly."""
@@ -24,10 +26,12 @@ class Choices:
     Args:
         panel: whether the side panel is open.
         sound: whether alarms are heard.
+        exports: folder of exported recordings; empty for the usual one.
     """
 
     panel: bool
     sound: bool
+    exports: str = ""
 
 
 def restore(window: QWidget) -> Choices:
@@ -38,7 +42,11 @@ def restore(window: QWidget) -> Choices:
     value = settings.value(_GEOMETRY)
     if not (isinstance(value, QByteArray) and window.restoreGeometry(value)):
         window.setWindowState(Qt.WindowState.WindowMaximized)
-    return Choices(_flag(settings, _PANEL, True), _flag(settings, _SOUND, False))
+    exports = settings.value(_EXPORTS)
+    absolute = isinstance(exports, str) and Path(exports).is_absolute()
+    return Choices(
+        _flag(settings, _PANEL, True), _flag(settings, _SOUND, False), str(exports) if absolute else ""
+    )
 
 
 def save(window: QWidget, choices: Choices) -> None:
@@ -47,6 +55,7 @@ def save(window: QWidget, choices: Choices) -> None:
     settings.setValue(_GEOMETRY, window.saveGeometry())
     settings.setValue(_PANEL, choices.panel)
     settings.setValue(_SOUND, choices.sound)
+    settings.setValue(_EXPORTS, choices.exports)
     settings.sync()
 
 

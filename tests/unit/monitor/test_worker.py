@@ -42,6 +42,7 @@ from console.monitor.conversation import RetryBackoff
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState
 from console.monitor.worker import Worker
+from tests.support.played_recordings import PlayedRecordings
 from tests.support.snapshots import event, snapshot
 from tests.support.waiting import wait_until
 
@@ -67,10 +68,11 @@ class NotDriven:
         raise NotImplementedError(enabled)
 
 
-class PlayedRobot(NotDriven):
+class PlayedRobot(NotDriven, PlayedRecordings):
     """Answers as the test sets it up, and records the calls."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.error: GatewayError | None = None
         self.streams = True
         """Whether it streams its status with detections; else it is an older one."""

@@ -1,0 +1,429 @@
+"""Recordings from a window: the list, its pictures, what an operator asks for, and one copy at a time.
+
+Everything runs in the worker's loop. The list is requested when the recorder's state changes, and while it is
+shown every ten seconds besides. A copy has a connection of
+its own, so that neither status nor commands of a driver wait behind it.
+
+    a call is refused or fails      a note says why; the list is requested anew
+    the role does not suffice       the same, and `denied` until other credentials are used
+    the list can't be had           `problem` says why; what was listed stays
+    a picture can't be had          the recording has none; after a lost connection it is requested again
+    a copy fails, or is cancelled   what was received stays, and another one goes on from there
+"""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, suppress
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import partial
+from pathlib import Path
+from typing import Final, NoReturn, Protocol
+
+from common.errors import UserError
+from console.client import (
+    ExportedRecording,
+    ExportOptions,
+    ExportProgress,
+    GatewayError,
+    Recording,
+    RecordingStatus,
+)
+from console.client.results import (
+    RecorderState,
+    RecordingAnswer,
+    RecordingDeleted,
+    RecordingPage,
+    RecordingThumbnail,
+)
+from console.monitor.calls import Calls
+from console.monitor.export_meter import ExportMeter, ExportRate
+from console.monitor.notes import Notes
+from console.presentation.preview_switch import Note
+from console.presentation.recording import exported
+from console.presentation.severity_style import SeverityStyle
+
+MOST_LISTED: Final = 200
+"""One page of the contract. `robotctl record list` lists all."""
+_LIST_EVERY_S: Final = 10.0
+"""Without a change of the recorder's status: a copy elsewhere, for example, changes nothing of it."""
+_LEAST_BETWEEN_LISTS_S: Final = 1.0
+_LEAST_BETWEEN_PICTURES_S: Final = 0.1
+_PICTURES_AGAIN_S: Final = 5.0
+_MOST_EXPORTS: Final = 20
+"""Whose ends are remembered."""
+_EXPORT_ENDS_WITHIN_S: Final = 0.5
+_UNLISTABLE: Final = (RecorderState.UNKNOWN, RecorderState.UNREACHABLE)
+_ROLE_TOO_LOW: Final = "ROLE_TOO_LOW"
+"""docs/errors.md"""
+
+
+class RecordingClient(Protocol):
+    """The calls of `console.client.AsyncGatewayClient` that are made here."""
+
+    async def list_recordings(self, page_size: int = ..., page_token: str = ...) -> RecordingPage:
+        """Returns a page of the list."""
+
+    async def start_recording(self, label: str = ..., *, preset: str = ...) -> RecordingAnswer:
+        """Starts a recording."""
+
+    async def stop_recording(self, recording_id: str = ...) -> RecordingAnswer:
+        """Stops a recording."""
+
+    async def trigger_snapshot(self, label: str = ..., *, pre_s: int | None = ...) -> RecordingAnswer:
+        """Keeps the last seconds."""
+
+    async def recording_thumbnail(self, recording_id: str) -> RecordingThumbnail:
+        """Returns a key frame."""
+
+    async def pin_recording(self, recording_id: str, pinned: bool = ...) -> RecordingAnswer:
+        """Pins a recording, or ends that."""
+
+    async def delete_recording(self, recording_id: str, *, expected_sha256: bytes = ...) -> RecordingDeleted:
+        """Deletes a recording."""
+
+    async def export_recording(
+        self, recording_id: str, folder: Path, options: ExportOptions | None = ...
+    ) -> ExportedRecording:
+        """Copies a recording to this computer."""
+
+
+class RecordingRobot(Protocol):
+    """The client in use; another one after each change of the credentials."""
+
+    @property
+    def client(self) -> RecordingClient:
+        """The client with the credentials in use."""
+
+
+class Pictures(Protocol):
+    """Makes pictures of key frames; `console.viewer.thumbnails.Thumbnails` does."""
+
+    async def picture(
+        self, recording: Recording, fetch: Callable[[], Awaitable[RecordingThumbnail]]
+    ) -> bytes:
+        """Returns the pixels; empty where none can be made. Raises a `GatewayError` of `fetch`."""
+
+
+class Change(Enum):
+    """What an operator asks for."""
+
+    START = "start"
+    STOP = "stop"
+    KEEP = "keep"
+    PIN = "pin"
+    DELETE = "delete"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A change, and the recording that it is for; empty for the one that runs."""
+
+    change: Change
+    recording_id: str = ""
+
+
+class ExportState(Enum):
+    """State of a copy."""
+
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportView:
+    """A copy at one moment.
+
+    Args:
+        folder: on this computer.
+        state: its state.
+        done, total: bytes; `total` is 0 before the first.
+        rate: of the newest seconds.
+        text: why nothing comes, what is there, or why it failed; may be empty.
+    """
+
+    folder: Path
+    state: ExportState = ExportState.RUNNING
+    done: int = 0
+    total: int = 0
+    rate: ExportRate = field(default_factory=ExportRate)
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingsView:
+    """What is known of the recordings at one moment.
+
+    Args:
+        listed: the newest ones, the newest first; None before the first list.
+        more: whether there are others.
+        problem: why the list can't be had; empty while it can.
+        pending: what the robot has yet to answer.
+        denied: why this caller may change nothing; empty as long as nothing was refused for that.
+        exports: copies by the recording's ID, the newest last.
+        pictures: pixels by the recording's ID; empty ones where there are none.
+    """
+
+    listed: tuple[Recording, ...] | None = None
+    more: bool = False
+    problem: str = ""
+    pending: frozenset[Asked] = frozenset()
+    denied: str = ""
+    exports: Mapping[str, ExportView] = field(default_factory=dict)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+
+    @property
+    def exporting(self) -> str:
+        """The ID of the recording that is being copied; empty without one."""
+        running = (name for name, each in self.exports.items() if each.state is ExportState.RUNNING)
+        return next(running, "")
+
+
+class Recordings:
+    """Lists, changes and copies recordings. Thread-safe; nothing here waits.
+
+    Args:
+        call_soon: calls a function in the loop that runs `run`.
+        on_change: called in that loop after each change of what `view` and `take_notes` return; must only
+            hand over.
+        connect: opens another connection to the robot, for a copy.
+        pictures: makes pictures of key frames; None for none.
+    """
+
+    _robot: RecordingRobot
+
+    def __init__(
+        self,
+        call_soon: Callable[[Callable[[], object]], None],
+        on_change: Callable[[], None],
+        connect: Callable[[], AbstractAsyncContextManager[RecordingRobot]],
+        pictures: Pictures | None = None,
+    ) -> None:
+        self._call_soon = call_soon
+        self._on_change = on_change
+        self._connect = connect
+        self._pictures = pictures
+        self._view = RecordingsView()
+        self._notes = Notes(on_change)
+        self._calls = Calls(on_change)
+        self._followed: object = None
+        """What of the recorder's status says that its recordings have changed."""
+        self._again_s: float | None = None
+        """Time until the next list without a change; None for none."""
+        self._listable, self._changed, self._visible = asyncio.Event(), asyncio.Event(), asyncio.Event()
+        self._to_picture: tuple[Recording, ...] = ()
+        self._export: asyncio.Task[None] | None = None
+        self._denied_to: RecordingClient | None = None
+
+    # --- any thread ---
+
+    def view(self) -> RecordingsView:
+        """Returns the present view."""
+        return self._view
+
+    def take_notes(self) -> list[Note]:
+        """Returns the answers that were not taken yet."""
+        return self._notes.take()
+
+    def follow(self, status: RecordingStatus | None, *, shown: bool) -> None:
+        """Takes the recorder's newest status; lists the recordings anew when they may have changed.
+
+        Args:
+            status: None while there is none that holds.
+            shown: whether the list can be seen.
+        """
+        recorder = None
+        if status and status.state not in _UNLISTABLE:
+            recorder = (status.state, status.recording_id, status.recordings, status.snapshots_pending, shown)
+        if recorder != self._followed:
+            self._followed = recorder
+            self._call_soon(partial(self._follow, recorder is not None, shown))
+
+    def show_pictures(self, recordings: tuple[Recording, ...]) -> None:
+        """Gets pictures for these recordings, which are the ones that can be seen."""
+        if recordings != self._to_picture:
+            self._to_picture = recordings
+            self._call_soon(self._visible.set)
+
+    def start(self, label: str, preset: str) -> None:
+        """Starts a recording."""
+        self._ask(Asked(Change.START), lambda robot: robot.start_recording(label, preset=preset))
+
+    def stop(self, recording_id: str) -> None:
+        """Stops the recording that was seen to run; another one goes on."""
+        self._ask(Asked(Change.STOP), lambda robot: robot.stop_recording(recording_id))
+
+    def keep(self, label: str, seconds: int) -> None:
+        """Keeps the last seconds."""
+        self._ask(Asked(Change.KEEP), lambda robot: robot.trigger_snapshot(label, pre_s=seconds))
+
+    def pin(self, recording_id: str, pinned: bool) -> None:
+        """Pins a recording, or ends that."""
+        self._ask(Asked(Change.PIN, recording_id), lambda robot: robot.pin_recording(recording_id, pinned))
+
+    def delete(self, recording: Recording) -> None:
+        """Deletes a recording as it was listed: one that has changed since stays."""
+        self._ask(
+            Asked(Change.DELETE, recording.id),
+            lambda robot: robot.delete_recording(recording.id, expected_sha256=recording.sha256),
+        )
+
+    def export(self, recording_id: str, folder: Path) -> None:
+        """Copies a recording, going on with what is there; no-op while another copy runs."""
+        self._call_soon(partial(self._begin_export, recording_id, folder))
+
+    def cancel_export(self) -> None:
+        """Ends the copy that runs; what was received stays."""
+        self._call_soon(self._cancel_export)
+
+    # --- the loop ---
+
+    async def run(self, robot: RecordingRobot) -> NoReturn:
+        """Serves until cancelled: then calls and a copy are cancelled. Raises only a defect of our own."""
+        self._robot = robot
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self._keep_listed())
+                tasks.create_task(self._keep_pictured())
+        finally:
+            self._calls.cancel()
+            if self._export:
+                self._export.cancel()
+                await asyncio.wait((self._export,), timeout=_EXPORT_ENDS_WITHIN_S)
+        raise AssertionError("both go on for ever")
+
+    def _follow(self, listable: bool, shown: bool) -> None:
+        self._again_s = _LIST_EVERY_S if shown else None
+        self._changed.set()
+        if listable:
+            self._listable.set()
+        else:
+            self._listable.clear()
+
+    async def _keep_listed(self) -> NoReturn:
+        while True:
+            await self._listable.wait()
+            self._changed.clear()
+            await self._list()
+            await asyncio.sleep(_LEAST_BETWEEN_LISTS_S)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(self._again_s):
+                    await self._changed.wait()
+
+    async def _list(self) -> None:
+        if self._denied_to is not self._robot.client:
+            self._update(denied="")
+        try:
+            page = await self._robot.client.list_recordings(MOST_LISTED)
+        except GatewayError as error:
+            self._update(problem=str(error))
+            return
+        listed = page.recordings[:MOST_LISTED]
+        ids = {each.id for each in listed}
+        pictures = {name: picture for name, picture in self._view.pictures.items() if name in ids}
+        self._update(listed=listed, more=bool(page.next_page_token), problem="", pictures=pictures)
+
+    async def _keep_pictured(self) -> NoReturn:
+        while True:
+            await self._visible.wait()
+            self._visible.clear()
+            if not await self._picture_visible():
+                await asyncio.sleep(_PICTURES_AGAIN_S)
+                self._visible.set()
+
+    async def _picture_visible(self) -> bool:
+        """Gets the pictures that are missing. Returns False where the robot did not answer."""
+        for recording in self._to_picture:
+            if self._pictures is None or recording.id in self._view.pictures:
+                continue
+            fetch = partial(self._robot.client.recording_thumbnail, recording.id)
+            try:
+                picture = await self._pictures.picture(recording, fetch)
+            except GatewayError as error:
+                if not error.reason:
+                    return False
+                # A refusal: it has no key frame, for example.
+                picture = b""
+            self._update(pictures={**self._view.pictures, recording.id: picture})
+            await asyncio.sleep(_LEAST_BETWEEN_PICTURES_S)
+            if self._visible.is_set():
+                break
+        return True
+
+    def _ask(
+        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
+    ) -> None:
+        self._call_soon(partial(self._begin, asked, call))
+
+    def _begin(
+        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
+    ) -> None:
+        if asked not in self._view.pending:
+            self._calls.start(partial(self._carry_out, asked, call))
+
+    async def _carry_out(
+        self, asked: Asked, call: Callable[[RecordingClient], Awaitable[RecordingAnswer | RecordingDeleted]]
+    ) -> None:
+        self._update(pending=self._view.pending | {asked})
+        client = self._robot.client
+        try:
+            self._notes.add((await call(client)).message, SeverityStyle.QUIET)
+        except GatewayError as error:
+            self._notes.add(str(error), SeverityStyle.BAD)
+            if error.reason == _ROLE_TOO_LOW:
+                self._denied_to = client
+                self._update(denied=error.what)
+        finally:
+            self._update(pending=self._view.pending - {asked})
+            self._changed.set()
+
+    def _begin_export(self, recording_id: str, folder: Path) -> None:
+        if self._export is None or self._export.done():
+            self._export = asyncio.create_task(self._copy(recording_id, folder))
+
+    def _cancel_export(self) -> None:
+        if self._export:
+            self._export.cancel()
+
+    async def _copy(self, recording_id: str, folder: Path) -> None:
+        meter = ExportMeter()
+
+        def progress(now: ExportProgress) -> None:
+            now_s = time.monotonic()
+            if meter.is_due(now_s) or now.waiting:
+                rate = meter.read(now_s, now.done, now.total)
+                self._show_export(recording_id, done=now.done, total=now.total, rate=rate, text=now.waiting)
+
+        others = [(name, each) for name, each in self._view.exports.items() if name != recording_id]
+        begun = (recording_id, ExportView(folder=folder))
+        self._update(exports=dict([*others[1 - _MOST_EXPORTS :], begun]))
+        try:
+            async with self._connect() as robot:
+                done = await robot.client.export_recording(
+                    recording_id, folder, ExportOptions(progress=progress)
+                )
+        except UserError as error:
+            self._show_export(recording_id, state=ExportState.FAILED, text=str(error))
+            self._notes.add(f"Not copied: {error}", SeverityStyle.BAD)
+        except asyncio.CancelledError:
+            self._show_export(recording_id, state=ExportState.CANCELLED, text="")
+            raise
+        else:
+            text = exported(done)
+            self._show_export(
+                recording_id, state=ExportState.DONE, done=done.size, total=done.size, text=text
+            )
+            self._notes.add(text, SeverityStyle.GOOD)
+
+    def _show_export(self, recording_id: str, **changes: object) -> None:
+        changed = replace(self._view.exports[recording_id], **changes)  # type: ignore[arg-type]
+        self._update(exports={**self._view.exports, recording_id: changed})
+
+    def _update(self, **changes: object) -> None:
+        view = replace(self._view, **changes)  # type: ignore[arg-type]
+        if view != self._view:
+            self._view = view
+            self._on_change()
