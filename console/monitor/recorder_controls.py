@@ -17,7 +17,7 @@ from console.monitor.monitor_state import MonitorState
 from console.monitor.recordings import Asked, Change, ExportState, ExportView, RecordingsView
 from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.preview_switch import Note
-from console.presentation.recording import is_written, recorder_mark, recording_state, remarks
+from console.presentation.recording import is_written, marks, recorder_mark, recording_state, remarks
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.presentation.value_style import of_recorder
 
@@ -48,6 +48,7 @@ _CUT_SHORT: Final = {
     RecordingStopReason.DISK: "because the disk has no more room",
     RecordingStopReason.ERROR: "by an error of the disk",
 }
+_BEGAN: Final = "%d %b %H:%M"
 _COMPONENT: Final = "recording"
 _DISK: Final = "recording.disk"
 """Component and ID of faults (docs/recording.md)."""
@@ -96,6 +97,7 @@ class RecordingItem:
         facts: begin, length, size.
         state: its state and what is remarkable, in words.
         style: of the state.
+        tip: all of it.
         picture: pixels; empty where there are none; None while they are not known.
         export, pin, delete: its buttons.
         copy: its copy on this computer; None without one.
@@ -107,6 +109,7 @@ class RecordingItem:
     facts: str
     state: str
     style: SeverityStyle
+    tip: str
     picture: bytes | None
     export: Action
     pin: Action
@@ -317,17 +320,25 @@ def _item(
     copy = view.exports.get(each.id)
     return RecordingItem(
         recording=each,
-        title=each.label or each.preset or each.id,
-        facts=joined(wall_clock(each.started_unix_ms), age(duration_ms), size(count)),
-        state=joined(recording_state(each), remarks(each)),
+        title=_title(each),
+        facts=joined(wall_clock(each.started_unix_ms, form=_BEGAN), age(duration_ms), size(count)),
+        state=joined(recording_state(each), marks(each)),
+        tip=f"{each.id}, {wall_clock(each.started_unix_ms)}. {joined(recording_state(each), remarks(each))}",
         style=_STATE_STYLES.get(each.state, SeverityStyle.QUIET),
-        picture=view.pictures.get(each.id) if each.video_frames and not is_written(each) else b"",
+        picture=view.pictures.get(each.id) if each.video_frames or is_written(each) else b"",
         export=_export(each, view, copy, silent),
         pin=Action("Unpin" if each.pinned else "Pin", _why_not_pinned(each, view, barred)),
         delete=Action("Delete ...", _why_not_deleted(each, view, barred, runs=runs)),
         copy=copy,
         copied=_copied(copy) if copy else "",
     )
+
+
+def _title(each: Recording) -> str:
+    if each.kind is RecordingKind.MANUAL:
+        return each.label or each.preset or each.id
+    kind = each.kind.value.replace("-", " ").capitalize()
+    return joined(kind, each.label or each.preset)
 
 
 def _export(each: Recording, view: RecordingsView, copy: ExportView | None, silent: str) -> Action:

@@ -72,9 +72,13 @@ def is_written(recording: Recording) -> bool:
 
 
 def remarks(recording: Recording) -> str:
-    """Returns what is remarkable about a recording: pinned, copied, incomplete, an incident."""
+    """Returns what is remarkable about a recording: an incident, pinned, copied, incomplete."""
+    return joined("" if recording.kind is RecordingKind.MANUAL else recording.kind.value, marks(recording))
+
+
+def marks(recording: Recording) -> str:
+    """Returns what has become of a recording: pinned, copied, incomplete, and why it was made."""
     return joined(
-        "" if recording.kind is RecordingKind.MANUAL else recording.kind.value,
         "pinned" if recording.pinned else "",
         "" if recording.copy.state is RecordingCopyState.UNKNOWN else f"copy {recording.copy.state.value}",
         plural(recording.gap_count, "gap") if recording.gap_count else "",

@@ -1,5 +1,6 @@
 """The list of recordings: a picture and three lines each, updated in place."""
 
+from html import escape
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -8,6 +9,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem
 
 from console.client import Recording
 from console.monitor.recorder_controls import RecordingItem
+from console.presentation.recording import is_written
 from console.presentation.severity_style import SeverityStyle
 from console.receiver.key_frame import HEIGHT_PX, PICTURE_BYTES, WIDTH_PX
 from console.window.theme import draw_shape
@@ -29,7 +31,7 @@ class RecordingList(QListWidget):
         self._items: dict[str, RecordingItem] = {}
         self.setAccessibleName("Recordings on the robot")
         self.setIconSize(_TILE)
-        self.setWordWrap(True)
+        self.setTextElideMode(Qt.TextElideMode.ElideRight)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QListWidget.ScrollMode.ScrollPerPixel)
         self.setMinimumHeight(_LEAST_ROWS * (_TILE.height() + 8))
@@ -53,11 +55,12 @@ class RecordingList(QListWidget):
             self.setCurrentRow(0)
 
     def visible(self) -> tuple[Recording, ...]:
-        """Returns the recordings that can be seen, and may have a picture."""
+        """Returns the recordings that can be seen, and whose picture can be had but is not there."""
         room = self.viewport().rect()
         rows = (self.item(row) for row in range(self.count()))
         seen = (self._items[each.data(_ID)] for each in rows if self.visualItemRect(each).intersects(room))
-        return tuple(each.recording for each in seen if each.picture is None)
+        missing = (each.recording for each in seen if each.picture is None)
+        return tuple(recording for recording in missing if not is_written(recording))
 
     def _show(self, row: int, each: RecordingItem) -> None:
         item = self._item_at(row, each.recording.id)
@@ -65,6 +68,7 @@ class RecordingList(QListWidget):
         if item.text() != text:
             item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, text.replace("\n", ", "))
+            item.setToolTip(f"<span>{escape(each.tip)}</span>")
         before = self._items.get(each.recording.id)
         shown = (before.picture, before.style) if before else None
         if shown != (each.picture, each.style):
