@@ -125,7 +125,7 @@ class RecorderControls:
     Args:
         absent: why there is no recorder; empty where there is one, or no status yet.
         mark, style: the recorder's state.
-        running: what is recorded: name, length, size.
+        running: what is recorded: length, size, name.
         room: how long there is room, at which rate.
         notes: what is wrong, the worst first.
         presets: what can be recorded.
@@ -134,7 +134,7 @@ class RecorderControls:
         record, keep: the buttons.
         items: the list, the newest first.
         listed: about the list as a whole.
-        tile: what the bar above the picture has; None without a recorder.
+        tile: what lies over the picture; None without a recorder.
     """
 
     absent: str = ""
@@ -209,10 +209,10 @@ def _running(status: RecordingStatus) -> str:
             plural(status.snapshots_pending, "snapshot") + " pending" if status.snapshots_pending else "",
         )
     return joined(
-        status.label or status.preset,
         age(status.elapsed_ms),
         size(status.size),
         "with video" if status.video else "without video",
+        status.label or status.preset,
         plural(status.messages_lost, "message") + " lost" if status.messages_lost else "",
     )
 

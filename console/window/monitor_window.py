@@ -92,7 +92,7 @@ class MonitorWindow(QWidget):
             SidePanel(),
         )
         self.driving = Driving(self, worker, self.strip, self.picture, pad)
-        self.recording = RecordingActions(worker, self.side.recordings, self.header, self.toasts)
+        self.recording = RecordingActions(worker, self.side.recordings, self.picture)
         keys = cockpit_keys(self)
         self.picture.show_keys((*keys, *KEYS_OF_THE_HANDS))
         self.preview = self.strip.preview

@@ -1,4 +1,4 @@
-"""The picture, edge to edge, with what lies over it: driving, gauges, trail, messages, keys."""
+"""The picture, edge to edge, with what lies over it: driving, gauges, trail, recorder, messages, keys."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -7,6 +7,7 @@ from PySide6.QtCore import QEvent, QPoint, QRect, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from console.monitor.bar_items import BarItem
 from console.monitor.motion import Motion
 from console.monitor.trail import Trail
 from console.presentation.drive_display import DriveDisplay
@@ -16,6 +17,7 @@ from console.window.gauge import Gauge
 from console.window.key_help import KeyHelp
 from console.window.keys import Key
 from console.window.layout import fill
+from console.window.record_tile import RecordTile
 from console.window.theme import COCKPIT
 from console.window.toasts import Toasts
 from console.window.trail_view import TrailView
@@ -44,8 +46,10 @@ class PictureArea(QWidget):
         self.turn = Gauge("Turn rate, left is positive", "rad/s", directed=True)
         self.trail, self._trail_place = TrailView(), QRect()
         self.hud, self._corner = DriveHud(), QPoint()
+        self.recorder = RecordTile()
         fill(QVBoxLayout(self), (video, 1))
-        for overlay in (self.speed, self.turn, self.trail, self.hud, self.toasts, self.banner, self.key_help):
+        corners = (self.speed, self.turn, self.trail, self.hud, self.recorder)
+        for overlay in (*corners, self.toasts, self.banner, self.key_help):
             overlay.setParent(self)
         # Not inside the paint event that found the new shape.
         video.reshaped.connect(self.place, Qt.ConnectionType.QueuedConnection)
@@ -67,6 +71,11 @@ class PictureArea(QWidget):
     def show_driving(self, display: DriveDisplay | None) -> None:
         """Shows the head-up display, on a robot that can be driven."""
         self.hud.show_display(display)
+        self._place_messages()
+
+    def show_recorder(self, item: BarItem | None) -> None:
+        """Shows the recorder below the place of the trail, while there is something to show."""
+        self.recorder.show_item(item)
         self._place_messages()
 
     def place(self) -> None:
@@ -100,6 +109,9 @@ class PictureArea(QWidget):
         top = 0 if self.banner.isHidden() else self.banner.height()
         self.trail.setGeometry(self._trail_place)
         self.trail.move(self._trail_place.left(), max(self._trail_place.top(), top + _EDGE_PX))
+        tile = self.recorder.sizeHint()
+        right, below = self._trail_place.right() + 1, self.trail.geometry().bottom() + 1 + _EDGE_PX
+        self.recorder.setGeometry(right - tile.width(), below, tile.width(), tile.height())
         self.hud.move(self._corner.x(), max(self._corner.y(), top + _EDGE_PX))
         # Beside the head-up display where there is room: an answer must not cover who drives.
         left = 0 if self.hud.isHidden() else self.hud.geometry().right()

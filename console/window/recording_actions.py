@@ -21,9 +21,8 @@ from console.monitor.recordings import ExportState
 from console.monitor.worker import Worker
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle
+from console.window.picture_area import PictureArea
 from console.window.recordings_tab import RecordingsTab
-from console.window.toasts import Toasts
-from console.window.top_bar import TopBar
 
 _LONGEST_NAME = 63
 
@@ -35,19 +34,18 @@ def default_folder() -> Path:
 
 
 class RecordingActions(QObject):
-    """Connects the worker's recordings, the tab, and the tile in the bar.
+    """Connects the worker's recordings, the tab, and the tile over the picture.
 
     Args:
         worker: talks to the gateway; none of its calls here blocks.
         tab: has the buttons.
-        bar: has the tile.
-        toasts: shows the answers.
+        picture: has the tile, and room for the answers.
     """
 
-    def __init__(self, worker: Worker, tab: RecordingsTab, bar: TopBar, toasts: Toasts) -> None:
+    def __init__(self, worker: Worker, tab: RecordingsTab, picture: PictureArea) -> None:
         super().__init__(tab)
         self._worker, self._recordings = worker, worker.recordings
-        self._tab, self._bar, self._toasts = tab, bar, toasts
+        self._tab, self._picture, self._toasts = tab, picture, picture.toasts
         self._now = RecorderControls()
         self.folder = default_folder()
         """Where exports are put."""
@@ -75,7 +73,7 @@ class RecordingActions(QObject):
         status = state.snapshot.status.recording if state.snapshot and known else None
         self._recordings.follow(status, shown=self._tab.isVisible())
         self._now = recorder_controls(state, self._recordings.view(), self._tab.preset, now_s)
-        self._bar.show_recorder(self._now.tile)
+        self._picture.show_recorder(self._now.tile)
         if self._tab.isVisible():
             self._tab.show_folder(self.folder)
             self._tab.show_controls(self._now)

@@ -20,7 +20,7 @@ _GROUND: Final = QColor("#3a4046")
 _INK: Final = QColor("#c8ccd0")
 _MARK: Final = QRectF(6, 6, 30, 30)
 """In the pixels of the picture, of which two are one of the tile."""
-_LEAST_ROWS: Final = 2
+_LEAST_ROWS: Final = 3
 
 
 class RecordingList(QListWidget):
@@ -34,7 +34,11 @@ class RecordingList(QListWidget):
         self.setTextElideMode(Qt.TextElideMode.ElideRight)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QListWidget.ScrollMode.ScrollPerPixel)
-        self.setMinimumHeight(_LEAST_ROWS * (_TILE.height() + 8))
+        self.setMinimumHeight(self.sizeHint().height())
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Returns the least that shows a list; it gets what else there is."""
+        return QSize(_TILE.width(), _LEAST_ROWS * (_TILE.height() + 3))
 
     @property
     def chosen(self) -> RecordingItem | None:

@@ -87,7 +87,7 @@ class SidePanel(QWidget):
 
     def show_recordings_tab(self, shown: bool) -> None:
         """Shows or hides the tab of the recordings."""
-        number = self.tabs.indexOf(self.recordings)
+        number = TABS.index("Recordings")
         if self.tabs.isTabVisible(number) != shown:
             self.tabs.setTabVisible(number, shown)
 
@@ -102,7 +102,7 @@ class SidePanel(QWidget):
         faults = _scrolled("Faults", self.faults, self.notes)
         faults.setMinimumHeight(_LEAST_FAULTS_PX)
         status = _scrolled("Status", self.components)
-        pages = (status, self.events_tab, self.plots, self.recordings)
+        pages = (status, self.events_tab, self.plots, _in_scroll_area("Recordings", self.recordings))
         for page, name in zip(pages, TABS, strict=True):
             self.tabs.addTab(page, name)
         self.tabs.setDocumentMode(True)
@@ -115,6 +115,10 @@ class SidePanel(QWidget):
 def _scrolled(name: str, *parts: QWidget) -> QScrollArea:
     inner = QWidget()
     fill(QVBoxLayout(inner), *parts, spacing=2).addStretch(1)
+    return _in_scroll_area(name, inner)
+
+
+def _in_scroll_area(name: str, inner: QWidget) -> QScrollArea:
     scroll = QScrollArea()
     scroll.setWidget(inner)
     scroll.setWidgetResizable(True)

@@ -1,4 +1,4 @@
-"""The bar above the picture: robot, health, battery, link, age of the picture, recorder, mode, time."""
+"""The bar above the picture: robot, health, battery, link, age of the picture, mode, time."""
 
 from typing import Final
 
@@ -6,7 +6,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from console.monitor.bar_items import (
-    BarItem,
     battery_item,
     clock_item,
     health_item,
@@ -55,8 +54,6 @@ class TopBar(QWidget):
         self.link = Cell("Link", _WIDEST_LINK, Marker())
         self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture age"), Marker())
         self.mode = Cell("Mode", ("autonomous", "mode"), None)
-        self.recorder = Cell("Recording", ("FINALISING", "room 999.9 GB"), Marker())
-        self.recorder.setVisible(False)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)
         self.panel_button = _button("Panel", "Side panel (F9)", checkable=True)
         self.help_button = _button("?", "Keys (F1)")
@@ -94,17 +91,11 @@ class TopBar(QWidget):
         self.mode.show_item(mode_item(state))
         self.clock.show_item(clock_item())
 
-    def show_recorder(self, item: BarItem | None) -> None:
-        """Shows the recorder, on a robot that has one."""
-        self.recorder.setVisible(item is not None)
-        if item:
-            self.recorder.show_item(item)
-
     def _lay_out(self) -> None:
         robot = fill(QVBoxLayout(), self.name, self.target, spacing=0, margins=(0, 2, 0, 3))
         self.target.setMinimumWidth(round(width_of(_USUAL_TARGET) * SMALL))
         self.target.setContentsMargins(4, 0, 0, 0)
-        cells = (self.battery, self.link, self.picture, self.recorder, self.mode, self.clock)
+        cells = (self.battery, self.link, self.picture, self.mode, self.clock)
         parts = (robot, (self.health, 1), *cells, self.panel_button, self.help_button)
         fill(QHBoxLayout(self), *parts, spacing=14, margins=(6, 0, 8, 0))
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from omniseer.gateway.v1 import preview_pb2
+from omniseer.gateway.v1 import preview_pb2, recording_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import StreamingGatewayDouble, serving
 from tests.support.running_preview import RunningPreview
@@ -88,6 +88,22 @@ def with_teleop(double: StreamingGatewayDouble) -> None:
     teleop = double.status.teleop
     teleop.state, teleop.enabled = states.TELEOP_ENABLED, True
     teleop.max_linear_mps, teleop.max_angular_rad_s = 0.8, 1.5
+
+
+def with_recorder(double: StreamingGatewayDouble) -> None:
+    """Makes it a robot that records, with little room left."""
+    recording = double.status.recording
+    recording.state, recording.recording_id = recording_pb2.RECORDER_STATE_RECORDING, "one"
+    recording.label, recording.preset, recording.video = "lap 12, with the new wheels", "driving", True
+    recording.elapsed_ms, recording.size, recording.bytes_per_s = 4_265_000, 1_340_000_000, 314_000
+    recording.room_bytes, recording.room_s, recording.ring_s = 770_000_000, 2452, 60
+    recording.presets.add(
+        name="driving",
+        description="motion and state, without images",
+        with_video=True,
+        bytes_per_minute=18_800_000,
+        in_ring=True,
+    )
 
 
 def with_trouble(double: StreamingGatewayDouble) -> None:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-_SITUATIONS: Final = ("cockpit", "panel-closed", "trouble", "driving", "dark", "view")
+_SITUATIONS: Final = ("cockpit", "panel-closed", "trouble", "driving", "recording", "dark", "view")
 _FRAMES: Final = 5
 _HISTORY_S: Final = 4.0
 """Until the trail is visible, and the plots have a curve."""
@@ -59,7 +59,8 @@ def main() -> None:
 
 def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
     from console.window.programs import monitor  # noqa: PLC0415
-    from tests.support.cockpit import seeing_robot, with_teleop, with_trouble  # noqa: PLC0415
+    from console.window.side_panel import TABS  # noqa: PLC0415
+    from tests.support.cockpit import seeing_robot, with_recorder, with_teleop, with_trouble  # noqa: PLC0415
     from tests.support.qt import let_pass, until  # noqa: PLC0415
 
     with seeing_robot(directory) as robot, monitor(robot.target) as window, _frames(window.video) as frames:
@@ -69,6 +70,10 @@ def _cockpit(situation: str, directory: Path, file: Path) -> Mapping[str, Any]:
             with_trouble(robot.gateway)
         if situation in ("trouble", "driving"):
             with_teleop(robot.gateway)
+        if situation == "recording":
+            with_recorder(robot.gateway)
+            until(lambda: not window.recording.absent, "the recorder")
+            window.show_tab(TABS.index("Recordings"))
         if situation == "panel-closed":
             window.toggle_panel()
         let_pass(1.0)

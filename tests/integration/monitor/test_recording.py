@@ -100,7 +100,7 @@ def test_a_recording_from_the_first_second_to_the_last_copy(operator: Operator, 
     until(lambda: tab.record.text() == "Stop recording", "a recording runs")
     until(lambda: "with video" in tab.running.text(), "with its video", 40)
     until(lambda: tab.room.text().startswith("Room for") and "/s" in tab.room.text(), "how long it may go on")
-    until(lambda: window.header.recorder.word.text() == "REC", "the tile")
+    until(lambda: window.picture.recorder.cell.word.text() == "REC", "the tile")
     until(tab.keep.isEnabled, "the ring has something to keep")
     press(window, Qt.Key.Key_K)
     operator.said("is being made")

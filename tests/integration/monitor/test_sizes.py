@@ -35,6 +35,7 @@ def shot(situation: str, width: int, height: int, scale: int = 1) -> Mapping[str
     [
         ("trouble", 1024, 600, 1, 0.47),
         ("driving", 1280, 800, 1, 0.50),
+        ("recording", 1024, 600, 1, 0.47),
         ("panel-closed", 1280, 800, 1, 0.80),
         ("cockpit", 1920, 1080, 1, 0.65),
         ("cockpit", 3840, 2160, 2, 0.65),

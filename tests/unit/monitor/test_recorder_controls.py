@@ -101,7 +101,7 @@ def test_a_recording_that_runs_shows_time_size_and_room_at_the_present_rate() ->
         True,
         "lap",
     )
-    assert now.running == "lap 1, 2 min 05 s, 40.0 MB, with video"
+    assert now.running == "2 min 05 s, 40.0 MB, with video, lap 1"
     assert now.room == "Room for 100 min at 1.0 MB/s"
     assert now.tile
     assert (now.tile.word, now.tile.detail, now.tile.style) == ("REC", "room 100 min", SeverityStyle.GOOD)
