@@ -39,8 +39,9 @@ def application() -> QApplication:
 
 @pytest.fixture
 def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A configuration directory of the test's own."""
+    """A directory of the test's own for settings and pictures."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path))
     return tmp_path
 
@@ -80,19 +81,27 @@ def press(
     QTest.keyClick(widget, key, *modifier)
 
 
-def keep_screenshot(widget: QWidget, name: str, *, fills_in_s: float = 0.0) -> Path:
+def keep_screenshot(
+    widget: QWidget,
+    name: str,
+    *,
+    fills_in_s: float = 0.0,
+    at_last: Callable[[], object] = lambda: None,
+) -> Path:
     """A screenshot, as an artefact; in lossless PNG.
 
     Args:
         widget: what is shown.
         name: of the file.
         fills_in_s: time until plots and texts are worth a picture in the documents.
+        at_last: returns when what must be seen is there; the picture is taken at that moment.
     """
     if os.environ.get(_FOR_THE_DOCUMENTS):
         let_pass(fills_in_s)
     KEPT_IN.mkdir(parents=True, exist_ok=True)
     file = KEPT_IN / f"{name}.png"
     let_pass(_LAID_OUT_AFTER_S)
+    at_last()
     # Qt's 0 is the smallest file, without any loss.
     assert widget.grab().save(str(file), "PNG", 0), f"{file} can't be written"
     return file

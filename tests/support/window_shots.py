@@ -36,7 +36,7 @@ def _choose_screen(width: int, height: int, scale: int, directory: Path) -> None
     file.write_text(json.dumps(form), encoding="utf-8")
     os.environ["QT_QPA_PLATFORM"] = f"offscreen:configfile={file}"
     os.environ["QT_SCALE_FACTOR"] = str(scale)
-    os.environ["XDG_CONFIG_HOME"] = str(directory)
+    os.environ["XDG_CONFIG_HOME"] = os.environ["XDG_CACHE_HOME"] = str(directory)
 
 
 def main() -> None:

@@ -123,7 +123,7 @@ def test_a_recording_from_the_first_second_to_the_last_copy(operator: Operator, 
     tab.label.setText("lap 2")
     press(window, Qt.Key.Key_C)
     until(lambda: "lap 2" in tab.running.text(), "another one runs")
-    keep_screenshot(window, "recording", fills_in_s=12)
+    keep_screenshot(window, "recording", fills_in_s=12, at_last=lambda: pictured(operator))
     operator.click(tab.record)
     until(lambda: tab.record.text() == "Record", "it has ended")
     assert tab.list.chosen
@@ -144,3 +144,9 @@ def test_a_recording_from_the_first_second_to_the_last_copy(operator: Operator, 
     delete = next(button for button in question.buttons() if button.text() == "Delete")
     QTest.mouseClick(delete, Qt.MouseButton.LeftButton)
     until(lambda: not any("lap 1" in row for row in operator.rows()), "it is gone")
+
+
+def pictured(operator: Operator) -> None:
+    """The snapshot has a picture as well, and no message lies over the live one."""
+    until(lambda: len(operator.window._worker.recordings.view().pictures) == 2, "both pictures", 40)
+    operator.window.toasts.dismiss()
