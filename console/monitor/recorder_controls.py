@@ -161,7 +161,7 @@ def deletion_question(item: RecordingItem) -> str:
 
 
 def recorder_controls(
-    state: MonitorState, view: RecordingsView, preset: str, now_s: float
+    state: MonitorState, view: RecordingsView, preset: str, now_s: float, *, with_items: bool = True
 ) -> RecorderControls:
     """Returns the panel.
 
@@ -170,6 +170,7 @@ def recorder_controls(
         view: of the recordings.
         preset: the one that is chosen; empty for the first.
         now_s: on the monotonic clock.
+        with_items: whether the list can be seen; without it most of the work is saved.
     """
     if state.snapshot is None:
         return RecorderControls()
@@ -179,6 +180,7 @@ def recorder_controls(
     lost = _NO_ANSWER if state.outdated(now_s) else ""
     silent = lost or (_BUSY[status.state] if status.state is RecorderState.UNREACHABLE else "")
     barred = lost or _BUSY.get(status.state, "")
+    listed = (view.listed or ()) if with_items else ()
     mark, style = recorder_mark(status)
     notes = () if lost else tuple(_notes(state.snapshot.status.faults, status, view))
     if lost:
@@ -196,7 +198,7 @@ def recorder_controls(
         running_id=status.recording_id,
         record=_record(status, view, barred),
         keep=Action(f"Keep the last {KEPT_S} s", _why_not_kept(status, view, barred)),
-        items=tuple(_item(each, status, view, silent, barred) for each in view.listed or ()),
+        items=tuple(_item(each, status, view, silent, barred) for each in listed),
         listed=_listed(view),
         tile=BarItem(_word(status), _tile_room(status), style, joined(mark, *(note.text for note in notes))),
     )

@@ -71,10 +71,13 @@ class RecordingActions(QObject):
             self._toasts.show_passing(note)
         known = state.snapshot is not None and not state.outdated(now_s)
         status = state.snapshot.status.recording if state.snapshot and known else None
-        self._recordings.follow(status, shown=self._tab.isVisible())
-        self._now = recorder_controls(state, self._recordings.view(), self._tab.preset, now_s)
+        shown = self._tab.isVisible()
+        self._recordings.follow(status, shown=shown)
+        self._now = recorder_controls(
+            state, self._recordings.view(), self._tab.preset, now_s, with_items=shown
+        )
         self._picture.show_recorder(self._now.tile)
-        if self._tab.isVisible():
+        if shown:
             self._tab.show_folder(self.folder)
             self._tab.show_controls(self._now)
             self._recordings.show_pictures(self._tab.list.visible())

@@ -1,6 +1,7 @@
 """The list of recordings: a picture and three lines each, updated in place."""
 
 from html import escape
+from itertools import takewhile
 from typing import Final
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -60,10 +61,11 @@ class RecordingList(QListWidget):
 
     def visible(self) -> tuple[Recording, ...]:
         """Returns the recordings that can be seen, and whose picture can be had but is not there."""
-        room = self.viewport().rect()
-        rows = (self.item(row) for row in range(self.count()))
-        seen = (self._items[each.data(_ID)] for each in rows if self.visualItemRect(each).intersects(room))
-        missing = (each.recording for each in seen if each.picture is None)
+        first, room = self.itemAt(1, 1), self.viewport().rect()
+        rows = (self.item(row) for row in range(self.row(first) if first else 0, self.count()))
+        seen = takewhile(lambda row: self.visualItemRect(row).intersects(room), rows)
+        items = (self._items[each.data(_ID)] for each in seen)
+        missing = (each.recording for each in items if each.picture is None)
         return tuple(recording for recording in missing if not is_written(recording))
 
     def _show(self, row: int, each: RecordingItem) -> None:

@@ -21,6 +21,8 @@ FILE = "data/000000.mcap"
 METADATA = b"rosbag2_bagfile_information: {}\n"
 DATA = bytes(range(256)) * 1024 * 16 + b"end"
 """16 chunks and a bit."""
+LONG = DATA * 8
+"""More than may be on its way, of which a client holds 64 chunks."""
 
 
 def robot_with(**files: bytes) -> RecorderDouble:
@@ -69,7 +71,7 @@ async def test_a_whole_recording_arrives_in_its_own_layout(tmp_path: Path) -> No
 
 
 async def test_a_cut_connection_costs_less_than_a_chunk(tmp_path: Path) -> None:
-    double = robot_with()
+    double = robot_with(**{FILE: LONG})
     async with recording_robot(tmp_path, double) as robot:
         with Relay(robot.port) as relay:
             options = ExportOptions(progress=partly(double, 5 * CHUNK_BYTES))
@@ -78,7 +80,7 @@ async def test_a_cut_connection_costs_less_than_a_chunk(tmp_path: Path) -> None:
             relay.cut()
             double.flowing.set()
             done = await asyncio.wait_for(copying, 30)
-    assert (tmp_path / "to/one" / FILE).read_bytes() == DATA
+    assert (tmp_path / "to/one" / FILE).read_bytes() == LONG
     assert done.cuts == 1
     assert done.received - done.size <= CHUNK_BYTES
     (first, began), (second, offset), *_ = double.exports
@@ -87,7 +89,7 @@ async def test_a_cut_connection_costs_less_than_a_chunk(tmp_path: Path) -> None:
 
 
 async def test_cancelled_it_leaves_a_part_and_another_export_goes_on_from_there(tmp_path: Path) -> None:
-    double, to = robot_with(), tmp_path / "to"
+    double, to = robot_with(**{FILE: LONG}), tmp_path / "to"
     async with recording_robot(tmp_path, double) as robot:
         options = ExportOptions(progress=partly(double, 3 * CHUNK_BYTES))
         copying = asyncio.create_task(copied(robot.port, to, options))
@@ -104,7 +106,7 @@ async def test_cancelled_it_leaves_a_part_and_another_export_goes_on_from_there(
         done = await copied(robot.port, to)
     assert double.exports[1] == (FILE, left)
     assert done.received == done.size - left
-    assert (to / "one" / FILE).read_bytes() == DATA
+    assert (to / "one" / FILE).read_bytes() == LONG
     assert not part.exists()
 
 
@@ -152,7 +154,7 @@ async def test_a_whole_that_is_not_what_the_robot_says_is_not_kept(tmp_path: Pat
 
 
 async def test_a_file_that_changes_ends_the_export_and_says_so(tmp_path: Path) -> None:
-    double = robot_with()
+    double = robot_with(**{FILE: LONG})
     async with recording_robot(tmp_path, double) as robot:
         with Relay(robot.port) as relay:
             options = ExportOptions(progress=partly(double, CHUNK_BYTES))
@@ -190,7 +192,7 @@ async def test_hostile_names_write_nothing_at_all(tmp_path: Path, name: str) -> 
 
 
 async def test_a_recorder_that_goes_away_and_comes_back(tmp_path: Path) -> None:
-    double = robot_with()
+    double = robot_with(**{FILE: LONG})
     async with recording_robot(tmp_path, double) as robot:
         options = ExportOptions(progress=partly(double, CHUNK_BYTES))
         copying = asyncio.create_task(copied(robot.port, tmp_path / "to", options))
@@ -201,7 +203,7 @@ async def test_a_recorder_that_goes_away_and_comes_back(tmp_path: Path) -> None:
         double.flowing.set()
         done = await asyncio.wait_for(copying, 60)
     assert done.cuts >= 1
-    assert (tmp_path / "to/one" / FILE).read_bytes() == DATA
+    assert (tmp_path / "to/one" / FILE).read_bytes() == LONG
 
 
 async def test_it_gives_up_when_nothing_comes_for_too_long(tmp_path: Path) -> None:
