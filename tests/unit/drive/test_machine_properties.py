@@ -170,17 +170,42 @@ class Driving(RuleBasedStateMachine):
         streaming=st.booleans(),
         velocity=velocities,
         flaw=st.sampled_from(["", "forever"]),
+        times=st.sampled_from([5, 40]),
     )
-    def set_off(self, supervision: Supervision, streaming: bool, velocity: Velocity, flaw: str) -> None:
-        """Does everything that it takes to drive: by chance alone it would hardly come about."""
+    def set_off(
+        self, supervision: Supervision, streaming: bool, velocity: Velocity, flaw: str, times: int
+    ) -> None:
+        """Does everything that it takes to drive, perhaps until it is as fast as it may be."""
         self.drive(held=False, velocity=ZERO, times=1)
         self.reset(right=True)
         self.enable(enabled=True)
         self.all_clear()
         self.grant(session="s1", supervision=supervision, streaming=streaming)
         self.drive(held=False, velocity=ZERO, times=1)
-        self.drive(held=True, velocity=velocity, times=5, flaw=flaw)
+        self.drive(held=True, velocity=velocity, times=times, flaw=flaw)
         assert self.state.phase is Phase.DRIVING
+
+    @rule(
+        session=st.sampled_from(SESSIONS),
+        supervision=st.sampled_from(Supervision),
+        velocity=velocities,
+        stopped=st.booleans(),
+    )
+    def hold_without_a_release(
+        self, session: str, supervision: Supervision, velocity: Velocity, stopped: bool
+    ) -> None:
+        """Holds right after a reset, or as another session: no release before that counts."""
+        self.enable(enabled=True)
+        self.all_clear()
+        self.drive(held=False, velocity=ZERO, times=1)
+        if stopped:
+            self.stop(by="anna")
+        self.reset(right=True)
+        if not stopped or self.lease is None:
+            self.grant(session=session, supervision=supervision, streaming=True)
+        streaming = self.lease is not None and self.lease.streaming
+        self.drive(held=True, velocity=velocity, times=3)
+        assert not (streaming and self.state.phase is Phase.DRIVING)
 
     @rule(by=st.sampled_from(["anna", "ben"]))
     def stop(self, by: str) -> None:
@@ -271,6 +296,13 @@ class Driving(RuleBasedStateMachine):
         assert abs(output.vx_mps) <= limits.vx_mps + 1e-9
         assert abs(output.vy_mps) <= limits.vy_mps + 1e-9
         assert abs(output.wz_rad_s) <= limits.wz_rad_s + 1e-9
+        rim_mps = abs(output.vx_mps) + abs(output.vy_mps) + limits.wheel_lever_m * abs(output.wz_rad_s)
+        assert rim_mps <= limits.wheel_mps + 1e-9
+        if self.state.phase is Phase.DRIVING and self.lease and self.newest:
+            by_eye = self.lease.supervision is Supervision.LINE_OF_SIGHT
+            age_s = (self.now_ns - self.newest.picture_ns) / 1e9
+            assert not by_eye or output.linear_mps <= limits.line_of_sight_mps + 1e-9
+            assert by_eye or output.linear_mps * age_s <= limits.picture_travel_m + 1e-9
         elapsed_s = (self.state.output_ns - self.before.output_ns) / 1e9
         previous = self.before.output or ZERO
         for name, limit in (
