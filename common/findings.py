@@ -4,8 +4,9 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
+import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -77,6 +78,13 @@ def print_findings(findings: Sequence[Finding], *, as_json: bool, out: Console) 
     out.print(_table(findings))
     count = sum(each.verdict is Verdict.WRONG for each in findings)
     out.print(Text("nothing is wrong" if count == 0 else f"{count} to fix", style="bold"))
+
+
+def end_with_findings(findings: Iterable[Finding], *, as_json: bool) -> NoReturn:
+    """Prints what a doctor has found on standard output, and ends the command with the exit code."""
+    found = list(findings)
+    print_findings(found, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
+    raise typer.Exit(int(exit_code(found)))
 
 
 _STYLES: Final = {Verdict.GOOD: "green", Verdict.NOTE: "yellow", Verdict.WRONG: "bold red"}

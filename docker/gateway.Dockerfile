@@ -70,6 +70,7 @@ COPY common common
 COPY console console
 COPY drive drive
 COPY gateway gateway
+COPY practice practice
 COPY preview preview
 COPY recorder recorder
 COPY simrobot simrobot

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from common import config, logs, program
 from common.check_options import PrintOption, SchemaOption, check_settings
-from common.findings import exit_code, print_findings
+from common.findings import end_with_findings
 from drive.config import DriveSettings
 from drive.log_thread import log_in_thread
 
@@ -68,9 +67,7 @@ def doctor(
     # So that a terminal that is closed ends a pulse with zeros.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
-    findings = list(examine(config_file, with_pulse=pulse))
-    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
-    raise typer.Exit(int(exit_code(findings)))
+    end_with_findings(examine(config_file, with_pulse=pulse), as_json=as_json)
 
 
 def main() -> None:

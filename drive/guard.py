@@ -21,6 +21,7 @@ from common.backoff import Backoff
 from common.errors import ExitCode
 from common.heartbeat import Heartbeats
 from drive.machine import OnLoss
+from drive.real_time import delayed_by
 from drive.stop_file import StopFile, Stops
 from drive.values import MS, ZERO, Latch, Velocity
 from drive.watch import Watch
@@ -139,7 +140,7 @@ class Guard:
             if self._end_by_ns is not None:
                 worker.terminate()  # The signal to stop came while it was being started.
             watch = Watch.started(time.monotonic_ns())
-            failure = self._follow(ours, watch)
+            failure = self._follow(ours, watch, worker.pid)
         # First the kill, then the zeros: a worker that thaws must not have the last word.
         if failure:
             worker.kill()
@@ -166,7 +167,7 @@ class Guard:
                 self._stops = Stops(stop_id, Latch(stop_id, "robot-drive", reason))
                 self._stop_file.keep(self._stops)
 
-    def _follow(self, heartbeats: socket.socket, watch: Watch) -> str:
+    def _follow(self, heartbeats: socket.socket, watch: Watch, pid: int) -> str:
         """Reads heartbeats until they end (empty) or the worker has to be killed; returns why, for people.
 
         Zeros go out until the first, where a driver had the robot before.
@@ -185,7 +186,8 @@ class Guard:
                 except DecodeError:
                     return "the worker sends what is no heartbeat, and is killed"
             elif watch.silent(now_ns := time.monotonic_ns()):
-                return f"no heartbeat of the worker for {(now_ns - watch.heard_ns) // MS} ms: it is killed"
+                silent_ms = (now_ns - watch.heard_ns) // MS
+                return f"no heartbeat of the worker for {silent_ms} ms, {delayed_by(pid)}: it is killed"
             if self._end_by_ns is not None and time.monotonic_ns() >= self._end_by_ns:
                 return "the worker does not end, and is killed"
 

@@ -18,6 +18,18 @@ _LOCK_PRESENT: Final = 1 | 4
 """MCL_CURRENT | MCL_ONFAULT, mlockall(2): what has been touched. MCL_FUTURE would have allocations fail that
 exceed RLIMIT_MEMLOCK."""
 
+_RUNNABLE: Final = "R"
+"""It runs, or would if a processor were free; a process that runs sends its heartbeats."""
+_DOING: Final = {
+    "S": "it waits in the kernel",
+    "D": "it waits for a device",
+    "T": "it is stopped",
+    "t": "a debugger has stopped it",
+    "Z": "it has ended",
+    "X": "it has ended",
+}
+"""By the letter of proc_pid_stat(5)."""
+
 
 def raise_priority(priority: int) -> None:
     """Asks for real-time priority, which RLIMIT_RTPRIO (`ulimit -r`) permits without privileges.
@@ -32,6 +44,21 @@ def raise_priority(priority: int) -> None:
         except OSError as error:
             _log.info("without real-time priority: %s", error.strerror)
             return
+
+
+def delayed_by(pid: int) -> str:
+    """Returns what keeps a silent process from going on, as the kernel sees it at this moment, for people."""
+    try:
+        # The command's name, in parentheses, may contain anything: proc_pid_stat(5).
+        state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0].decode()
+        where = Path(f"/proc/{pid}/wchan").read_text(encoding="ascii", errors="replace")
+        real_time = os.sched_getscheduler(pid) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO
+    except OSError as error:
+        return f"what it does is not known ({error.strerror})"
+    if state == _RUNNABLE:
+        return "it waits for a processor" + ("" if real_time else ", without real-time priority")
+    doing = _DOING.get(state, f"it is in state {state}")
+    return f"{doing} ({where})" if where.strip("0") else doing
 
 
 def lock_memory() -> None:

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from common import logs
 from common.check_options import PrintOption, SchemaOption
 from common.config import SettingsConflictError, as_yaml, json_schema
 from common.errors import UserError
-from common.findings import exit_code, print_findings
+from common.findings import end_with_findings
 from common.program import bound_arenas, run, run_command_line
 from gateway.access.reloader import load_access
 from gateway.app import serve as serve_until
@@ -82,9 +81,7 @@ def doctor(
 
     Ends 0 when nothing is wrong, 1 when something is.
     """
-    findings = list(examine(config))
-    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
-    raise typer.Exit(int(exit_code(findings)))
+    end_with_findings(examine(config), as_json=as_json)
 
 
 def main() -> None:

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from common import config, logs, program
 from common.check_options import PrintOption, SchemaOption, check_settings
 from common.errors import ExitCode
-from common.findings import exit_code, print_findings
+from common.findings import end_with_findings
 from recorder.config import RecorderSettings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Records the robot's topics and video.")
@@ -71,9 +70,7 @@ def doctor(config_file: _Config = None, as_json: _AsJson = False) -> None:
     """Finds out what keeps this robot from recording; exits 1 if something is wrong."""
     from recorder.doctor.examination import examine  # noqa: PLC0415
 
-    findings = list(examine(config_file))
-    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
-    raise typer.Exit(int(exit_code(findings)))
+    end_with_findings(examine(config_file), as_json=as_json)
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Final
+from typing import Any, Final
 
 _END_WITHIN_S: Final = 10
 
@@ -29,7 +29,7 @@ def spawn(
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, env=variables)
 
 
-def end(process: "subprocess.Popen[bytes]") -> None:
+def end(process: "subprocess.Popen[Any]") -> None:
     """Terminates a program, and kills it where that takes too long."""
     process.terminate()
     try:

@@ -51,6 +51,10 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
         "console.cli.drive:drive",
         "Drive the robot by keyboard or gamepad, with your own eyes on it, where the robot permits that.",
     ),
+    "practice": (
+        "practice.cli:practice",
+        "Practise driving in the monitor's window, without a robot: nothing leaves this computer.",
+    ),
     "record": (
         "console.cli.record:record_app",
         "Record on the robot, keep its last minutes, copy recordings to this computer.",

@@ -82,7 +82,7 @@ def view(
     address = parse_target(session.target)
     _require_gstreamer()
     if not headless:
-        with _requiring_qt("--headless works without"):
+        with requiring_qt("--headless works without"):
             from console.window.programs import run_view  # noqa: PLC0415 - Qt is needed here only
     # A login that can't be used is reported before a file is made.
     session.credentials()
@@ -106,7 +106,7 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
 
     Keys: F1 lists all; p preview on or off, 1-3 profile, F9 side panel, f picture only, s save, q quit.
     """
-    with _requiring_qt():
+    with requiring_qt():
         from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
     session = session_of(context, target, robot)
 
@@ -147,7 +147,7 @@ def _require_gstreamer() -> None:
 
 
 @contextmanager
-def _requiring_qt(alternative: str = "") -> Iterator[None]:
+def requiring_qt(alternative: str = "") -> Iterator[None]:
     """Turns a failed import of `console.window` into an error with a remedy.
 
     Args:

@@ -223,7 +223,7 @@ class AsyncGatewayClient:
         """
         if self._second is None:
             self._second = self._connect()
-        request = stop_request(reason)
+        request = stop_request(_request_id(), reason)
         calls = (self._calls, UnaryCalls(self._second, self._options))
         attempts = [
             asyncio.create_task(each.call(STOP_ROBOT, request, self._within_s), name="stop") for each in calls
@@ -403,7 +403,7 @@ class AsyncGatewayClient:
 
 
 def _request_id() -> str:
-    """Returns an ID by which the robot recognises a call that is repeated after a lost connection."""
+    """Returns an ID by which the robot recognises a call that comes again, or on a second connection."""
     return uuid.uuid4().hex
 
 

@@ -13,14 +13,14 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Final, Self, TypeAlias
+from typing import Final, Protocol, Self, TypeAlias
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.version import project_version
 from console.client.errors import GatewayError, GatewayFailed, Refused, Unreachable
 from console.client.mapping.driving import DriveCommand, command_request, join_request, open_request
-from console.client.mapping.methods import DRIVE
+from console.client.mapping.methods import DRIVE, Method
 from console.client.results import (
     DriveInhibit,
     DriveLimits,
@@ -30,7 +30,6 @@ from console.client.results import (
     StopLatch,
     Supervision,
 )
-from console.client.transport import Duplex, GrpcTransport
 
 HOLD_COUNTS_S: Final = 0.1
 """A hold that is not renewed for this long is a release: the program that reads the driver's hands hangs.
@@ -52,7 +51,33 @@ _REJOINS: Final = 3
 _NS_PER_S: Final = 1_000_000_000
 
 
-_Lane: TypeAlias = Duplex[DriveOpened | DriveState | None]
+LaneItem: TypeAlias = DriveOpened | DriveState | None
+
+
+class Lane(Protocol):
+    """One lane, open; `console.client.transport.Duplex` is one. Its end raises a `GatewayError`."""
+
+    async def write(self, request: bytes) -> None:
+        """Sends a request."""
+
+    async def read(self) -> LaneItem:
+        """Returns the next item."""
+
+    async def finish(self) -> None:
+        """Ends the requests; the robot then ends the lane."""
+
+    def cancel(self) -> None:
+        """Ends the lane at once."""
+
+
+class LaneTransport(Protocol):
+    """Opens one lane; `console.client.transport.GrpcTransport` can."""
+
+    def open_both_ways(self, method: Method[LaneItem]) -> Lane:
+        """Returns the lane."""
+
+    async def close(self) -> None:
+        """Ends it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +125,7 @@ class DriveSession:
     """
 
     def __init__(
-        self, connect: Callable[[], GrpcTransport], options: DriveOptions, opens_within_s: float
+        self, connect: Callable[[], LaneTransport], options: DriveOptions, opens_within_s: float
     ) -> None:
         self._connect = connect
         self._options = options
@@ -344,7 +369,7 @@ class DriveSession:
         ]
         await self._changes.wait_until(lambda: self._open_lanes == LANES or self._error is not None, _LANES_S)
 
-    async def _first_lane(self) -> tuple[GrpcTransport, _Lane]:
+    async def _first_lane(self) -> tuple[LaneTransport, Lane]:
         options = self._options
         opening = open_request(self._name, options.supervision, take_over=options.take_over)
         deadline_s = time.monotonic() + self._opens_within_s
@@ -361,7 +386,7 @@ class DriveSession:
                     raise
             await asyncio.sleep(pause_s)
 
-    async def _open_lane(self, opening: bytes, within_s: float) -> tuple[GrpcTransport, _Lane]:
+    async def _open_lane(self, opening: bytes, within_s: float) -> tuple[LaneTransport, Lane]:
         transport = self._connect()
         try:
             async with asyncio.timeout(within_s):
@@ -378,7 +403,7 @@ class DriveSession:
             self._session_id, self.limits = opened.session_id, opened.limits
         return transport, lane
 
-    async def _keep_lane(self, opened: tuple[GrpcTransport, _Lane] | None) -> None:
+    async def _keep_lane(self, opened: tuple[LaneTransport, Lane] | None) -> None:
         """Keeps one lane open as long as another is: the last one's end is the session's."""
         backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
         while not self._ending and self._error is None:
@@ -397,7 +422,7 @@ class DriveSession:
             opened = None
             await asyncio.sleep(backoff.next_s())
 
-    async def _serve_lane(self, transport: GrpcTransport, lane: _Lane) -> None:
+    async def _serve_lane(self, transport: LaneTransport, lane: Lane) -> None:
         """Writes commands and reads states.
 
         Raises:
@@ -421,7 +446,7 @@ class DriveSession:
             await transport.close()
             self._changes.notify_all()
 
-    async def _write(self, lane: _Lane, on_their_way: "OnTheirWay") -> None:
+    async def _write(self, lane: Lane, on_their_way: "OnTheirWay") -> None:
         """Writes the newest command whenever there is a new one; those in between are skipped."""
         seen = 0
         while True:

@@ -6,7 +6,7 @@ from typing import Final
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
 from console.client.driving import SENTENCES, stopped_by
-from console.client.results import DriveInhibit, FaultSeverity, HealthState, SourceState, TeleopState
+from console.client.results import DriveInhibit, FaultSeverity, HealthState, SourceState, Teleop, TeleopState
 
 LARGEST_SKEW_S: Final = 1.0
 _FALLBACK: Final = "preview.fallback"
@@ -139,7 +139,7 @@ _INHIBITED: Final = {
 
 
 def driving_findings(status: SystemStatus) -> Iterator[Finding]:
-    """Yields what keeps the robot from being driven; nothing where it is not set up for that."""
+    """Yields what keeps the robot from being driven, and what stops its base; nothing if it is not set up."""
     teleop = status.teleop
     if teleop.state is TeleopState.UNKNOWN:
         return
@@ -147,7 +147,12 @@ def driving_findings(status: SystemStatus) -> Iterator[Finding]:
         what = f"the robot is stopped {stopped_by(teleop.stop)}"
         remedy = f"When it may move again, type: robotctl reset-stop {teleop.stop.stop_id}"
         yield note("driving", what, "Nothing moves until that is reset", remedy)
-        return
+    else:
+        yield from _obstacles(teleop)
+    yield _base_timeout(teleop.base_timeout_ms)
+
+
+def _obstacles(teleop: Teleop) -> Iterator[Finding]:
     for inhibit in teleop.inhibits:
         if inhibit in _INHIBITED:
             yield note(
@@ -158,7 +163,6 @@ def driving_findings(status: SystemStatus) -> Iterator[Finding]:
     elif not teleop.inhibits:
         who = f"{teleop.holder} drives" if teleop.holder else "no one drives"
         yield good("driving", f"the robot can be driven; {who}")
-    yield _base_timeout(teleop.base_timeout_ms)
 
 
 def _base_timeout(timeout_ms: int | None) -> Finding:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from console.client import DeadlineExceeded, GatewayError, NotAllowed, NotTrusted, Unreachable
-from console.presentation.formatting import age
+from console.presentation.formatting import age, sentence
 from console.presentation.severity_style import SeverityStyle
 
 _MS_PER_S = 1000
@@ -75,8 +75,8 @@ def link_text(link: Link, target: str, now_s: float) -> LinkText:
             rejected = isinstance(link.error, NotAllowed | NotTrusted)
             lack = "No access" if rejected else "No answer"
             retry = f"{lack} for {duration}. Attempt {link.attempts + 1} {_when(link, rejected, now_s)}."
-            banner = error[:1].upper() + error[1:]
-            return LinkText(_mark(link.error), SeverityStyle.BAD, f"for {duration}", banner, retry)
+            mark = _mark(link.error)
+            return LinkText(mark, SeverityStyle.BAD, f"for {duration}", sentence(error), retry)
 
 
 def _mark(error: GatewayError | None) -> str:

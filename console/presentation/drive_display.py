@@ -7,7 +7,7 @@ from typing import Final
 from console.client import DrivePhase, DriveState, StopLatch, Supervision
 from console.client.driving import rest_reasons
 from console.client.results import DriveLimits, Teleop, TeleopState
-from console.presentation.formatting import joined
+from console.presentation.formatting import joined, sentence
 from console.presentation.severity_style import DRIVE_STYLES, SeverityStyle
 from console.steering import permitted
 
@@ -88,7 +88,7 @@ def watched_display(teleop: Teleop, *, known: bool = True) -> DriveDisplay | Non
         driver=f"{teleop.holder} drives" if teleop.holder else "No driver",
         phase=phase.value.upper(),
         style=DRIVE_STYLES[phase],
-        reason=_sentence(rest_reasons(teleop.stop, teleop.inhibits)),
+        reason=sentence(rest_reasons(teleop.stop, teleop.inhibits)),
         stop=teleop.stop,
     )
 
@@ -115,7 +115,7 @@ def own_display(
         driver=f"You drive{by}",
         phase=state.phase.value.upper(),
         style=SeverityStyle.BAD if late else DRIVE_STYLES[state.phase],
-        reason=". ".join(filter(None, (_sentence(reason), step))),
+        reason=". ".join(filter(None, (sentence(reason), step))),
         bars=tuple(_bars(state, limits, supervision)),
         ages=joined(
             f"command {state.command_age_ms + round(state_age_s * _MS_PER_S)} ms",
@@ -134,7 +134,3 @@ def _bars(state: DriveState, limits: DriveLimits, supervision: Supervision) -> l
     # Without a speed nothing turns, either.
     turn_rad_s = most.wz_rad_s if now_mps else 0.0
     return [*bars, SpeedBar("turn", "rad/s", state.wz_rad_s, limits.max_wz_rad_s, turn_rad_s)]
-
-
-def _sentence(words: str) -> str:
-    return words[:1].upper() + words[1:]

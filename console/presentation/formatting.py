@@ -78,6 +78,11 @@ def plural(count: int | None, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def sentence(words: str) -> str:
+    """Returns words with a capital letter at their beginning; all others stay as they are."""
+    return words[:1].upper() + words[1:]
+
+
 def joined(*parts: str) -> str:
     """Returns the parts that are not empty, separated by commas."""
     return ", ".join(part for part in parts if part)

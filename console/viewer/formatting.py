@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from console.presentation.formatting import joined, plural
+from console.presentation.formatting import joined, plural, sentence
 from console.presentation.severity_style import SeverityStyle
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
@@ -95,7 +95,7 @@ def recording_line(recording: Recording | None) -> str:
 def joined_sentences(*sentences: str) -> str:
     """Joins sentences; the last one ends without a full stop."""
     text = ". ".join(part.strip().rstrip(".") for part in sentences if part.strip())
-    return text[:1].upper() + text[1:]
+    return sentence(text)
 
 
 def mebibytes(count: int) -> str:

@@ -8,12 +8,14 @@ from console.client import PictureReport, PreviewStatus
 from console.client.results import Detections
 from console.monitor.credential_refresh import LoadCredentials
 from console.monitor.link import LinkState
-from console.monitor.worker import Worker, connecting
+from console.monitor.worker import Connect, Worker, connecting
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import PixelFormat
 from console.receiver.recording import Recording
+from console.viewer.decoders import Decoders
 from console.viewer.picture_meter import PictureMeter
-from console.viewer.session import VideoSession
+from console.viewer.session import Connect as Receive
+from console.viewer.session import VideoSession, open_connection
 from console.viewer.thumbnails import Thumbnails
 
 _SILENT_AFTER_S: Final = 1.0
@@ -30,6 +32,9 @@ class RobotVideo:
         recording: keeps the encoded stream, too; closed together with the session.
         delivery: how packets are delivered.
         on_change: called after each change of the status, in the worker's thread; must only hand over.
+        connect: makes the worker's client, in the place of `load`.
+        receive: opens connections to the stream; by default over SRT.
+        decoders: of the stream.
 
     Raises:
         UserError: the target is not an address, or the credentials can't be used.
@@ -44,13 +49,16 @@ class RobotVideo:
         recording: Recording | None = None,
         delivery: DeliveryChoice = DeliveryChoice.AUTO,
         on_change: Callable[[], None] | None = None,
+        connect: Connect | None = None,
+        receive: Receive = open_connection,
+        decoders: Decoders | None = None,
     ) -> None:
         self._on_change = on_change
         self.recording = recording
         self.worker = Worker(
             target,
             self._update_session,
-            connecting(load),
+            connect or connecting(load),
             picture=self._report,
             captured=self._captured,
             pictures=Thumbnails(),
@@ -60,9 +68,11 @@ class RobotVideo:
         self.session = VideoSession(
             pixels=pixels,
             recording=recording,
+            decoders=decoders,
             delivery=delivery,
             robot_now_ns=self.meter.robot_now_ns,
             on_picture_lost=self.worker.request_key_frame,
+            connect=receive,
         )
 
     def start(self) -> None:

@@ -30,7 +30,9 @@ def cockpit_keys(window: "MonitorWindow") -> Sequence[Key]:
         Key((f"Ctrl+{number}",), f"tab {title}", partial(window.show_tab, number - 1))
         for number, title in enumerate(TABS, start=1)
     )
+    practice = (Key(("N",), "practice: another network", window.band.choose_next),) if window.band else ()
     return (
+        *practice,
         Key(("P",), "preview on or off", window.switch),
         *profiles,
         Key(("O",), "boxes around objects", window.toggle_boxes),

@@ -30,8 +30,8 @@ _LEAVING: Final = (
     QEvent.Type.FocusOut,
     QEvent.Type.WindowDeactivate,
     QEvent.Type.WindowBlocked,
-    QEvent.Type.Hide,
 )
+"""With the hiding of the window itself. A part that hides takes no one away, unless it has the focus."""
 _TEXT_FIELDS: Final = (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)
 _NO_MODIFIER: Final = Qt.KeyboardModifier.NoModifier
 _PLAIN: Final = (
@@ -105,7 +105,7 @@ class DriveHands(QObject):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
         """Takes the keys of driving out of the events of the whole program."""
         kind = event.type()
-        if kind in _LEAVING:
+        if kind in _LEAVING or (kind is QEvent.Type.Hide and watched is self._window):
             if self._is_ours(watched):
                 self.release()
             return False

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 from console.presentation.drive_display import DriveDisplay, SpeedBar
 from console.presentation.formatting import signed
 from console.presentation.severity_style import SeverityStyle
-from console.window.gauge import DIM_INK, INK
+from console.window.gauge import DIM_INK, INK, TRACK, VALUE
 from console.window.overlay import Overlay
 from console.window.theme import COLOURS
 
@@ -20,9 +20,7 @@ _BAR_LEFT_PX: Final = 62.0
 _BAR_RIGHT_PX: Final = 96.0
 _GROUND: Final = QColor(16, 18, 20, 215)
 """Darker than the gauges': there is more to read."""
-_TRACK: Final = QColor(255, 255, 255, 60)
 _NOW: Final = QColor(255, 255, 255, 95)
-_VALUE: Final = QColor("#56B4E9")
 
 
 class DriveHud(Overlay):
@@ -83,10 +81,10 @@ class DriveHud(Overlay):
             return half * max(-1.0, min(1.0, value / bar.top)) if bar.top else 0.0
 
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.fillRect(box, _TRACK)
+        painter.fillRect(box, TRACK)
         now = share(bar.now)
         painter.fillRect(QRectF(middle - now, box.top(), 2 * now, box.height()), _NOW)
-        painter.fillRect(QRectF(middle, box.top(), share(bar.value), box.height()).normalized(), _VALUE)
+        painter.fillRect(QRectF(middle, box.top(), share(bar.value), box.height()).normalized(), VALUE)
         painter.setPen(QPen(INK, 1))
         painter.drawLine(QPointF(middle, box.top() - 2), QPointF(middle, box.bottom() + 2))
         row = QRectF(_MARGIN_PX, top, self.width() - 2 * _MARGIN_PX, _BAR_PX)

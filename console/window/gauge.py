@@ -14,8 +14,8 @@ GROUND: Final = QColor(16, 18, 20, 170)
 """Behind what is painted over the picture: the scene stays visible, and white text readable."""
 INK: Final = QColor("#FFFFFF")
 DIM_INK: Final = QColor("#C8CCD0")
-_TRACK: Final = QColor(255, 255, 255, 60)
-_VALUE: Final = QColor("#56B4E9")
+TRACK: Final = QColor(255, 255, 255, 60)
+VALUE: Final = QColor("#56B4E9")
 _STALE: Final = QColor("#E69F00")
 _START_DEG: Final = 225
 _SPAN_DEG: Final = 270
@@ -68,8 +68,8 @@ class Gauge(Overlay):
             painter.drawArc(ring, round(start_deg * 16), round(span_deg * 16))
 
         share = max(-1.0, min(1.0, self._reading.value / self._reading.top))
-        arc(_TRACK, _START_DEG, -_SPAN_DEG)
-        colour = _STALE if self._stale else _VALUE
+        arc(TRACK, _START_DEG, -_SPAN_DEG)
+        colour = _STALE if self._stale else VALUE
         if self._directed:
             arc(colour, _MIDDLE_DEG, share * _SPAN_DEG / 2)
             self._paint_zero(painter, ring, thick)

@@ -34,6 +34,7 @@ from console.window.keys import bind_keys, leave_full_screen
 from console.window.layout import fill
 from console.window.picture_area import PictureArea
 from console.window.plot import Plots
+from console.window.practice_band import PracticeBand
 from console.window.preview_actions import PreviewActions
 from console.window.recording_actions import RecordingActions
 from console.window.saver import Saver
@@ -61,6 +62,7 @@ class MonitorWindow(QWidget):
         video: shows the video.
         roster: lists the robots to switch to; by default the known ones.
         pad: a gamepad; None without one.
+        band: says that there is no robot, above everything else; None where there is one.
     """
 
     def __init__(
@@ -70,6 +72,8 @@ class MonitorWindow(QWidget):
         video: VideoView,
         roster: Roster | None = None,
         pad: Pad | None = None,
+        *,
+        band: PracticeBand | None = None,
     ) -> None:
         super().__init__()
         self._worker = worker
@@ -93,6 +97,7 @@ class MonitorWindow(QWidget):
         )
         self.driving = Driving(self, worker, self.strip, self.picture, pad)
         self.recording = RecordingActions(worker, self.side.recordings, self.picture)
+        self.band = band
         keys = cockpit_keys(self)
         self.picture.show_keys((*keys, *KEYS_OF_THE_HANDS))
         self.preview = self.strip.preview
@@ -102,7 +107,7 @@ class MonitorWindow(QWidget):
         self._lay_out()
         self._connect(changes)
         bind_keys(self, keys)
-        self.setWindowTitle(f"Robot {worker.target}")
+        self.setWindowTitle("PRACTICE, no robot" if band else f"Robot {worker.target}")
         chosen = window_settings.restore(self)
         self.alarm.sound_on = chosen.sound
         if chosen.exports:
@@ -257,7 +262,7 @@ class MonitorWindow(QWidget):
         middle.setSpacing(0)
         middle.addLayout(column, 1)
         middle.addWidget(self.side)
-        whole = fill(QVBoxLayout(self), self.header, spacing=0)
+        whole = fill(QVBoxLayout(self), *([self.band] if self.band else []), self.header, spacing=0)
         whole.addLayout(middle, 1)
         whole.addWidget(self.strip)
 

@@ -24,6 +24,7 @@ from console.window.application import application
 from console.window.drive_hands import Pad
 from console.window.handover import ThreadHandover
 from console.window.monitor_window import MonitorWindow
+from console.window.practice_band import PracticeBand
 from console.window.video_view import VideoView
 from console.window.view_window import ViewWindow
 
@@ -115,9 +116,29 @@ def monitor(
 ) -> Iterator[MonitorWindow]:
     """Opens the monitor window with its background threads; closes them at the end of the block."""
     changes = ThreadHandover()
-    robot = RobotVideo(target, load, on_change=changes.post)
+    with cockpit(RobotVideo(target, load, on_change=changes.post), changes, roster, pad) as window:
+        yield window
+
+
+@contextmanager
+def cockpit(
+    robot: RobotVideo,
+    changes: ThreadHandover,
+    roster: Roster | None = None,
+    pad: Pad | None = None,
+    band: PracticeBand | None = None,
+) -> Iterator[MonitorWindow]:
+    """Opens the monitor window of a robot; closes it with its background threads at the end of the block.
+
+    Args:
+        robot: is shown.
+        changes: signals changes of its status.
+        roster: lists the robots to switch to; by default the known ones.
+        pad: a gamepad; None without one.
+        band: says that there is no robot; None where there is one.
+    """
     video = VideoView(robot.session, robot.detections, robot.meter)
-    window = MonitorWindow(robot.worker, changes, video, roster, pad)
+    window = MonitorWindow(robot.worker, changes, video, roster, pad, band=band)
     # The bar has the age; the card would cover the trail.
     video.show_age(False)
     window.read_picture_age = partial(_age_of, robot.meter, window.reported_age)

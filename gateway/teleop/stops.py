@@ -19,6 +19,31 @@ HOW_TO_REACH: Final = (
 _SHARED_NS: Final = 100_000_000
 """A caller who repeats a stop within this time gets the same answer, from memory."""
 _NS_PER_S: Final = 1_000_000_000
+COPIES_NS: Final = 10 * _NS_PER_S
+"""A copy of a request is recognised for so long; no client waits longer for an answer."""
+MOST_COPIES: Final = 64
+"""Requests that are remembered; a copy of an older one stops the robot, as one without a request ID does."""
+
+
+class Copies:
+    """The stops that were confirmed lately, by the requests that made them."""
+
+    def __init__(self) -> None:
+        self._stops: dict[tuple[str, str], tuple[int, StopLatch]] = {}
+
+    def first(self, by: str, request_id: str, now_ns: int) -> StopLatch | None:
+        """Returns the stop that an earlier copy of a request has made; None for a request of its own."""
+        confirmed_ns, stop = self._stops.get((by, request_id), (now_ns - COPIES_NS, None))
+        return stop if now_ns - confirmed_ns < COPIES_NS else None
+
+    def confirmed(self, by: str, request_id: str, stop: StopLatch, now_ns: int) -> None:
+        """Keeps the stop that a request has made, for `COPIES_NS`; of MOST_COPIES the oldest goes."""
+        if not request_id:
+            return
+        kept = [item for item in self._stops.items() if now_ns - item[1][0] < COPIES_NS]
+        self._stops = dict(kept[-MOST_COPIES + 1 :])
+        # By the first copy: a request ID that is used for ever keeps no stop out for longer.
+        self._stops.setdefault((by, request_id), (now_ns, stop))
 
 
 class Stops:
@@ -34,21 +59,29 @@ class Stops:
         self._commands = commands
         self._stopped_ns: dict[str, int] = {}
         """When the newest stop was confirmed, by caller; empty after a reset."""
+        self._copies = Copies()
 
-    async def stop(self, by: str, reason: str) -> StopLatch:
+    async def stop(self, by: str, reason: str, request_id: str = "") -> StopLatch:
         """Stops the robot, and returns the stop when the drive program has confirmed it.
+
+        A copy of a request whose stop was confirmed returns that one, reset or not, and stops nothing anew.
 
         Args:
             by: who, for people.
             reason: why, for people.
+            request_id: the same for all copies of one request; empty for a request without copies.
 
         Raises:
             DriveUnreachableError: it has not.
         """
         stop, now_ns = self._link.view.stop, time.monotonic_ns()
+        if first := self._copies.first(by, request_id, now_ns):
+            return first
         recent = now_ns - self._stopped_ns.get(by, -_NS_PER_S) < _SHARED_NS
         if stop and stop.by == by and recent and self._link.view.reachable:
-            return stop  # Repeated by the same caller, perhaps very often: one confirmation serves all.
+            # Repeated by the same caller, perhaps very often: one confirmation serves all.
+            self._copies.confirmed(by, request_id, stop, now_ns)
+            return stop
         if not self._commands.stop(by, reason):
             raise DriveUnreachableError(f"the robot's drive program can't be reached: {HOW_TO_REACH}")
         if not await self._confirmed(now_ns, lambda view: view.phase is DrivePhase.STOPPED):
@@ -59,7 +92,13 @@ class Stops:
         if stop is None:
             raise DriveUnreachableError(f"the stop is already reset; stop again, or {HOW_TO_REACH}")
         self._stopped_ns = {by: time.monotonic_ns()}
+        self._copies.confirmed(by, request_id, stop, now_ns)
         return stop
+
+    def in_force(self, stop: StopLatch) -> bool:
+        """Returns whether a stop was not reset, as far as the drive program has reported."""
+        present = self._link.view.stop
+        return present is not None and present.stop_id == stop.stop_id
 
     async def reset(self, stop_id: int) -> str:
         """Resets a stop; returns what happened, for people.

@@ -34,11 +34,10 @@ def of(blame: Blame, what: str, plan: Plan) -> Fault:
 
 def from_message(message: Any, parts: Parts, plan: Plan) -> Fault:
     """Returns the fault of an ERROR message of the bus."""
-    error, debug = message.parse_error()
     culprit = message.src
     elements = _elements(parts).items()
     blame = next((b for b, e in elements if culprit is e or culprit.has_as_ancestor(e)), Blame.OTHER)
-    return of(blame, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
+    return of(blame, f"failed: {_reason(*message.parse_error())}", plan)
 
 
 def of_listener(message: Any, plan: Plan) -> Fault:
@@ -52,7 +51,7 @@ def of_listener(message: Any, plan: Plan) -> Fault:
             f"UDP port {port} on {plan.srt.bind} can't be used: another program has it, or the address is not"
             f" this machine's. 'ss -lunp sport = :{port}' names the program; or choose another srt.port.",
         )
-    return of(Blame.LISTENER, f"failed: {_reason(error.message.rstrip('.'), debug or '')}", plan)
+    return of(Blame.LISTENER, f"failed: {_reason(error, debug)}", plan)
 
 
 def blocked(parts: Parts, plan: Plan, seconds: float) -> Fault:
@@ -72,9 +71,10 @@ def _elements(parts: Parts) -> dict[Blame, Any]:
     return {Blame.ENCODER: parts.encoder, Blame.SOURCE: parts.source}
 
 
-def _reason(text: str, debug: str) -> str:
+def _reason(error: Any, debug: str | None) -> str:
     """Returns GStreamer's error text, and the last line of its debug text where that adds something."""
-    last = debug.strip().rsplit("\n", 1)[-1].strip().rstrip(".")
+    text: str = error.message.rstrip(".")
+    last = (debug or "").strip().rsplit("\n", 1)[-1].strip().rstrip(".")
     if not last or "(): " in last or last in text or last.startswith(("../", "/")):
         return text
     return f"{text} ({last[:_DETAILS] + '...' if len(last) > _DETAILS else last})"

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = ("gateway", "preview", "drive", "recorder", "console", "simrobot")
-OURS = ("common", *PROGRAMS)
+OURS = ("common", *PROGRAMS, "practice")
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,21 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
     ("importer", "forbidden"),
     [
         ("common/", PROGRAMS),
-        *((f"{one}/", tuple(other for other in PROGRAMS if other != one)) for one in PROGRAMS),
+        *((f"{one}/", (*(other for other in PROGRAMS if other != one), "practice")) for one in PROGRAMS),
+        # Practice is the console with the pure core of the drive program behind it. It opens no connection.
+        (
+            "practice/",
+            (
+                *("gateway", "preview", "recorder", "rclpy", "gi", "grpc", "socket"),
+                *("console.client.aio", "console.client.blocking", "console.client.transport"),
+                *("drive.worker", "drive.endpoint", "drive.guard", "drive.base", "drive.client", "drive.app"),
+                *("simrobot.drive_train", "simrobot.robot", "simrobot.app", "simrobot.control"),
+            ),
+        ),
+        *(
+            (f"practice/{name}.py", (*HEAVY, *WIRE, "console", "asyncio", "time", "threading"))
+            for name in ("network", "robot", "scene")
+        ),
         ("drive/", ("omniseer.gateway", "grpc", "asyncio")),
         ("preview/", ("omniseer.gateway",)),
         ("console/", ("omniseer.preview",)),
@@ -195,7 +209,10 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "console/client/",
             ),
         ),
-        ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
+        (
+            "omniseer.gateway",
+            ("gateway/rpc/", "console/client/", "practice/wire.py", "recorder/rpc/", "recorder/doctor/"),
+        ),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
         ("omniseer.recorder", ("gateway/links/recorder/", "recorder/rpc/", "recorder/doctor/")),

@@ -493,7 +493,11 @@ ADDITIONS = [
             "problems": ["no base"],
         },
     ),
-    Case(teleop_pb2.StopRobotRequest, text(1, "a child"), {"reason": "a child"}),
+    Case(
+        teleop_pb2.StopRobotRequest,
+        text(1, "a child") + text(2, "one"),
+        {"reason": "a child", "request_id": "one"},
+    ),
     Case(
         teleop_pb2.StopRobotResponse,
         text(1, "stopped") + sub(2, uint(1, 3)),

@@ -18,6 +18,7 @@ from typing import Any, Final
 import psutil
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
+from bench.video.foreign import end
 from common.ros_node import message_class, ros_node
 from omniseer.drive.v1 import drive_pb2 as pb
 from tests.support.drive_peer import Instants
@@ -297,11 +298,7 @@ class Driving:
             with suppress(psutil.NoSuchProcess, IndexError):
                 self.worker.resume()
             self.guard.send_signal(signal.SIGCONT)
-            self.guard.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                self.guard.wait(_END_S)
-            self.guard.kill()
-            self.guard.wait()
+            end(self.guard)
 
 
 @contextmanager

@@ -4,13 +4,14 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import grpc
 
+from bench.video.foreign import end
 from omniseer.gateway.v1.robot_gateway_pb2 import GetOverlaySnapshotRequest, GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.free import free_tcp_port
@@ -66,8 +67,4 @@ def gateway_program(
             grpc.channel_ready_future(channel).result(timeout=_UP_WITHIN_S)
             yield GatewayProgram(process, port, RobotGatewayStub(channel))
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(5)
-        process.kill()
-        process.wait()
+        end(process)

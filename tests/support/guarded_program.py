@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bench.video.foreign import end
 from console.client import Credentials, GatewayClient, PreviewState, Unreachable
 from console.robots import read_credentials, read_robots_file
 from console.robots.login import parse_login
@@ -142,11 +143,7 @@ def guarded_program(
         assert process.poll() is None, robot.log()
         yield robot
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(5)
-        process.kill()
-        process.wait()
+        end(process)
 
 
 @contextmanager

@@ -3,13 +3,14 @@
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bench.video.foreign import end
 from simrobot.control import ask
 from tests.support.free import free_domain
 
@@ -69,10 +70,6 @@ def simulated_robot(directory: Path, *arguments: str) -> Iterator[SimulatedRobot
         assert "ready" in line, f"the simulated robot ended early: {line!r}"
         yield SimulatedRobot(process, control)
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(5)
-        process.kill()
-        process.wait()
+        end(process)
         if process.stdout:
             process.stdout.close()

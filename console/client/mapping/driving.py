@@ -47,9 +47,9 @@ def command_request(command: DriveCommand) -> bytes:
     return teleop_pb2.DriveRequest(command=teleop_pb2.DriveCommand(**values)).SerializeToString()
 
 
-def stop_request(reason: str) -> bytes:
+def stop_request(request_id: str, reason: str) -> bytes:
     """Returns the request of StopRobot."""
-    return teleop_pb2.StopRobotRequest(reason=reason).SerializeToString()
+    return teleop_pb2.StopRobotRequest(reason=reason, request_id=request_id).SerializeToString()
 
 
 def reset_request(stop_id: int) -> bytes:

@@ -84,11 +84,12 @@ class TeleopService:
 
     async def stop_robot(self, request: StopRobotRequest, call: CallContext) -> StopRobotResponse:
         """Returns when the drive program has confirmed the stop."""
-        stop = await self._configured().stops.stop(_driver(call).name, request.reason)
-        return StopRobotResponse(
-            message=f"the robot is stopped; to reset the stop: robotctl reset-stop {stop.stop_id}",
-            stop=stop_latch(stop, time.monotonic_ns()),
-        )
+        stops = self._configured().stops
+        stop = await stops.stop(_driver(call).name, request.reason, request.request_id)
+        message = f"the robot is stopped; to reset the stop: robotctl reset-stop {stop.stop_id}"
+        if not stops.in_force(stop):
+            message = f"this request has stopped the robot before; that stop ({stop.stop_id}) is reset"
+        return StopRobotResponse(message=message, stop=stop_latch(stop, time.monotonic_ns()))
 
     async def reset_stop(self, request: ResetStopRequest, _call: CallContext) -> ResetStopResponse:
         """Returns when the drive program has confirmed the reset."""

@@ -117,6 +117,15 @@ def test_a_lost_worker_means_zeros_until_the_next_one_has_the_robot(
     assert latch is None or latch.by == "robot-drive"
 
 
+def test_a_silent_worker_is_killed_and_the_log_says_what_it_waited_for(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with guarding(tmp_path, "beat") as running:
+        os.kill(running.worker(), signal.SIGSTOP)
+        wait_until(lambda: "it is stopped" in caplog.text, "the reason")
+    assert "no heartbeat of the worker for " in caplog.text
+
+
 def test_zeros_go_on_while_the_next_workers_fail(tmp_path: Path) -> None:
     with guarding(tmp_path, "crash") as running:
         lost = running.worker()

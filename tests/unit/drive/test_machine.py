@@ -260,6 +260,23 @@ def test_pressing_during_an_inhibit_does_not_move_when_it_ends() -> None:
     assert robot.driven(100).phase is Phase.INHIBITED
 
 
+def test_a_drive_gets_as_fast_as_the_limits_permit_and_no_faster() -> None:
+    robot = Robot().driving()
+    for _ in range(50):
+        robot.now_ns += 20 * MS
+        robot.command(held=True, velocity=Velocity(vx_mps=2.0))
+    assert robot.forward_mps == pytest.approx(RULES.limits.wheel_mps)
+
+
+def test_a_release_of_the_session_before_counts_for_nothing() -> None:
+    robot = Robot().armed()
+    robot.lease = Lease("s2", "ben")
+    robot.feed(GrantLease(robot.lease))
+    assert robot.command(held=True).phase is Phase.ARMED
+    robot.command(held=False)
+    assert robot.command(held=True).phase is Phase.DRIVING
+
+
 def test_a_reset_never_moves_and_waits_for_the_release() -> None:
     robot = in_phase(Phase.STOPPED)
     stop_id = robot.stop_id

@@ -5,7 +5,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from drive.machine import (
     Enable,
@@ -80,10 +80,23 @@ class Driving(RuleBasedStateMachine):
         self.sequence = 0
         self.newest: Command | None = None
         self.arrived_ns = 0
+        self.released = False
+        """Whether the driver has been seen not to hold, since the lease began or a stop was reset."""
 
     def feed(self, event: Event) -> None:
         self.before, self.event = self.state, event
         self.state = step(self.state, event, self.now_ns, self.configured)
+        self.judge()
+
+    def judge(self) -> None:
+        """Judges each step: what a rule does in several of them must not pass unseen."""
+        self.motion_has_every_reason()
+        self.slowing_down_only_follows_a_release()
+        self.motion_begins_with_a_press_after_a_release()
+        self.limits_hold()
+        self.nothing_is_published_when_nobody_drives()
+        self.a_stop_stays_until_its_reset()
+        self.the_sequence_only_grows()
 
     @rule(ms=st.integers(0, 700))
     def pass_time(self, ms: int) -> None:
@@ -103,7 +116,7 @@ class Driving(RuleBasedStateMachine):
     def grant(self, session: str, supervision: Supervision, streaming: bool) -> None:
         lease = Lease(session, session, supervision, streaming)
         if self.enabled:
-            self.lease, self.newest = lease, None
+            self.lease, self.newest, self.released = lease, None, False
         self.feed(GrantLease(lease))
 
     @rule(session=st.sampled_from(SESSIONS), why=st.sampled_from(LeaseEnd))
@@ -142,27 +155,57 @@ class Driving(RuleBasedStateMachine):
                 picture_ns=now - 20 * MS,
             )
             self.send(replace(proper, **_flawed(flaw, now)))
-            self.limits_hold()
 
     def send(self, command: Command) -> None:
         mine = self.lease is not None and command.session_id == self.lease.session_id
         newer = self.newest is None or command.sequence > self.newest.sequence
         if mine and newer and command.velocity.is_finite:
             self.newest, self.arrived_ns = command, self.now_ns
+            self.released = self.released or not command.held
         self.feed(command)
 
     @precondition(lambda self: self.state.phase is not Phase.DRIVING)
-    @rule(supervision=st.sampled_from(Supervision), streaming=st.booleans(), velocity=velocities)
-    def set_off(self, supervision: Supervision, streaming: bool, velocity: Velocity) -> None:
-        """Does everything that it takes to drive: by chance alone it would hardly come about."""
+    @rule(
+        supervision=st.sampled_from(Supervision),
+        streaming=st.booleans(),
+        velocity=velocities,
+        flaw=st.sampled_from(["", "forever"]),
+        times=st.sampled_from([5, 40]),
+    )
+    def set_off(
+        self, supervision: Supervision, streaming: bool, velocity: Velocity, flaw: str, times: int
+    ) -> None:
+        """Does everything that it takes to drive, perhaps until it is as fast as it may be."""
         self.drive(held=False, velocity=ZERO, times=1)
         self.reset(right=True)
         self.enable(enabled=True)
         self.all_clear()
         self.grant(session="s1", supervision=supervision, streaming=streaming)
         self.drive(held=False, velocity=ZERO, times=1)
-        self.drive(held=True, velocity=velocity, times=5)
+        self.drive(held=True, velocity=velocity, times=times, flaw=flaw)
         assert self.state.phase is Phase.DRIVING
+
+    @rule(
+        session=st.sampled_from(SESSIONS),
+        supervision=st.sampled_from(Supervision),
+        velocity=velocities,
+        stopped=st.booleans(),
+    )
+    def hold_without_a_release(
+        self, session: str, supervision: Supervision, velocity: Velocity, stopped: bool
+    ) -> None:
+        """Holds right after a reset, or as another session: no release before that counts."""
+        self.enable(enabled=True)
+        self.all_clear()
+        self.drive(held=False, velocity=ZERO, times=1)
+        if stopped:
+            self.stop(by="anna")
+        self.reset(right=True)
+        if not stopped or self.lease is None:
+            self.grant(session=session, supervision=supervision, streaming=True)
+        streaming = self.lease is not None and self.lease.streaming
+        self.drive(held=True, velocity=velocity, times=3)
+        assert not (streaming and self.state.phase is Phase.DRIVING)
 
     @rule(by=st.sampled_from(["anna", "ben"]))
     def stop(self, by: str) -> None:
@@ -178,7 +221,7 @@ class Driving(RuleBasedStateMachine):
             assert self.state.output in (None, ZERO)
         if self.state.latch is None and latch is not None:
             # What was held before the reset is unknown to it, and starts nothing.
-            self.newest = None
+            self.newest, self.released = None, False
 
     @rule(
         running=st.booleans(), newest_ms=st.integers(-900, 0), base=st.booleans(), bad=st.sampled_from("sofn")
@@ -201,7 +244,6 @@ class Driving(RuleBasedStateMachine):
     def moves(self) -> bool:
         return self.state.output not in (None, ZERO)
 
-    @invariant()
     def motion_has_every_reason(self) -> None:
         state = self.state
         if not self.moves() or state.phase is Phase.STOPPING:
@@ -227,7 +269,6 @@ class Driving(RuleBasedStateMachine):
             assert command.picture_ns <= self.arrived_ns + 20 * MS
             assert self.now_ns - command.picture_ns <= 600 * MS
 
-    @invariant()
     def slowing_down_only_follows_a_release(self) -> None:
         if self.moves() and self.state.phase is Phase.STOPPING:
             assert self.configured.release_ramp_s > 0
@@ -235,7 +276,6 @@ class Driving(RuleBasedStateMachine):
             assert self.before.phase in {Phase.DRIVING, Phase.STOPPING}
             assert _no_faster(self.state.output, self.before.output)
 
-    @invariant()
     def motion_begins_with_a_press_after_a_release(self) -> None:
         before, state = self.before, self.state
         if state.phase is not Phase.DRIVING or before.phase is Phase.DRIVING:
@@ -247,8 +287,8 @@ class Driving(RuleBasedStateMachine):
             assert before.lease == state.lease
             assert before.command is not None
             assert not before.command.held
+            assert self.released
 
-    @invariant()
     def limits_hold(self) -> None:
         limits, output = self.configured.limits, self.state.output
         if output is None:
@@ -256,6 +296,13 @@ class Driving(RuleBasedStateMachine):
         assert abs(output.vx_mps) <= limits.vx_mps + 1e-9
         assert abs(output.vy_mps) <= limits.vy_mps + 1e-9
         assert abs(output.wz_rad_s) <= limits.wz_rad_s + 1e-9
+        rim_mps = abs(output.vx_mps) + abs(output.vy_mps) + limits.wheel_lever_m * abs(output.wz_rad_s)
+        assert rim_mps <= limits.wheel_mps + 1e-9
+        if self.state.phase is Phase.DRIVING and self.lease and self.newest:
+            by_eye = self.lease.supervision is Supervision.LINE_OF_SIGHT
+            age_s = (self.now_ns - self.newest.picture_ns) / 1e9
+            assert not by_eye or output.linear_mps <= limits.line_of_sight_mps + 1e-9
+            assert by_eye or output.linear_mps * age_s <= limits.picture_travel_m + 1e-9
         elapsed_s = (self.state.output_ns - self.before.output_ns) / 1e9
         previous = self.before.output or ZERO
         for name, limit in (
@@ -266,14 +313,12 @@ class Driving(RuleBasedStateMachine):
             grown = abs(getattr(output, name)) - abs(getattr(previous, name))
             assert grown <= limit * elapsed_s + 1e-9
 
-    @invariant()
     def nothing_is_published_when_nobody_drives(self) -> None:
         silent = self.state.phase in {Phase.DISABLED, Phase.AVAILABLE}
         assert (self.state.output is None) == silent
         if silent:
             assert self.before.output in (None, ZERO), "the last is zero"
 
-    @invariant()
     def a_stop_stays_until_its_reset(self) -> None:
         if self.before.phase is Phase.STOPPED and self.state.phase is not Phase.STOPPED:
             assert isinstance(self.event, Reset)
@@ -281,7 +326,6 @@ class Driving(RuleBasedStateMachine):
             assert self.event.stop_id == self.before.latch.stop_id
             assert not self.before.holding(self.now_ns)
 
-    @invariant()
     def the_sequence_only_grows(self) -> None:
         before, after = self.before.command, self.state.command
         if before and after and self.before.lease == self.state.lease:

@@ -142,6 +142,27 @@ async def test_anyone_may_stop_and_only_that_stop_is_reset(
         await in_motion(session, robot.base, SPEED_MPS)
 
 
+async def test_a_late_copy_of_a_stop_stops_nothing_anew_after_the_reset(
+    robot: DrivenRobot, client: AsyncGatewayClient
+) -> None:
+    """A client sends each stop on two connections; the slower copy may come after the stop was reset."""
+    async with grpc.aio.insecure_channel(robot.target) as channel:
+        stub = TeleopServiceStub(channel)
+        request = teleop_pb2.StopRobotRequest(reason="a child", request_id="one")
+        first = await stub.StopRobot(request)
+        await client.reset_stop(first.stop.stop_id)
+        copy = await stub.StopRobot(request)
+        assert copy.stop.stop_id == first.stop.stop_id
+        assert "reset" in copy.message
+        # Another request stops, and so does each that names none.
+        newest = first.stop.stop_id
+        for another in ("two", "", ""):
+            stopped = await stub.StopRobot(teleop_pb2.StopRobotRequest(request_id=another))
+            assert stopped.stop.stop_id > newest
+            newest = stopped.stop.stop_id
+            await client.reset_stop(newest)
+
+
 async def test_a_lost_driver_leaves_a_stopped_robot(robot: DrivenRobot, client: AsyncGatewayClient) -> None:
     channel = grpc.aio.insecure_channel(robot.target, options=(("grpc.use_local_subchannel_pool", 1),))
     async with channel:

@@ -4,9 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from console.cli.app import COMMANDS
 from console.cli.typed_options import typed_options
 
 LOGIN = "type: robotctl login NAME HOST:PORT FILE"
+FOR_NO_ROBOT = {"login", "robots", "practice"}
+"""Or they name it themselves."""
 KNOWN = """
 default = "lab1"
 [robots.lab1]
@@ -36,6 +39,12 @@ def known_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_the_robot_is_repeated(words: str, repeated: str) -> None:
     assert typed_options(words.split()).repeated_in("Type: robotctl status") == repeated
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS.keys() - FOR_NO_ROBOT))
+def test_every_command_for_a_robot_gets_it(command: str) -> None:
+    text = typed_options(["--robot", "lab2", "doctor"]).repeated_in(f"Type: robotctl {command}")
+    assert text == f"Type: robotctl --robot lab2 {command}"
 
 
 def test_commands_that_are_for_no_robot_stay() -> None:

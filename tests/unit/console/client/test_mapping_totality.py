@@ -651,7 +651,8 @@ def test_every_field_of_the_requests_of_driving_is_set() -> None:
     )
     joining = teleop_pb2.DriveRequest.FromString(join_request("tool", "session")).open
     assert joining == teleop_pb2.DriveOpen(client_name="tool", session_id="session")
-    assert teleop_pb2.StopRobotRequest.FromString(stop_request("why")).reason == "why"
+    stop = teleop_pb2.StopRobotRequest.FromString(stop_request("id", "why"))
+    assert (stop.request_id, stop.reason) == ("id", "why")
     assert teleop_pb2.ResetStopRequest.FromString(reset_request(7)).stop_id == 7
     assert robot_gateway_pb2.SetTeleopEnabledRequest.FromString(enabled_request(True)).enabled
     velocity = robot_gateway_pb2.SendTeleopCommandRequest.FromString(velocity_request(0.25, 0.5, 0.75))

@@ -233,6 +233,9 @@ def test_what_keeps_a_robot_from_being_driven_is_found(double: GatewayDouble) ->
     assert (found.verdict, found.remedy) == (Verdict.NOTE, "Type on the robot: robot-drive doctor")
     teleop.stop.stop_id, teleop.stop.by = 7, "ben"
     assert "reset-stop 7" in examined(double)["driving"].remedy
+    assert examined(double)["driving.base"].verdict is Verdict.NOTE, "a stop changes nothing about the base"
+    teleop.base_timeout_ms = 250
+    assert "250 ms" in examined(double)["driving.base"].what
     teleop.Clear()
     teleop.state = states.TELEOP_DISABLED
     assert "disabled" in examined(double)["driving"].what
