@@ -1,10 +1,12 @@
 """What the disk does to a recorder: full, damaged, strange, shared with another one."""
 
 import os
+import resource
+import shutil
 import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from recorder.lifecycle import State
 from recorder.requests import StartOptions
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
-from tests.support.recorder_in_process import Running, Source, running_recorder
+from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 
 MIB = 1024 * 1024
 SLOW_S = 0.1
@@ -98,6 +100,63 @@ async def test_a_disk_full_at_the_end_leaves_a_recording_that_opens(small_disk: 
         assert done.state in (RecordingState.COMPLETE, RecordingState.FAULTED)
         assert done.messages == 50
         assert done.metadata
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """The kernel refuses to write beyond that size: EFBIG (setrlimit(2)), which is no lack of space."""
+    before, highest = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, highest))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (before, highest))
+
+
+async def test_an_error_of_the_disk_ends_the_recording_and_it_records_again_by_itself(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+        source.send(100, size=1000)
+        await running.written(100)
+        with files_of_at_most(400_000):
+            source.send(100, size=20_000)
+            await running.until(lambda: running.readings.running is None)
+            cut = running.readings.newest
+            assert cut
+            assert (cut.state, cut.stop_reason) == (RecordingState.FAULTED, StopReason.ERROR)
+            assert "the disk can't be written: File too large" in running.readings.last_error
+            assert not running.readings.disk_short
+            with pytest.raises(PreconditionError, match="can't be written"):
+                await running.operations.start("2", StartOptions())
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        assert running.readings.last_error == ""
+        found = numbers(running.readings, running.readings.get(cut.id))
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) >= 100
+        assert (await running.operations.start("3", StartOptions())).recording
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")], ids=["gone", "empty"])
+async def test_any_file_that_a_power_cut_has_taken_costs_no_other_recording(
+    tmp_path: Path, harm: Callable[[Path], object]
+) -> None:
+    """What was not synchronised may be gone, or have a name and no content."""
+    async with running_recorder(tmp_path / "whole", ring={"preset": "all"}) as running:
+        intact, hurt = await recorded(running, 1000), await recorded(running, 2000)
+        assert hurt.messages == 10
+    whole = tmp_path / "whole"
+    files = [each.relative_to(whole) for each in whole.rglob("*") if each.is_file()]
+    for number, file in enumerate(each for each in files if intact.id not in each.parts):
+        root = tmp_path / str(number)
+        shutil.copytree(whole, root)
+        harm(root / file)
+        async with running_recorder(root, ring={"preset": "all"}) as running:
+            assert running.readings.phase.state is State.IDLE, file
+            assert numbers(running.readings, running.readings.get(intact.id)) == list(range(1, 11)), file
+            if running.readings.has(hurt.id) and file.suffix != ".mcap":
+                assert running.readings.get(hurt.id).messages == 10, file
+            await running.operations.start("again", StartOptions())
 
 
 async def test_room_is_made_in_the_order_of_retention(small_disk: Path) -> None:
