@@ -58,7 +58,7 @@ def numbers(readings: Readings, manifest: Manifest, topic: str = "/odom") -> lis
     ]
 
 
-class _NoSources:
+class NoSources:
     problem = ""
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class Running:
     operations: Operations
     readings: Readings
     queue: SampleQueue
-    sources: _NoSources
+    sources: NoSources
     settings: RecorderSettings
 
     async def written(self, count: int) -> None:
@@ -121,7 +121,7 @@ async def running_recorder(root: Path, boot_id: str = "boot", **values: Any) -> 
     """Recovered and idle, or recording, when the block begins; closed in order when it ends."""
     settings = settings_for(root, **values)
     make_directory(root)
-    queue, sources = SampleQueue(settings.queue_bytes), _NoSources()
+    queue, sources = SampleQueue(settings.queue_bytes), NoSources()
     parts = parts_of(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
     readings = Readings(parts)
     recorder = Recorder(parts, readings)
