@@ -36,6 +36,9 @@ NAMES: Final = (
     "audit_line",
     "admission",
     "video_stream",
+    "video_tap",
+    "segment",
+    "export_request",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

@@ -2,12 +2,23 @@
 
 from typing import Any, Final
 
+from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
+from common.video_tap import Header, Kind, encode_object
+from fuzz import recording
 from fuzz.robot import SOURCES, type_of
 from gateway.access.ca import new_ca
-from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
+from omniseer.gateway.v1 import (
+    overlay_pb2,
+    preview_pb2,
+    recording_pb2,
+    robot_gateway_pb2,
+    states_pb2,
+    system_status_pb2,
+)
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
+from recorder.mcap.records import bytes_of
 from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame
 
 _STATUS: Final = system_status_pb2.SystemStatus(
@@ -48,6 +59,30 @@ def _video(codec: str) -> bytes:
     for number in range(2):
         packets += writer.unit(coded_frame(codec, number, key=number == 0), number * 3000)
     return b"".join(bytes([number]) + packet for number, packet in enumerate(packets))
+
+
+def _tap() -> bytes:
+    """The beginning of a connection: what comes, two frames, and some that are missing."""
+    unit = b"".join(b"\0\0\1" + bytes([kind]) + b"data" for kind in (7, 8, 5))
+    at_ns = recording.NOW.monotonic_ns
+    frame = Header(Kind.ACCESS_UNIT, len(unit), key_frame=True, captured_ns=at_ns).encode() + unit
+    info = encode_object(Kind.INFO, {"state": "running", "codec": "h264", "error": ""})
+    gap = encode_object(Kind.GAP, {"frames": 2, "from_ns": at_ns, "to_ns": at_ns + 1})
+    unpaired = encode_object(Kind.INFO, {"state": "faulted", "error": "\ud800"})
+    return info + frame + gap + frame + unpaired
+
+
+def _chunk_content() -> bytes:
+    """A schema, a channel and a message."""
+    return bytes(
+        bytes_of(
+            [
+                Schema(id=1, name="std_msgs/msg/String", encoding="ros2msg", data=b"string data"),
+                Channel(id=1, topic="/a", message_encoding="cdr", metadata={}, schema_id=1),
+                Message(channel_id=1, log_time=5, publish_time=5, sequence=1, data=b"data"),
+            ]
+        )
+    )
 
 
 _SEEDS: Final = {
@@ -91,6 +126,16 @@ _SEEDS: Final = {
     "audit_line": [b"enabled: true, profile: LOW_BW"],
     "admission": [bytes((0, 8, 1, 0, 4, 0, 2, 1, 8, 0, 7, 90, 8, 0, 3, 1, 5, 0, 6, 0))],
     "video_stream": [_video("h264"), _video("h265")],
+    "video_tap": [_tap()],
+    "segment": [b"\0" + recording.unfinished(), b"\1" + _chunk_content()],
+    "export_request": [
+        recording_pb2.ExportRecordingRequest(
+            recording_id=recording.RECORDING, file=recording.FILE, offset=100
+        ).SerializeToString(),
+        recording_pb2.ExportRecordingRequest(
+            recording_id=recording.RECORDING, file="../manifest.json", expected_sha256=bytes(32)
+        ).SerializeToString(),
+    ],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 

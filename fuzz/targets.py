@@ -25,6 +25,7 @@ from console.receiver.transport_stream import PACKET_BYTES, TransportStream, Unk
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
+from fuzz.recording import export_request, segment, video_tap
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
 from gateway.access.ca import certificate_info
@@ -221,6 +222,9 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             audit_line,
             admission,
             video_stream,
+            video_tap,
+            segment,
+            export_request,
         )
     }
 )

@@ -25,7 +25,7 @@ _MEMORY_MIB: Final = 1024
 
 def main(arguments: list[str]) -> None:
     """Returns only when it lists."""
-    with atheris.instrument_imports(include=["common", "console", "gateway", "preview"]):
+    with atheris.instrument_imports(include=["common", "console", "gateway", "preview", "recorder"]):
         from fuzz import seeds  # noqa: PLC0415
         from fuzz.targets import TARGETS  # noqa: PLC0415
     if arguments == ["--list"]:

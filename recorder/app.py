@@ -8,7 +8,10 @@ from common import bind, rpc
 from common.boot import boot_id
 from common.health import Health
 from recorder.config import RecorderSettings
+from recorder.operations import Operations
+from recorder.parts import parts_of
 from recorder.priority import step_back
+from recorder.readings import Readings
 from recorder.recorder import Recorder
 from recorder.rpc.servicer import SERVICE, RecorderServicer
 from recorder.sources import RobotSources
@@ -32,7 +35,7 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
     queue = SampleQueue(settings.queue_bytes)
     with folder_lock(settings.root):
         async with RobotSources(settings, queue) as sources:
-            recorder = Recorder(
+            parts = parts_of(
                 settings,
                 queue,
                 sources,
@@ -40,8 +43,12 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
                 boot_id=boot_id(),
                 run_id=secrets.token_hex(_RUN_ID_BYTES),
             )
+            readings = Readings(parts)
+            recorder = Recorder(parts, readings)
+            operations = Operations(parts, readings, recorder)
+            bundles = RunBundles(settings.run_bundles)
             server = rpc.new_server()
-            RecorderServicer(recorder, RunBundles(settings.run_bundles), settings).register(server)
+            RecorderServicer(operations, readings, bundles, settings).register(server)
             Health(SERVICE).register(server)
             bind.bind_unix(server, settings.socket)
             await server.start()

@@ -175,6 +175,12 @@ class RecorderSettings(Settings):
         return self.presets[preset].video and self.video.socket is not None
 
     @property
+    def folders(self) -> tuple[Path, ...]:
+        """Where recordings and the ring are: what the quota counts."""
+        apart = self.ring.directory if self.ring.preset else None
+        return (self.root, apart) if apart else (self.root,)
+
+    @property
     def ring_directory(self) -> Path:
         """Where the ring is."""
         return self.ring.directory or self.root / "ring"

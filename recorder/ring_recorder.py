@@ -5,12 +5,14 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from common.errors import InvalidRequestError, PreconditionError, TooMuchError
 from common.reasons import Reason
 from recorder.config import RecorderSettings
 from recorder.incidents import SEVERITIES, Incidents, Rules
+from recorder.outputs import Outputs
 from recorder.store.catalogue import Catalogue
 from recorder.store.folder import new_id
 from recorder.store.housekeeping import Housekeeping, attempt
@@ -45,13 +47,11 @@ class RingRecorder:
         settings: of the program; `ring.preset` is set.
         ring: its segments.
         catalogue: where snapshots become recordings.
-        housekeeping: makes room for them.
+        outputs: has the ring's, but while it can't be written.
         writer: writes the ring.
+        housekeeping: makes room for snapshots.
         boot_id: of the computer; empty if unknown.
         run_id: of this process.
-
-    Attributes:
-        output: of the ring; None while it can't be written.
     """
 
     def __init__(
@@ -59,9 +59,10 @@ class RingRecorder:
         settings: RecorderSettings,
         ring: Ring,
         catalogue: Catalogue,
-        housekeeping: Housekeeping,
+        outputs: Outputs,
         writer: Writer,
         *,
+        housekeeping: Housekeeping,
         boot_id: str,
         run_id: str,
     ) -> None:
@@ -70,10 +71,10 @@ class RingRecorder:
         self._ring = ring
         self._catalogue = catalogue
         self._housekeeping = housekeeping
+        self._outputs = outputs
         self._writer = writer
         self._boot_id = boot_id
         self._run_id = run_id
-        self.output: Output | None = None
         self._pending: list[_Snapshot] = []
         incidents = settings.incidents
         self._incidents = Incidents(
@@ -84,6 +85,11 @@ class RingRecorder:
                 frozenset(incidents.ignore),
             )
         )
+
+    @property
+    def directory(self) -> Path:
+        """Of its segments."""
+        return self._ring.directory
 
     @property
     def pending(self) -> int:
@@ -122,19 +128,19 @@ class RingRecorder:
         for segment in await asyncio.to_thread(self._ring.recover):
             await self._link(segment)
         output = Output(self.shape(), self._writer.head, closed)
-        self.output = output
+        self._outputs.ring = output
         await asyncio.wrap_future(self._writer.add(output))
 
     async def close(self) -> None:
         """Makes the last segment final."""
-        if self.output:
-            output, self.output = self.output, None
+        if output := self._outputs.ring:
+            self._outputs.ring = None
             await asyncio.wrap_future(self._writer.remove(output))
 
     async def rotate(self) -> None:
         """Makes the present segment final, so that snapshots can have it."""
-        if self.output:
-            await asyncio.wrap_future(self._writer.rotate(self.output))
+        if output := self._outputs.ring:
+            await asyncio.wrap_future(self._writer.rotate(output))
 
     async def take(self, closed: Closed) -> None:
         """Takes a segment that has become final."""
@@ -168,7 +174,7 @@ class RingRecorder:
         """
         if preset and preset != self._preset:
             raise InvalidRequestError(f"the ring records '{self._preset}', not '{preset}'")
-        if self.output is None:
+        if self._outputs.ring is None:
             raise PreconditionError(
                 "the ring can't be written at present; see last_error", Reason.RECORDER_NOT_READY
             )
@@ -258,7 +264,8 @@ class RingRecorder:
     def _at_end(self, manifest: Manifest) -> Manifest:
         """Returns the manifest with the begin of what it contains, which may be later than was requested."""
         now_ms, now_ns = time.time_ns() // _NS_PER_MS, time.monotonic_ns()
-        numbered = self.output.progress.numbered if self.output else manifest.numbered
+        output = self._outputs.ring
+        numbered = output.progress.numbered if output else manifest.numbered
         update: dict[str, Any] = {"ended_unix_ms": now_ms, "ended_monotonic_ns": now_ns, "numbered": numbered}
         firsts = [each.first_ns for each in manifest.segments if each.first_ns is not None]
         if firsts:

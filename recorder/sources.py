@@ -63,7 +63,8 @@ class RobotSources:
         problems = self._intake.problems if self._intake else {}
         if problems:
             return next(iter(problems.values()))
-        return self._tap.last_error if self._tap else ""
+        without = self._tap.problem if self._tap else ""
+        return f"no video from the preview: {without}" if without else ""
 
     def want(self, presets: frozenset[str], *, video: bool) -> None:
         """Takes the topics of these presets, and the video, from now on; everything else no longer."""

@@ -133,8 +133,8 @@ def snapshot(
 def list_all(session: Session) -> None:
     """List the recordings on the robot, the newest first."""
     with session.connect() as gateway:
-        status = gateway.list_recordings(page_size=1).status
-        recordings = tuple(gateway.recordings())
+        pages = tuple(gateway.recording_pages())
+    status, recordings = pages[0].status, tuple(each for page in pages for each in page.recordings)
     document = {"status": json_form(status), "recordings": json_form(recordings)}
     summary = Text(f"{status.state.value.upper()}  {recording_summary(status, compact=False)}", style="dim")
     session.show(document, Group(_list_table(recordings), Text(), summary) if recordings else summary)
@@ -217,7 +217,7 @@ async def _export(session: Session, recording_id: str, to: Path, *, resume: bool
         folder = path_below(to, found.id)
         with ExportBar(session.out, shown=not session.as_json) as bar:
             done = await client.export_recording(
-                recording_id,
+                found,
                 folder,
                 ExportOptions(
                     resume=resume, max_bytes_per_s=round(limit_mbit * 1e6 / 8), progress=bar.update

@@ -9,7 +9,7 @@ from typing import Self, TypeVar
 from console.client import results
 from console.client.clock import Clock, Offset
 from console.client.driving import DriveOptions, DriveSession
-from console.client.errors import DeadlineExceeded, Unreachable
+from console.client.errors import DeadlineExceeded, Unreachable, Unsupported
 from console.client.event_feed import EventFeed
 from console.client.exporting import Export, ExportedRecording, ExportOptions
 from console.client.mapping import recording
@@ -322,11 +322,16 @@ class AsyncGatewayClient:
 
     async def recordings(self) -> AsyncGenerator[results.Recording]:
         """Yields all recordings, the newest first; requests page after page."""
+        async for page in self.recording_pages():
+            for each in page.recordings:
+                yield each
+
+    async def recording_pages(self) -> AsyncGenerator[results.RecordingPage]:
+        """Yields all pages of the list, the newest recordings first, each with the state of the recorder."""
         token, seen = "", set[str]()
         while True:
             page = await self.list_recordings(page_token=token)
-            for each in page.recordings:
-                yield each
+            yield page
             token = page.next_page_token
             # A robot that repeats a token would be asked without an end.
             if not token or token in seen:
@@ -364,7 +369,7 @@ class AsyncGatewayClient:
         return await self._call_recording(DELETE_RECORDING, request)
 
     async def export_recording(
-        self, recording_id: str, folder: Path, options: ExportOptions | None = None
+        self, recording_id: str | results.Recording, folder: Path, options: ExportOptions | None = None
     ) -> ExportedRecording:
         """Copies a recording to this computer; of one that is still written, what is final so far.
 
@@ -372,18 +377,24 @@ class AsyncGatewayClient:
         files, from which another export goes on.
 
         Args:
-            recording_id: Which.
+            recording_id: Which; or the recording with its files, as `recording()` has just returned it.
             folder: Gets the recording's files; made if it is not there.
             options: How to copy it.
 
         Raises:
             UserError: The folder can't be written, or has other files of the same names.
         """
-        found = await self.recording(recording_id)
+        found = await self.recording(recording_id) if isinstance(recording_id, str) else recording_id
         return await Export(self._transport, found, folder, options or ExportOptions()).run()
 
     async def _call_recording(self, method: Method[ResultT], request: bytes) -> ResultT:
-        return await self._calls.call(method, request, self._options.recording_within_s)
+        try:
+            return await self._calls.call(method, request, self._options.recording_within_s)
+        except Unsupported as error:
+            raise Unsupported(
+                f"the gateway at {self.target} is too old to record; nothing was changed",
+                "Update it on the robot (docs/deploy.md); to see its version, type: robotctl info",
+            ) from error
 
     def _connect(self) -> GrpcTransport:
         """Returns a connection of its own."""

@@ -59,7 +59,7 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
 def _folder(settings: RecorderSettings) -> Iterator[Finding]:
     existing = next(each for each in (settings.root, *settings.root.parents) if each.exists())
     room = Limits(settings.room.quota_bytes, settings.room.min_free_bytes)
-    free = room.room_bytes(used_bytes([settings.root]), disk_of(existing))
+    free = room.room_bytes(used_bytes(settings.folders), disk_of(existing))
     yield from folder_findings(settings, free, writable=os.access(existing, os.W_OK | os.X_OK))
 
 

@@ -113,9 +113,19 @@ def _head_length(file: BinaryIO, size: int) -> int:
     if _read(file, 0, len(MCAP0_MAGIC)) != MCAP0_MAGIC:
         return 0
     record = _record(file, len(MCAP0_MAGIC), size)
-    if record is None or record[0] != Opcode.HEADER:
+    if record is None or record[0] != Opcode.HEADER or not _is_header(record[1]):
         return 0
     return len(MCAP0_MAGIC) + RECORD.size + len(record[1])
+
+
+def _is_header(body: bytes) -> bool:
+    """Returns whether readers can read a header with this body. There is no CRC to ask."""
+    stream = ReadDataStream(BytesIO(body))
+    try:
+        Header.read(stream)
+    except (EndOfFile, UnicodeDecodeError, struct.error):
+        return False
+    return bool(stream.count == len(body))
 
 
 def _record(file: BinaryIO, at: int, size: int) -> tuple[int, bytes] | None:

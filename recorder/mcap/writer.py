@@ -61,16 +61,6 @@ class SegmentWriter:
         """Bytes of the file so far, and of the chunk that is not compressed yet."""
         return self._file.size + self._pending
 
-    @property
-    def messages(self) -> int:
-        """Messages written so far."""
-        return self._messages
-
-    @property
-    def began_ns(self) -> int | None:
-        """Earliest log time so far; None before the first message."""
-        return self._first_ns
-
     def write(self, sample: Sample) -> None:
         """Adds a message; a full chunk goes to the file."""
         if self._pending and self._pending + len(sample.data) > MAX_CHUNK:

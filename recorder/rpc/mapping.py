@@ -9,7 +9,7 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
-from recorder.recorder import Recorder
+from recorder.readings import Readings
 from recorder.requests import Live
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
@@ -44,15 +44,15 @@ _COPY_STATES_BACK: Final = {message: state for state, message in COPY_STATES.ite
 _NS_PER_MS: Final = 1_000_000
 
 
-def recording(recorder: Recorder, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
+def recording(readings: Readings, manifest: Manifest, *, whole: bool = False) -> pb.Recording:
     """Returns the message of a recording.
 
     Args:
-        recorder: has how far it has come, if it runs.
+        readings: have how far it has come, if it runs.
         manifest: of the recording.
         whole: whether with its files and gaps.
     """
-    live = recorder.live(manifest)
+    live = readings.live(manifest)
     gaps = manifest.all_gaps
     message = pb.Recording(
         id=manifest.id,
@@ -113,33 +113,33 @@ def bundle(found: Bundle, sums: Mapping[str, bytes] | None = None) -> pb.Recordi
     return message
 
 
-def status(recorder: Recorder, settings: RecorderSettings) -> pb.RecordingStatus:
+def status(readings: Readings, settings: RecorderSettings) -> pb.RecordingStatus:
     """Returns the message of the recorder's state."""
     message = pb.RecordingStatus(
-        state=STATES[recorder.phase.state],
-        bytes_per_s=recorder.bytes_per_s,
-        room_bytes=max(recorder.room.bytes, 0),
-        ring_s=recorder.ring_s,
-        snapshots_pending=recorder.snapshots_pending,
-        last_error=recorder.last_error,
+        state=STATES[readings.phase.state],
+        bytes_per_s=readings.bytes_per_s,
+        room_bytes=max(readings.room.bytes, 0),
+        ring_s=readings.ring_s,
+        snapshots_pending=readings.snapshots_pending,
+        last_error=readings.last_error,
         presets=[
             pb.RecordingPreset(
                 name=name,
                 description=preset.description,
                 with_video=preset.video and settings.video.socket is not None,
-                bytes_per_minute=recorder.bytes_per_minute.get(name, 0),
+                bytes_per_minute=readings.bytes_per_minute.get(name, 0),
                 in_ring=name == settings.ring.preset,
             )
             for name, preset in settings.presets.items()
         ],
     )
-    recordings = recorder.recordings
+    recordings = readings.recordings
     message.recordings = len(recordings)
     message.to_copy = sum(each.copied.outstanding for each in recordings)
-    if (room_s := recorder.room_s) is not None:
+    if (room_s := readings.room_s) is not None:
         message.room_s = int(min(room_s, 1e9))
-    if running := recorder.running:
-        live = recorder.live(running)
+    if running := readings.running:
+        live = readings.live(running)
         message.recording_id = running.id
         message.label = running.label
         message.preset = running.preset
@@ -152,20 +152,20 @@ def status(recorder: Recorder, settings: RecorderSettings) -> pb.RecordingStatus
     return message
 
 
-def watch_state(recorder: Recorder, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
+def watch_state(readings: Readings, settings: RecorderSettings) -> recorder_pb.WatchStateResponse:
     """Returns the message that the gateway watches."""
-    newest = recorder.newest
+    newest = readings.newest
     message = recorder_pb.WatchStateResponse(
-        instance_id=recorder.run_id,
-        status=status(recorder, settings),
-        newest=recording(recorder, newest) if newest else None,
-        messages_dropped=recorder.dropped,
-        disk_free_bytes=recorder.room.disk.free_bytes,
-        disk_size_bytes=recorder.room.disk.size_bytes,
-        disk_short=recorder.disk_short,
-        ended=[recording(recorder, each) for each in recorder.recently_ended],
+        instance_id=readings.run_id,
+        status=status(readings, settings),
+        newest=recording(readings, newest) if newest else None,
+        messages_dropped=readings.dropped,
+        disk_free_bytes=readings.room.disk.free_bytes,
+        disk_size_bytes=readings.room.disk.size_bytes,
+        disk_short=readings.disk_short,
+        ended=[recording(readings, each) for each in readings.recently_ended],
     )
-    if (lost := recorder.lost) is not None:
+    if (lost := readings.lost) is not None:
         message.messages_lost = lost
     return message
 

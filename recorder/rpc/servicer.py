@@ -18,7 +18,8 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.config import RecorderSettings
-from recorder.recorder import Recorder
+from recorder.operations import Operations
+from recorder.readings import Readings
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
 from recorder.store.export import Content, Pace, UnreadableError, chunks
@@ -40,13 +41,17 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     """RecorderService.
 
     Args:
-        recorder: owns what is recorded.
+        operations: of the recorder.
+        readings: of the same.
         bundles: the robot's own experiments.
         settings: of the program.
     """
 
-    def __init__(self, recorder: Recorder, bundles: RunBundles, settings: RecorderSettings) -> None:
-        self._recorder = recorder
+    def __init__(
+        self, operations: Operations, readings: Readings, bundles: RunBundles, settings: RecorderSettings
+    ) -> None:
+        self._operations = operations
+        self._readings = readings
         self._bundles = bundles
         self._settings = settings
         self._pace = Pace(settings.export.max_bytes_per_s)
@@ -68,9 +73,9 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
 
         while True:
             changed = False
-            yield mapping.watch_state(self._recorder, self._settings)
-            writes = self._recorder.writes
-            await self._recorder.changes.wait_until(
+            yield mapping.watch_state(self._readings, self._settings)
+            writes = self._readings.writes
+            await self._readings.changes.wait_until(
                 has_changed, _HEARTBEAT_WRITING_S if writes else _HEARTBEAT_S
             )
 
@@ -86,14 +91,14 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
             max_duration_s=request.max_duration_s,
             max_bytes=request.max_bytes,
         )
-        result = await self._recorder.start(_request_id(request), options)
+        result = await self._operations.start(_request_id(request), options)
         return pb.StartRecordingResponse(message=result.message, recording=self._recording_of(result))
 
     async def StopRecording(  # noqa: N802  # the schema names it
         self, request: pb.StopRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.StopRecordingResponse:
         """Stops a recording."""
-        result = await self._recorder.stop(_request_id(request), request.recording_id)
+        result = await self._operations.stop(_request_id(request), request.recording_id)
         return pb.StopRecordingResponse(message=result.message, recording=self._recording_of(result))
 
     async def TriggerSnapshot(  # noqa: N802  # the schema names it
@@ -106,7 +111,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
             label=request.label,
             preset=request.preset,
         )
-        result = await self._recorder.snapshot(_request_id(request), options, _caller(context))
+        result = await self._operations.snapshot(_request_id(request), options, _caller(context))
         return pb.TriggerSnapshotResponse(message=result.message, recording=self._recording_of(result))
 
     async def ListRecordings(  # noqa: N802  # the schema names it
@@ -114,7 +119,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> pb.ListRecordingsResponse:
         """Returns a page of the list."""
         bundles = await asyncio.to_thread(self._bundles.all)
-        listed: list[Manifest | Bundle] = [*self._recorder.recordings, *bundles]
+        listed: list[Manifest | Bundle] = [*self._readings.recordings, *bundles]
         listed.sort(key=_place, reverse=True)
         if request.page_token:
             listed = _after(listed, request.page_token)
@@ -123,7 +128,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return pb.ListRecordingsResponse(
             recordings=[self._message(each) for each in page],
             next_page_token=_token(page[-1]) if len(listed) > size else "",
-            status=mapping.status(self._recorder, self._settings),
+            status=mapping.status(self._readings, self._settings),
         )
 
     async def GetRecording(  # noqa: N802  # the schema names it
@@ -133,8 +138,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         if bundle := await self._bundle(request.recording_id):
             sums = await asyncio.to_thread(self._sums, bundle)
             return pb.GetRecordingResponse(recording=mapping.bundle(bundle, sums))
-        manifest = self._recorder.get(request.recording_id)
-        return pb.GetRecordingResponse(recording=mapping.recording(self._recorder, manifest, whole=True))
+        manifest = self._readings.get(request.recording_id)
+        return pb.GetRecordingResponse(recording=mapping.recording(self._readings, manifest, whole=True))
 
     async def ExportRecording(  # noqa: N802  # the schema names it
         self, request: pb.ExportRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
@@ -153,7 +158,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         yield pb.ExportRecordingResponse(header=header)
 
         def check() -> None:
-            if bundle is None and not self._recorder.has(request.recording_id):
+            if bundle is None and not self._readings.has(request.recording_id):
                 raise ConflictError(
                     f"recording {request.recording_id} was deleted meanwhile", Reason.RECORDING_DELETED
                 )
@@ -172,8 +177,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: pb.GetRecordingThumbnailRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> pb.GetRecordingThumbnailResponse:
         """Returns a key frame."""
-        manifest = self._recorder.get(request.recording_id)
-        found = await asyncio.to_thread(find_thumbnail, self._recorder.folder_of(manifest), manifest)
+        manifest = self._readings.get(request.recording_id)
+        found = await asyncio.to_thread(find_thumbnail, self._readings.folder_of(manifest), manifest)
         if found is None:
             raise NotFoundError(
                 f"{manifest.id} has no key frame of video that is final", Reason.RECORDING_NOT_FOUND
@@ -187,7 +192,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> pb.PinRecordingResponse:
         """Pins a recording, or ends that."""
         await self._refuse_bundle(request.recording_id)
-        result = await self._recorder.pin(_request_id(request), request.recording_id, pinned=request.pinned)
+        result = await self._operations.pin(_request_id(request), request.recording_id, pinned=request.pinned)
         return pb.PinRecordingResponse(message=result.message, recording=self._recording_of(result))
 
     async def DeleteRecording(  # noqa: N802  # the schema names it
@@ -195,7 +200,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> pb.DeleteRecordingResponse:
         """Deletes a recording."""
         await self._refuse_bundle(request.recording_id)
-        result = await self._recorder.delete(
+        result = await self._operations.delete(
             _request_id(request), request.recording_id, request.expected_sha256, force=request.force
         )
         return pb.DeleteRecordingResponse(message=result.message)
@@ -204,7 +209,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, request: recorder_pb.ReportFaultRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> recorder_pb.ReportFaultResponse:
         """Makes an incident of a fault."""
-        made = await self._recorder.report_fault(request.fault_id, request.severity, request.message)
+        made = await self._operations.report_fault(request.fault_id, request.severity, request.message)
         return recorder_pb.ReportFaultResponse(recording_id=made)
 
     async def SetCopy(  # noqa: N802  # the schema names it
@@ -212,19 +217,19 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     ) -> recorder_pb.SetCopyResponse:
         """Records the state of a copy."""
         await self._refuse_bundle(request.recording_id)
-        await self._recorder.set_copy(request.recording_id, mapping.copy(request.copy))
+        await self._operations.set_copy(request.recording_id, mapping.copy(request.copy))
         return recorder_pb.SetCopyResponse()
 
     def _recording_of(self, result: Result) -> pb.Recording | None:
-        return mapping.recording(self._recorder, result.recording) if result.recording else None
+        return mapping.recording(self._readings, result.recording) if result.recording else None
 
     def _message(self, each: Manifest | Bundle) -> pb.Recording:
-        return mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._recorder, each)
+        return mapping.bundle(each) if isinstance(each, Bundle) else mapping.recording(self._readings, each)
 
     async def _bundle(self, recording_id: str) -> Bundle | None:
         return (
             None
-            if self._recorder.has(recording_id)
+            if self._readings.has(recording_id)
             else await asyncio.to_thread(self._bundles.get, recording_id)
         )
 
@@ -250,12 +255,12 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
     async def _content(self, request: pb.ExportRecordingRequest, bundle: Bundle | None) -> Content:
         if bundle:
             return await self._bundle_content(bundle, request.file)
-        manifest = self._recorder.get(request.recording_id)
+        manifest = self._readings.get(request.recording_id)
         for file in manifest.files:
             if file.name == request.file:
-                path = self._recorder.folder_of(manifest) / file.name
+                path = self._readings.folder_of(manifest) / file.name
                 return Content(path, file.size, bytes.fromhex(file.sha256))
-        if request.file == self._recorder.live(manifest).part:
+        if request.file == self._readings.live(manifest).part:
             raise _not_final(request.file)
         raise _no_such_file(manifest.id, request.file)
 

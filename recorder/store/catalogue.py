@@ -36,9 +36,13 @@ class Catalogue:
 
     Args:
         root: the folder of all recordings.
+
+    Attributes:
+        revision: grows with every change.
     """
 
     def __init__(self, root: Path) -> None:
+        self.revision = 0
         self._folder = root / RECORDINGS
         self._manifests: dict[str, Manifest] = {}
 
@@ -95,6 +99,7 @@ class Catalogue:
             OSError: the disk is full or fails; then the memory alone has it.
         """
         self._manifests[manifest.id] = manifest
+        self.revision += 1
         manifest.write(self.folder_of(manifest))
 
     def delete(self, manifest: Manifest) -> None:
@@ -106,6 +111,7 @@ class Catalogue:
         folder = self.folder_of(manifest)
         manifest.model_copy(update={"deleting": True}).write(folder)
         self._manifests.pop(manifest.id, None)
+        self.revision += 1
         parts = segments_in(folder, PART)
         for path in (*(folder / file.name for file in manifest.files), *parts, folder / METADATA):
             path.unlink(missing_ok=True)

@@ -75,10 +75,7 @@ class Housekeeping:
 
     def _measured(self) -> Room:
         disk = disk_of(self._settings.root)
-        folders = [self._settings.root]
-        if self._ring and self._settings.ring.directory:
-            folders.append(self._ring.directory)
-        used = used_bytes(folders) if self._limits.quota_bytes else 0
+        used = used_bytes(self._settings.folders) if self._limits.quota_bytes else 0
         return Room(self._limits.room_bytes(used, disk), disk)
 
     def _keepables(self) -> list[Keepable]:

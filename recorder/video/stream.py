@@ -143,7 +143,7 @@ class Stream:
     def _take_info(self, info: Mapping[str, Any], now: Now) -> list[Item]:
         if len(info) > _MAX_ENTRIES:
             raise MalformedRecordError(f"an info of {len(info)} entries")
-        values = {key[:_MAX_TEXT]: _text(value) for key, value in info.items()}
+        values = {_text(key): _text(value) for key, value in info.items()}
         self.running = values.get("state") == "running"
         self.error = values.get("error", "")
         if "codec" in values:
@@ -187,7 +187,8 @@ def _object(payload: bytes) -> dict[str, Any]:
 
 
 def _text(value: object) -> str:
-    return str(value)[:_MAX_TEXT]
+    # JSON may have half of a surrogate pair (RFC 8259 8.2), which no file takes.
+    return str(value)[:_MAX_TEXT].encode(errors="replace").decode()
 
 
 def _is_count(value: object) -> bool:

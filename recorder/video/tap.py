@@ -68,9 +68,9 @@ class Tap:
         return self._stream.frames
 
     @property
-    def stream_error(self) -> str:
-        """What the preview says about frames that do not flow; empty while they do."""
-        return "" if self._stream.running else self._stream.error
+    def problem(self) -> str:
+        """Why no frames come, as far as is known: of the connection, or the preview's own; else empty."""
+        return self.last_error or ("" if self._stream.running else self._stream.error)
 
     async def run(self) -> NoReturn:
         """Records until it is cancelled."""

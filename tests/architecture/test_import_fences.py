@@ -99,7 +99,22 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
             for name in ("lifecycle", "incidents")
         ),
         ("recorder/config.py", (*HEAVY, *WIRE, "asyncio", "recorder")),
-        ("recorder/recorder.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc")),
+        *(
+            (f"recorder/{name}.py", (*HEAVY, *WIRE, "omniseer", "recorder.intake", "recorder.rpc"))
+            for name in (
+                "life",
+                "manual_recorder",
+                "operations",
+                "outputs",
+                "parts",
+                "readings",
+                "recorder",
+                "reports",
+                "ring_recorder",
+            )
+        ),
+        ("recorder/manual_recorder.py", ("recorder.parts", "recorder.recorder", "recorder.ring_recorder")),
+        ("recorder/readings.py", ("recorder.recorder", "recorder.operations")),
         ("gateway/status/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config", "asyncio")),
         ("gateway/access/", (*HEAVY, *WIRE, "gateway.ros", "gateway.rpc", "gateway.config")),
         ("gateway/ros/", ("gateway.rpc", "gateway.links", *WIRE)),

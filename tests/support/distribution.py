@@ -13,7 +13,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 _CONTAINERS: Final = "tests/e2e/containers/"
 _SHARING: Final = tuple(
-    f"{_CONTAINERS}test_{name}.py" for name in ("main_job", "hardening", "upgrade", "faults")
+    f"{_CONTAINERS}test_{name}.py" for name in ("main_job", "hardening", "upgrade", "recording", "faults")
 )
 LONGEST: Final = (
     *_SHARING,

@@ -20,9 +20,9 @@ _PERIOD_S: Final = 0.002
 async def main(root: Path, first: int) -> None:
     """Records until the process is killed."""
     async with running_recorder(root, segments={"max_s": 1}) as running:
-        if running.recorder.running is None:
-            await running.recorder.start("child", StartOptions())
-        await running.until(lambda: running.recorder.phase.state is State.RECORDING)
+        if running.readings.running is None:
+            await running.operations.start("child", StartOptions())
+        await running.until(lambda: running.readings.phase.state is State.RECORDING)
         source = Source(running.queue, sent=first - 1)
         while True:
             source.send(size=1000)

@@ -58,6 +58,7 @@ class RecorderDouble(RecorderServiceServicer):
         recordings: as they are listed, without files.
         report: what it reports; `changed` sends it at once.
         requests: every request that changes something, with its metadata.
+        looks: names of the calls that only looked, in order.
         faults: every fault that was reported to it.
         thawed: while it is not set, no call is answered, though connections are accepted.
         flowing: while it is not set, exports rest after the chunk on its way.
@@ -75,6 +76,7 @@ class RecorderDouble(RecorderServiceServicer):
         self.recordings: dict[str, pb.Recording] = {}
         self.unfinal: set[str] = set()
         self.requests: list[tuple[Any, dict[str, Any]]] = []
+        self.looks: list[str] = []
         self.faults: list[recorder_service_pb2.ReportFaultRequest] = []
         self.thawed, self.flowing = asyncio.Event(), asyncio.Event()
         self.thawed.set()
@@ -208,6 +210,7 @@ class RecorderDouble(RecorderServiceServicer):
 
     async def ListRecordings(self, request: pb.ListRecordingsRequest, _context: Any) -> Any:  # noqa: N802
         await self.thawed.wait()
+        self.looks.append("ListRecordings")
         newest = sorted(self.recordings.values(), key=lambda each: each.id, reverse=True)
         if request.page_token and not request.page_token.isdecimal():
             raise InvalidRequestError("the page token is not one of this robot")
@@ -220,6 +223,7 @@ class RecorderDouble(RecorderServiceServicer):
 
     async def GetRecording(self, request: pb.GetRecordingRequest, _context: Any) -> Any:  # noqa: N802
         await self.thawed.wait()
+        self.looks.append("GetRecording")
         recording = pb.Recording()
         recording.CopyFrom(self._found(request.recording_id))
         for name, data in sorted(self.files[recording.id].items()):

@@ -12,6 +12,9 @@ from typing import Any, Final
 from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.mcap.reading import messages
+from recorder.operations import Operations
+from recorder.parts import parts_of
+from recorder.readings import Readings
 from recorder.recorder import Recorder
 from recorder.store.folder import make_directory
 from recorder.store.manifest import Manifest
@@ -45,9 +48,9 @@ class Source:
             self.queue.put([Sample(self.of, data, now_ns, now_ns, self.sent, time.monotonic_ns())])
 
 
-def numbers(recorder: Recorder, manifest: Manifest, topic: str = "/odom") -> list[int]:
+def numbers(readings: Readings, manifest: Manifest, topic: str = "/odom") -> list[int]:
     """What the messages of a `Source` say that a recording has, in order."""
-    folder = recorder.folder_of(manifest)
+    folder = readings.folder_of(manifest)
     return [
         int(data[8:].partition(b".")[0])
         for segment in manifest.segments
@@ -55,7 +58,7 @@ def numbers(recorder: Recorder, manifest: Manifest, topic: str = "/odom") -> lis
     ]
 
 
-class _NoSources:
+class NoSources:
     problem = ""
 
     def __init__(self) -> None:
@@ -84,17 +87,18 @@ class LatchedMessages:
 
 @dataclass
 class Running:
-    recorder: Recorder
+    operations: Operations
+    readings: Readings
     queue: SampleQueue
-    sources: _NoSources
+    sources: NoSources
     settings: RecorderSettings
 
     async def written(self, count: int) -> None:
         """Returns when so many messages of the running recording are on the disk."""
         await self.until(
             lambda: (
-                self.recorder.running is not None
-                and self.recorder.live(self.recorder.running).messages >= count
+                self.readings.running is not None
+                and self.readings.live(self.readings.running).messages >= count
             )
         )
 
@@ -117,13 +121,15 @@ async def running_recorder(root: Path, boot_id: str = "boot", **values: Any) -> 
     """Recovered and idle, or recording, when the block begins; closed in order when it ends."""
     settings = settings_for(root, **values)
     make_directory(root)
-    queue, sources = SampleQueue(settings.queue_bytes), _NoSources()
-    recorder = Recorder(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
+    queue, sources = SampleQueue(settings.queue_bytes), NoSources()
+    parts = parts_of(settings, queue, sources, LatchedMessages(), boot_id=boot_id, run_id="run")
+    readings = Readings(parts)
+    recorder = Recorder(parts, readings)
     stop = asyncio.Event()
     task = asyncio.ensure_future(recorder.run(stop))
-    running = Running(recorder, queue, sources, settings)
+    running = Running(Operations(parts, readings, recorder), readings, queue, sources, settings)
     try:
-        await running.until(lambda: task.done() or recorder.phase.state is not State.RECOVERING)
+        await running.until(lambda: task.done() or readings.phase.state is not State.RECOVERING)
         yield running
     finally:
         stop.set()

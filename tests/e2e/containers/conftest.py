@@ -13,13 +13,23 @@ def _shared_demo(
     tmp_path_factory: pytest.TempPathFactory,
     images: str,  # noqa: ARG001  # for its effect
 ) -> Iterator[Deployment]:
-    with deployed(tmp_path_factory.mktemp("demo"), demo_overlay()) as deployment:
+    directory = tmp_path_factory.mktemp("demo")
+    config = directory / "recorder.yaml"
+    # Without a ring, so that the preview is off unless a test enables it or records it.
+    config.write_text("room: {min_free_bytes: 0}\n", encoding="utf-8")
+    with deployed(
+        directory,
+        demo_overlay(),
+        COMPOSE_PROFILES="record",
+        ROBOT_RECORDS="true",
+        RECORDER_CONFIG=str(config),
+    ) as deployment:
         yield deployment
 
 
 @pytest.fixture
 def demo(_shared_demo: Deployment) -> Deployment:
-    """The whole system with a simulated robot: containers up, preview off, restarts counted from 0."""
+    """The whole system with a simulated robot: containers up, preview and recording off, no restarts yet."""
     _shared_demo.reset()
     return _shared_demo
 

@@ -23,6 +23,7 @@ from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.waiting import wait_until
 
 SERVICES = ("gateway", "preview")
+_GUARDED = (*SERVICES, "recorder")
 # Devices, and the kernel's own trees.
 _RUNTIME = ("/proc", "/sys", "/dev")
 
@@ -86,7 +87,7 @@ class Deployment:
     def program_pid(self, service: str) -> int:
         """The program itself: a child of the first process, tini, or of the guard between the two."""
         pid = int(self.inspect(service)["State"]["Pid"])
-        for _ in range(2 if service in {"gateway", "preview"} else 1):
+        for _ in range(2 if service in _GUARDED else 1):
             children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
             pid = int(children[0])
         return pid

@@ -10,14 +10,17 @@ from tests.e2e.containers.deployment import Deployment, mounts, writable
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
 
-SERVICES = ("gateway", "preview", "robot")
-USERS = {"gateway": 10001, "preview": 10002, "robot": 10001}
+SERVICES = ("gateway", "preview", "recorder", "robot")
+USERS = {"gateway": 10001, "preview": 10002, "recorder": 10004, "robot": 10001}
 GROUP = 10000
 WRITABLE = {
     "gateway": {"/tmp", "/dev/shm"},
     "preview": {"/tmp", "/run/robot-gateway", "/run/robot-video", "/dev/shm"},
+    "recorder": {"/tmp", "/run/robot-recorder", "/var/lib/robot-recorder", "/dev/shm"},
     "robot": {"/tmp", "/dev/shm"},
 }
+_ON_THE_DISK = {"/var/lib/robot-recorder"}
+"""The others are in memory, with options of their own."""
 _LISTENING = "0A"
 
 
@@ -60,7 +63,7 @@ def test_nothing_can_be_written_beyond_what_is_declared(running: Deployment, ser
     assert writable(pid) == WRITABLE[service]
     mounted = mounts(pid)
     assert "ro" in mounted["/"]
-    for path in WRITABLE[service] - {"/dev/shm"}:
+    for path in WRITABLE[service] - {"/dev/shm"} - _ON_THE_DISK:
         assert {"noexec", "nosuid", "nodev"} <= mounted[path], path
 
 
@@ -103,6 +106,7 @@ def _engine_dns() -> str:
 def test_only_the_declared_ports_listen(running: Deployment) -> None:
     assert listening_tcp(running.program_pid("gateway")) == {50051}
     assert listening_tcp(running.program_pid("preview")) == set()
+    assert listening_tcp(running.program_pid("recorder")) == set()
     assert listening_tcp(running.program_pid("robot")) == set()
     udp = Path(f"/proc/{running.program_pid('preview')}/net/udp").read_text(encoding="ascii").splitlines()[1:]
     bound = {line.split()[1] for line in udp if not line.split()[1].startswith(_engine_dns())}
@@ -110,15 +114,19 @@ def test_only_the_declared_ports_listen(running: Deployment) -> None:
 
 
 def test_the_images_have_no_compiler_and_no_installer(running: Deployment) -> None:
-    for service in ("gateway", "preview"):
+    for service in ("gateway", "preview", "recorder"):
         for tool in ("gcc", "cc", "g++", "cmake", "pip", "uv"):
             found = running.run("exec", service, "sh", "-c", f"command -v {tool}", check=False)
             assert found.returncode, f"{service} has {tool}: {found.stdout}"
 
 
-def test_limits_are_in_force(running: Deployment) -> None:
-    preview = running.inspect("preview")["HostConfig"]
-    assert (preview["Memory"], preview["PidsLimit"]) == (512 << 20, 256)
-    assert preview["NanoCpus"] == min(1.5, os.cpu_count() or 1) * 1e9
-    score = Path(f"/proc/{running.program_pid('preview')}/oom_score_adj").read_text(encoding="ascii")
+@pytest.mark.parametrize(
+    ("service", "cpus", "processes"), [("preview", 1.5, 256), ("recorder", 1.0, 128)], ids=str
+)
+def test_limits_are_in_force(running: Deployment, service: str, cpus: float, processes: int) -> None:
+    limits = running.inspect(service)["HostConfig"]
+    assert (limits["Memory"], limits["PidsLimit"]) == (512 << 20, processes)
+    assert limits["NanoCpus"] == min(cpus, os.cpu_count() or 1) * 1e9
+    assert limits["CpuShares"] == 256
+    score = Path(f"/proc/{running.program_pid(service)}/oom_score_adj").read_text(encoding="ascii")
     assert int(score) == 500

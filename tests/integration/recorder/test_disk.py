@@ -1,10 +1,12 @@
 """What the disk does to a recorder: full, damaged, strange, shared with another one."""
 
 import os
+import resource
+import shutil
 import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from recorder.lifecycle import State
 from recorder.requests import StartOptions
 from recorder.store.lock import folder_lock
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
-from tests.support.recorder_in_process import Running, Source, running_recorder
+from tests.support.recorder_in_process import Running, Source, numbers, running_recorder
 
 MIB = 1024 * 1024
 SLOW_S = 0.1
@@ -45,9 +47,9 @@ def fill(disk: Path, leave: int) -> Path:
 
 async def recorded(running: Running, size: int = 1000) -> Manifest:
     """A finished recording."""
-    await running.recorder.start(f"start-{size}", StartOptions())
+    await running.operations.start(f"start-{size}", StartOptions())
     Source(running.queue).send(10, size=size // 10)
-    done = (await running.recorder.stop(f"stop-{size}", "")).recording
+    done = (await running.operations.stop(f"stop-{size}", "")).recording
     assert done
     return done
 
@@ -56,48 +58,105 @@ async def test_a_disk_full_before_the_start_refuses_it(small_disk: Path) -> None
     async with running_recorder(small_disk / "root") as running:
         fill(small_disk, 2 * MIB)
         with pytest.raises(TooMuchError, match="no room"):
-            await running.recorder.start("1", StartOptions())
-        assert running.recorder.phase.state is State.IDLE
+            await running.operations.start("1", StartOptions())
+        assert running.readings.phase.state is State.IDLE
 
 
 async def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_written(small_disk: Path) -> None:
     async with running_recorder(small_disk / "root") as running:
-        await running.recorder.start("1", StartOptions())
+        await running.operations.start("1", StartOptions())
         source = Source(running.queue)
         source.send(100, size=1000)
         await running.written(100)
         ballast = fill(small_disk, 100_000)
         source.send(100, size=20_000)
-        await running.until(lambda: running.recorder.running is None)
-        cut = running.recorder.newest
+        await running.until(lambda: running.readings.running is None)
+        cut = running.readings.newest
         assert cut
         assert cut.stop_reason is StopReason.DISK
         assert cut.messages >= 100
-        assert running.recorder.disk_short
-        assert "disk" in running.recorder.last_error
+        assert running.readings.disk_short
+        assert "disk" in running.readings.last_error
         # With room again it records again, by itself.
         ballast.unlink()
-        await running.until(lambda: running.recorder.phase.state is State.IDLE)
-        await running.until(lambda: not running.recorder.get(cut.id).state.open)
-        assert (await running.recorder.start("2", StartOptions())).recording
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        await running.until(lambda: not running.readings.get(cut.id).state.open)
+        assert (await running.operations.start("2", StartOptions())).recording
 
 
 async def test_a_disk_full_at_the_end_leaves_a_recording_that_opens(small_disk: Path) -> None:
     async with running_recorder(small_disk / "root") as running:
-        await running.recorder.start("1", StartOptions())
+        await running.operations.start("1", StartOptions())
         Source(running.queue).send(50, size=1000)
         await running.written(50)
-        recording = running.recorder.running
+        recording = running.readings.running
         assert recording
         ballast = fill(small_disk, 0)
         with suppress(NotFoundError):  # The writer may find the disk full before the stop comes.
-            await running.recorder.stop("2", "")
+            await running.operations.stop("2", "")
         ballast.unlink()
-        await running.until(lambda: running.recorder.phase.state is State.IDLE)
-        done = running.recorder.get(recording.id)
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        done = running.readings.get(recording.id)
         assert done.state in (RecordingState.COMPLETE, RecordingState.FAULTED)
         assert done.messages == 50
         assert done.metadata
+
+
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """The kernel refuses to write beyond that size: EFBIG (setrlimit(2)), which is no lack of space."""
+    before, highest = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, highest))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (before, highest))
+
+
+async def test_an_error_of_the_disk_ends_the_recording_and_it_records_again_by_itself(tmp_path: Path) -> None:
+    async with running_recorder(tmp_path) as running:
+        await running.operations.start("1", StartOptions())
+        source = Source(running.queue)
+        source.send(100, size=1000)
+        await running.written(100)
+        with files_of_at_most(400_000):
+            source.send(100, size=20_000)
+            await running.until(lambda: running.readings.running is None)
+            cut = running.readings.newest
+            assert cut
+            assert (cut.state, cut.stop_reason) == (RecordingState.FAULTED, StopReason.ERROR)
+            assert "the disk can't be written: File too large" in running.readings.last_error
+            assert not running.readings.disk_short
+            with pytest.raises(PreconditionError, match="can't be written"):
+                await running.operations.start("2", StartOptions())
+        await running.until(lambda: running.readings.phase.state is State.IDLE)
+        assert running.readings.last_error == ""
+        found = numbers(running.readings, running.readings.get(cut.id))
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) >= 100
+        assert (await running.operations.start("3", StartOptions())).recording
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"")], ids=["gone", "empty"])
+async def test_any_file_that_a_power_cut_has_taken_costs_no_other_recording(
+    tmp_path: Path, harm: Callable[[Path], object]
+) -> None:
+    """What was not synchronised may be gone, or have a name and no content."""
+    async with running_recorder(tmp_path / "whole", ring={"preset": "all"}) as running:
+        intact, hurt = await recorded(running, 1000), await recorded(running, 2000)
+        assert hurt.messages == 10
+    whole = tmp_path / "whole"
+    files = [each.relative_to(whole) for each in whole.rglob("*") if each.is_file()]
+    for number, file in enumerate(each for each in files if intact.id not in each.parts):
+        root = tmp_path / str(number)
+        shutil.copytree(whole, root)
+        harm(root / file)
+        async with running_recorder(root, ring={"preset": "all"}) as running:
+            assert running.readings.phase.state is State.IDLE, file
+            assert numbers(running.readings, running.readings.get(intact.id)) == list(range(1, 11)), file
+            if running.readings.has(hurt.id) and file.suffix != ".mcap":
+                assert running.readings.get(hurt.id).messages == 10, file
+            await running.operations.start("again", StartOptions())
 
 
 async def test_room_is_made_in_the_order_of_retention(small_disk: Path) -> None:
@@ -107,19 +166,19 @@ async def test_room_is_made_in_the_order_of_retention(small_disk: Path) -> None:
         copied = await recorded(running, MIB + 1)
         pinned = await recorded(running, MIB + 2)
         waiting = await recorded(running, MIB + 3)
-        await running.recorder.set_copy(copied.id, Copy(state=CopyState.VERIFIED))
-        await running.recorder.set_copy(waiting.id, Copy(state=CopyState.QUEUED))
-        await running.recorder.pin("pin", pinned.id, pinned=True)
+        await running.operations.set_copy(copied.id, Copy(state=CopyState.VERIFIED))
+        await running.operations.set_copy(waiting.id, Copy(state=CopyState.QUEUED))
+        await running.operations.pin("pin", pinned.id, pinned=True)
         ballast = fill(small_disk, 11 * MIB + MIB // 2)
-        await running.recorder.start("a", StartOptions())
-        assert not running.recorder.has(copied.id)
-        assert running.recorder.has(oldest.id)
-        await running.recorder.stop("b", "")
+        await running.operations.start("a", StartOptions())
+        assert not running.readings.has(copied.id)
+        assert running.readings.has(oldest.id)
+        await running.operations.stop("b", "")
         ballast.unlink()
         fill(small_disk, 6 * MIB)
         with pytest.raises(TooMuchError):
-            await running.recorder.start("c", StartOptions())
-        assert {each.id for each in running.recorder.recordings} == {pinned.id, waiting.id}
+            await running.operations.start("c", StartOptions())
+        assert {each.id for each in running.readings.recordings} == {pinned.id, waiting.id}
 
 
 async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) -> None:
@@ -128,7 +187,7 @@ async def test_a_damaged_manifest_is_made_anew_and_kept_aside(tmp_path: Path) ->
     folder = tmp_path / "recordings" / done.id
     (folder / "manifest.json").write_text('{"id": 7', encoding="utf-8")
     async with running_recorder(tmp_path) as running:
-        found = running.recorder.get(done.id)
+        found = running.readings.get(done.id)
         assert found.messages == 10
         assert found.state is RecordingState.RECOVERED
         assert found.pinned  # It might have been.
@@ -151,8 +210,8 @@ async def test_what_is_not_ours_is_neither_listed_nor_deleted(tmp_path: Path) ->
         path.write_text("mine", encoding="utf-8")
     (recordings / "20260101T000000Z-aaaaaa").symlink_to(tmp_path / "elsewhere")
     async with running_recorder(tmp_path) as running:
-        assert [each.id for each in running.recorder.recordings] == [done.id]
-        await running.recorder.delete("1", done.id, b"", force=False)
+        assert [each.id for each in running.readings.recordings] == [done.id]
+        await running.operations.delete("1", done.id, b"", force=False)
     assert all(path.read_text(encoding="utf-8") == "mine" for path in strange)
     assert [path.name for path in (recordings / done.id / "data").iterdir()] == ["my-notes.txt"]
 
@@ -171,8 +230,8 @@ async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_en
 ) -> None:
     """Also where the disk is slow: no client sees an idle recorder in between."""
     async with running_recorder(tmp_path) as running:
-        await running.recorder.start("1", StartOptions())
-        done = (await running.recorder.stop("2", "")).recording
+        await running.operations.start("1", StartOptions())
+        done = (await running.operations.stop("2", "")).recording
         assert done
     # As a recorder leaves it that was killed.
     cut = done.model_copy(update={"state": RecordingState.RECORDING, "stop_reason": None, "ended_unix_ms": 0})
@@ -186,17 +245,17 @@ async def test_a_recording_cut_off_in_this_boot_goes_on_and_in_an_earlier_one_en
 
     monkeypatch.setattr("os.statvfs", slowly)
     async with running_recorder(tmp_path) as running:
-        assert running.recorder.running
-        assert running.recorder.running.id == done.id
+        assert running.readings.running
+        assert running.readings.running.id == done.id
         with pytest.raises(PreconditionError):
-            await running.recorder.start("3", StartOptions())
+            await running.operations.start("3", StartOptions())
     ended = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
     assert ended.stop_reason is StopReason.SHUTDOWN
     assert [gap.cause.name for gap in ended.gaps] == ["INTERRUPTED"]
     cut.write(folder)
     async with running_recorder(tmp_path, boot_id="another") as running:
-        assert running.recorder.running is None
-        found = running.recorder.get(done.id)
+        assert running.readings.running is None
+        found = running.readings.get(done.id)
         assert (found.state, found.stop_reason) == (RecordingState.RECOVERED, StopReason.INTERRUPTED)
 
 
@@ -208,7 +267,7 @@ async def test_a_snapshot_cut_off_in_this_boot_does_not_grow_afterwards(tmp_path
     times = {"started_monotonic_ns": an_hour_ago_ns, "ended_monotonic_ns": 0, "ended_unix_ms": 0}
     done.model_copy(update=cut | times).write(tmp_path / "recordings" / done.id)
     async with running_recorder(tmp_path) as running:
-        found = running.recorder.get(done.id)
+        found = running.readings.get(done.id)
         assert found.state is RecordingState.RECOVERED
         calendar_ms = found.ended_unix_ms - found.started_unix_ms
-        assert running.recorder.live(found).duration_ms == max(calendar_ms, 0)
+        assert running.readings.live(found).duration_ms == max(calendar_ms, 0)

@@ -17,18 +17,18 @@ async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Pat
     async with running_recorder(tmp_path) as running:
         source = Source(running.queue)
         source.send(5)  # Before the start: not part of it.
-        started = await running.recorder.start("1", StartOptions(label="first", preset="all"))
+        started = await running.operations.start("1", StartOptions(label="first", preset="all"))
         assert started.recording
         assert started.recording.state is RecordingState.RECORDING
         assert running.sources.presets == {"all"}
         source.send(100)
-        stopped = await running.recorder.stop("2", "")
+        stopped = await running.operations.stop("2", "")
         done = stopped.recording
         assert done
         assert (done.state, done.stop_reason) == (RecordingState.COMPLETE, StopReason.REQUESTED)
-        assert numbers(running.recorder, done) == list(range(6, 106))
-        assert running.recorder.live(done).lost == 0
-        folder = running.recorder.folder_of(done)
+        assert numbers(running.readings, done) == list(range(6, 106))
+        assert running.readings.live(done).lost == 0
+        folder = running.readings.folder_of(done)
         assert running.sources.presets == frozenset()
     with Reader(folder / "data") as bag:
         assert bag.message_count == 100
@@ -36,81 +36,81 @@ async def test_what_was_sent_is_there_and_rosbags_opens_the_folder(tmp_path: Pat
 
 async def test_requests_repeated_change_nothing_even_after_a_restart(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
-        first = await running.recorder.start("1", StartOptions())
-        again = await running.recorder.start("1", StartOptions())
+        first = await running.operations.start("1", StartOptions())
+        again = await running.operations.start("1", StartOptions())
         assert first.recording
         assert again.recording
         assert again.recording.id == first.recording.id
         with pytest.raises(PreconditionError, match="stop it first"):
-            await running.recorder.start("2", StartOptions())
+            await running.operations.start("2", StartOptions())
         with pytest.raises(InvalidRequestError, match="was used for StartRecording"):
-            await running.recorder.stop("1", "")
-        await running.recorder.stop("3", "")
-        assert (await running.recorder.stop("3", "")).message.endswith("has ended")
+            await running.operations.stop("1", "")
+        await running.operations.stop("3", "")
+        assert (await running.operations.stop("3", "")).message.endswith("has ended")
         with pytest.raises(NotFoundError, match="no recording runs"):
-            await running.recorder.stop("4", "")
+            await running.operations.stop("4", "")
     async with running_recorder(tmp_path) as running:
-        after = await running.recorder.start("1", StartOptions())
+        after = await running.operations.start("1", StartOptions())
         assert after.recording
         assert after.recording.id == first.recording.id
-        assert running.recorder.phase.state is State.IDLE
+        assert running.readings.phase.state is State.IDLE
 
 
 async def test_limits_end_a_recording(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
-        await running.recorder.start("1", StartOptions(max_duration_s=1))
-        await running.until(lambda: running.recorder.running is None)
-        assert running.recorder.newest
-        assert running.recorder.newest.stop_reason is StopReason.LIMIT
+        await running.operations.start("1", StartOptions(max_duration_s=1))
+        await running.until(lambda: running.readings.running is None)
+        assert running.readings.newest
+        assert running.readings.newest.stop_reason is StopReason.LIMIT
 
 
 async def test_a_long_recording_is_cut_into_segments_without_a_loss(tmp_path: Path) -> None:
     segments = {"max_bytes": 1024 * 1024, "max_s": 60}
     async with running_recorder(tmp_path, segments=segments) as running:
-        await running.recorder.start("1", StartOptions())
+        await running.operations.start("1", StartOptions())
         latched = Source(running.queue, channel("/tf_static", latched=True))
         latched.send()
         source = Source(running.queue)
         source.send(60, size=100_000)
-        done = (await running.recorder.stop("2", "")).recording
+        done = (await running.operations.stop("2", "")).recording
         assert done
         assert len(done.segments) >= 5
-        assert numbers(running.recorder, done) == list(range(1, 61))
+        assert numbers(running.readings, done) == list(range(1, 61))
         # At the head of each segment.
-        assert numbers(running.recorder, done, "/tf_static") == [1] * len(done.segments)
+        assert numbers(running.readings, done, "/tf_static") == [1] * len(done.segments)
 
 
 async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
-        await running.recorder.start("1", StartOptions())
+        await running.operations.start("1", StartOptions())
         source = Source(running.queue)
         for hours in (0, 1, -1):
             source.send(10, step_ns=hours * 3_600_000_000_000)
-        done = (await running.recorder.stop("2", "")).recording
+        done = (await running.operations.stop("2", "")).recording
         assert done
         assert [segment.messages for segment in done.segments] == [10, 10, 10]
-        assert running.recorder.live(done).duration_ms < 60_000
+        assert running.readings.live(done).duration_ms < 60_000
 
 
 async def test_overlapping_snapshots_share_what_is_on_the_disk(tmp_path: Path) -> None:
     async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
         source = Source(running.queue)
-        await running.until(lambda: running.recorder.ring_part_bytes > 0)
+        await running.until(lambda: running.readings.writes)
         source.send(50)
-        first = await running.recorder.snapshot("1", SnapshotOptions(pre_s=10, post_s=1), "someone")
-        second = await running.recorder.snapshot("2", SnapshotOptions(pre_s=10, post_s=1), "another")
+        first = await running.operations.snapshot("1", SnapshotOptions(pre_s=10, post_s=1), "someone")
+        second = await running.operations.snapshot("2", SnapshotOptions(pre_s=10, post_s=1), "another")
         assert first.recording
         assert second.recording
         asked_s = time.monotonic()
         source.send(50)
-        await running.until(lambda: not running.recorder.snapshots_pending)
+        await running.until(lambda: not running.readings.snapshots_pending)
         assert time.monotonic() - asked_s < 5
-        made = [running.recorder.get(each.recording.id) for each in (first, second) if each.recording]
+        made = [running.readings.get(each.recording.id) for each in (first, second) if each.recording]
         for each in made:
             assert (each.state, each.kind) == (RecordingState.COMPLETE, Kind.SNAPSHOT)
-            assert numbers(running.recorder, each) == list(range(1, 101))
+            assert numbers(running.readings, each) == list(range(1, 101))
         inodes = [
-            {(running.recorder.folder_of(each) / segment.name).stat().st_ino for segment in each.segments}
+            {(running.readings.folder_of(each) / segment.name).stat().st_ino for segment in each.segments}
             for each in made
         ]
         assert inodes[0] & inodes[1]
@@ -121,30 +121,30 @@ async def test_a_fault_makes_an_incident_and_its_repetition_none(tmp_path: Path)
     incidents = {"pre_s": 10, "post_s": 0, "cooldown_s": 60}
     async with running_recorder(tmp_path, ring={"preset": "all"}, incidents=incidents) as running:
         Source(running.queue).send(10)
-        assert await running.recorder.report_fault("vision.slow", 2, "slow") == ""
-        made = await running.recorder.report_fault("vision.silent", 3, "nothing comes")
+        assert await running.operations.report_fault("vision.slow", 2, "slow") == ""
+        made = await running.operations.report_fault("vision.silent", 3, "nothing comes")
         assert made
-        assert await running.recorder.report_fault("vision.silent", 3, "nothing comes") == made
-        await running.until(lambda: not running.recorder.snapshots_pending)
-        incident = running.recorder.get(made)
+        assert await running.operations.report_fault("vision.silent", 3, "nothing comes") == made
+        await running.until(lambda: not running.readings.snapshots_pending)
+        incident = running.readings.get(made)
         assert incident.kind is Kind.INCIDENT
         assert incident.trigger == "vision.silent: nothing comes"
-        assert len(running.recorder.recordings) == 1
+        assert len(running.readings.recordings) == 1
 
 
 async def test_deleting_needs_a_reason_that_is_good_enough(tmp_path: Path) -> None:
     async with running_recorder(tmp_path) as running:
-        await running.recorder.start("1", StartOptions())
-        done = (await running.recorder.stop("2", "")).recording
+        await running.operations.start("1", StartOptions())
+        done = (await running.operations.stop("2", "")).recording
         assert done
         with pytest.raises(PreconditionError, match="has changed"):
-            await running.recorder.delete("3", done.id, b"x" * 32, force=False)
-        await running.recorder.pin("4", done.id, pinned=True)
+            await running.operations.delete("3", done.id, b"x" * 32, force=False)
+        await running.operations.pin("4", done.id, pinned=True)
         with pytest.raises(PreconditionError, match="pinned"):
-            await running.recorder.delete("5", done.id, done.sha256, force=False)
-        await running.recorder.delete("6", done.id, done.sha256, force=True)
-        assert running.recorder.recordings == []
-        assert not running.recorder.folder_of(done).exists()
-        assert (await running.recorder.delete("6", done.id, done.sha256, force=True)).message
+            await running.operations.delete("5", done.id, done.sha256, force=False)
+        await running.operations.delete("6", done.id, done.sha256, force=True)
+        assert running.readings.recordings == []
+        assert not running.readings.folder_of(done).exists()
+        assert (await running.operations.delete("6", done.id, done.sha256, force=True)).message
         with pytest.raises(NotFoundError):
-            await running.recorder.delete("7", done.id, b"", force=False)
+            await running.operations.delete("7", done.id, b"", force=False)

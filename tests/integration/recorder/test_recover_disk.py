@@ -20,12 +20,12 @@ from tests.support.recorder_in_process import Source, running_recorder
 async def cut_off(root: Path) -> Path:
     """A folder of recordings as a power cut leaves it; returns the folder of its one recording."""
     async with running_recorder(root) as running:
-        await running.recorder.start("1", StartOptions())
+        await running.operations.start("1", StartOptions())
         Source(running.queue).send(50)
         await running.written(50)
-        open_manifest = running.recorder.running
+        open_manifest = running.readings.running
         assert open_manifest
-        folder = running.recorder.folder_of(open_manifest)
+        folder = running.readings.folder_of(open_manifest)
         part = next((folder / "data").glob("*.part"))
         content = part.read_bytes()
     for file in (folder / "data").iterdir():

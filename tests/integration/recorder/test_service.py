@@ -47,7 +47,7 @@ async def served(root: Path, **values: Any) -> AsyncIterator[Served]:
     async with running_recorder(root / "root", **values) as running:
         server = rpc.new_server()
         bundles = RunBundles(running.settings.run_bundles)
-        RecorderServicer(running.recorder, bundles, running.settings).register(server)
+        RecorderServicer(running.operations, running.readings, bundles, running.settings).register(server)
         socket = root / "recorder.sock"
         bind.bind_unix(server, socket)
         await server.start()

@@ -117,6 +117,20 @@ def test_a_preview_that_falls_silent_is_left(
         recording.wait_for(lambda: recording.tap.failures >= 2, "two failures")
 
 
+def test_what_the_preview_says_about_missing_frames_is_a_problem_until_they_come(tmp_path: Path) -> None:
+    path = tmp_path / "tap.sock"
+    faulted = encode_object(Kind.INFO, {"state": "faulted", "error": "no camera at /dev/video0"})
+    with (
+        server(path, lambda: faulted, lambda: faulted + INFO + key_frame(), keeps_open=True),
+        TapRecording(path) as recording,
+    ):
+        recording.wait_for(lambda: recording.tap.problem == "no camera at /dev/video0", "the preview's words")
+        assert recording.tap.last_error == ""
+        with TapRecording(path) as later:
+            later.wait_for_frames(0)
+            assert later.tap.problem == ""
+
+
 async def test_cancelled_while_it_connects_it_leaves_nothing_behind(tmp_path: Path) -> None:
     running = asyncio.create_task(client.Tap(tmp_path / "none.sock", lambda _items: None).run())
     await asyncio.sleep(0)

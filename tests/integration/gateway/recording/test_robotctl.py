@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from console.client import GatewayClient
+from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.recorder_double import RecorderDouble
 from tests.support.recording_gateway import RecordingRobot, recording_robot
 from tests.support.robotctl import only_line, robotctl, robotctl_process
@@ -83,6 +84,28 @@ async def test_the_installed_program_and_the_status(tmp_path: Path) -> None:
         assert json.loads(listed.stdout)["status"]["state"] == "recording"
         status = await asyncio.to_thread(robotctl, "--target", target, "status")
         assert "RECORDING  lap, 1 min 01 s, 0 B, without video, room for 1 h 00 min" in status.stdout
+
+
+async def test_the_robot_is_asked_once(tmp_path: Path) -> None:
+    double = RecorderDouble()
+    double.add({"a": b"1"}, id="one")
+    async with recording_robot(tmp_path, double) as robot:
+        await printed(robot, "list")
+        assert double.looks == ["ListRecordings"]
+        await printed(robot, "export", "one", "--to", str(tmp_path / "to"))
+        assert double.looks == ["ListRecordings", "GetRecording"]
+
+
+def test_a_gateway_from_before_recording_is_named_with_what_to_type() -> None:
+    with serving(GatewayDouble()) as port:
+        for words in (["list"], ["start"], ["stop"], ["export", "one"], ["delete", "one"]):
+            ran = robotctl("--target", f"127.0.0.1:{port}", "record", *words)
+            assert (ran.returncode, ran.stdout) == (1, "")
+            assert only_line(ran.stderr) == (
+                f"error: the gateway at 127.0.0.1:{port} is too old to record; nothing was changed. "
+                "Update it on the robot (docs/deploy.md); to see its version, type: "
+                f"robotctl --target 127.0.0.1:{port} info"
+            )
 
 
 async def test_a_robot_that_is_not_set_up(tmp_path: Path) -> None:

@@ -111,7 +111,15 @@ def test_a_bad_block_in_the_middle_is_a_gap(tmp_path: Path, unfinished: bytes, c
         assert [each.name for each in make_reader(file).iter_metadata()] == ["clock", "gap"]
 
 
-@pytest.mark.parametrize("harm", [lambda head: bytes(len(head)), lambda head: b"x" + head[1:]])
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda head: bytes(len(head)),
+        lambda head: b"x" + head[1:],
+        lambda head: head.replace(b"robot-gateway", b"robot-gat\x9fway"),
+    ],
+    ids=["zeros", "magic", "no text"],
+)
 def test_a_damaged_beginning_costs_no_whole_chunk_behind_it(
     tmp_path: Path, unfinished: bytes, chunk_ends: list[int], harm: Callable[[bytes], bytes]
 ) -> None:

@@ -30,7 +30,6 @@ def test_a_finished_segment_has_what_was_written(tmp_path: Path) -> None:
         writer.write(sample)
     writer.loss(Loss(STRING, GapCause.MIDDLEWARE, 1, 2, 3))
     writer.flush()
-    assert (writer.messages, writer.began_ns) == (5, samples[0].log_time_ns)
     summary = writer.finish()
     assert summary.path == tmp_path / "000000.mcap"
     assert list(tmp_path.iterdir()) == [summary.path]

@@ -189,6 +189,14 @@ def test_a_long_text_is_cut() -> None:
     assert len(note.values["error"]) == 1000
 
 
+def test_half_of_a_surrogate_pair_can_be_written() -> None:
+    """JSON has it as an escape (RFC 8259 8.2); UTF-8 has not, and so no file would take it."""
+    run = Run(informed=False)
+    (note,) = run.info({"state": "faulted", "\ud800": "\ud800"})
+    assert isinstance(note, Note)
+    assert (note.values["?"], note.values["state"]) == ("?", "faulted")
+
+
 @given(st.sampled_from(Kind), st.binary(max_size=300), st.booleans(), st.integers(0, (1 << 64) - 1))
 def test_any_record_is_taken_or_refused(
     kind: Kind, payload: bytes, key: bool, at_ns: int

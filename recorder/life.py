@@ -1,0 +1,85 @@
+"""The lifecycle at work: its phase, what is wrong, when the disk is tried again."""
+
+import asyncio
+import logging
+from typing import Final
+
+from common.backoff import Backoff
+from common.broadcast import Broadcast
+from recorder.lifecycle import Event, Phase, State, step
+
+_log = logging.getLogger(__name__)
+
+_FIRST_RETRY_S: Final = 1.0
+_LONGEST_RETRY_S: Final = 30.0
+
+
+class Life:
+    """Keeps the phase; used on one event loop.
+
+    Attributes:
+        changes: notified of every change.
+        phase: of the lifecycle.
+        error: why nothing can be recorded, or why a recording was stopped; empty when all is well.
+        stopped_by_disk: whether a full disk has ended a recording, and none has begun since.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._backoff = Backoff(_FIRST_RETRY_S, _LONGEST_RETRY_S)
+        self._retry_at_s = 0.0
+        self.changes = Broadcast()
+        self.phase = Phase(State.RECOVERING, self._loop.time())
+        self.error = ""
+        self.stopped_by_disk = False
+
+    @property
+    def state(self) -> State:
+        """The phase's state."""
+        return self.phase.state
+
+    @property
+    def retry_due(self) -> bool:
+        """Whether what has failed may be tried again."""
+        return self._loop.time() >= self._retry_at_s
+
+    def move(self, event: Event) -> None:
+        """Enters the phase that follows on an event.
+
+        Raises:
+            IllegalEventError: the state has no transition for it.
+        """
+        before = self.phase
+        self.phase = step(before, event, self._loop.time())
+        if self.phase.state is not before.state:
+            _log.info("%s -> %s (%s)", before.state.value, self.phase.state.value, event.value)
+        self.changes.notify_all()
+
+    def fault(self, text: str) -> None:
+        """Enters FAULTED, with what is wrong for people."""
+        self.error = text
+        self.try_later(text)
+        self.move(Event.FAILURE)
+
+    def try_later(self, text: str) -> None:
+        """Logs what has failed, and lets it be tried again after the next pause of the backoff."""
+        _log.error("%s", text)
+        self._retry_at_s = self._loop.time() + self._backoff.next_s()
+
+    def close_well(self) -> None:
+        """Enters IDLE after a recording that the disk has taken to its end."""
+        self.move(Event.CLOSED)
+        self._backoff.reset()
+        self.error = ""
+
+    def clear(self) -> None:
+        """Enters IDLE after a fault."""
+        self.move(Event.CLEARED)
+        self.error = ""
+        self.stopped_by_disk = False
+
+    def stopped_for_room(self) -> None:
+        """Takes note that a recording was stopped in order, before the disk was full."""
+        self.stopped_by_disk = True
+        self.error = "recording was stopped: the disk has no room, and nothing on it may be deleted"
+        _log.error("%s", self.error)

@@ -1,0 +1,108 @@
+"""The parts that a recorder consists of, assembled."""
+
+from dataclasses import dataclass
+
+from recorder.config import RecorderSettings
+from recorder.life import Life
+from recorder.manual_recorder import ManualRecorder
+from recorder.outputs import Outputs, Sources
+from recorder.reports import Reports
+from recorder.ring_recorder import RingRecorder
+from recorder.store.catalogue import Catalogue
+from recorder.store.housekeeping import Housekeeping
+from recorder.store.ring import Ring
+from recorder.store.room import Reserve
+from recorder.store.state_file import StateFile
+from recorder.writing.queue import SampleQueue
+from recorder.writing.writer import Latched, Writer
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What the recorder, its operations and its readings share. `ring` is None if none is configured."""
+
+    settings: RecorderSettings
+    boot_id: str
+    run_id: str
+    queue: SampleQueue
+    sources: Sources
+    life: Life
+    catalogue: Catalogue
+    state_file: StateFile
+    reserve: Reserve
+    housekeeping: Housekeeping
+    reports: Reports
+    writer: Writer
+    outputs: Outputs
+    manual: ManualRecorder
+    segments: Ring | None
+    ring: RingRecorder | None
+
+
+def parts_of(
+    settings: RecorderSettings,
+    queue: SampleQueue,
+    sources: Sources,
+    latched: Latched,
+    *,
+    boot_id: str,
+    run_id: str,
+) -> Parts:
+    """Returns the parts, for the event loop that runs; nothing is read or started yet.
+
+    Args:
+        settings: of the program.
+        queue: what `sources` fill.
+        sources: what takes messages.
+        latched: what the head of each segment repeats.
+        boot_id: of the computer; empty if unknown.
+        run_id: random for every process.
+    """
+    life, outputs, reports = Life(), Outputs(sources), Reports()
+    catalogue = Catalogue(settings.root)
+    state_file = StateFile(settings.root)
+    reserve = Reserve(settings.root)
+    writer = Writer(queue, latched, reports.failed)
+    segments = Ring(settings.ring_directory, settings.ring.seconds) if settings.ring.preset else None
+    housekeeping = Housekeeping(settings, catalogue, segments)
+    manual = ManualRecorder(
+        settings,
+        life,
+        catalogue,
+        outputs,
+        writer,
+        sources=sources,
+        state_file=state_file,
+        reserve=reserve,
+        boot_id=boot_id,
+    )
+    ring: RingRecorder | None = None
+    if segments:
+        ring = RingRecorder(
+            settings,
+            segments,
+            catalogue,
+            outputs,
+            writer,
+            housekeeping=housekeeping,
+            boot_id=boot_id,
+            run_id=run_id,
+        )
+    return Parts(
+        settings=settings,
+        boot_id=boot_id,
+        run_id=run_id,
+        queue=queue,
+        sources=sources,
+        life=life,
+        catalogue=catalogue,
+        state_file=state_file,
+        reserve=reserve,
+        housekeeping=housekeeping,
+        reports=reports,
+        writer=writer,
+        outputs=outputs,
+        manual=manual,
+        segments=segments,
+        ring=ring,
+    )
