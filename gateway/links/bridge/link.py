@@ -2,10 +2,15 @@
 
 import time
 from collections.abc import Callable
+from typing import Final
 
 from gateway.links.bridge.wire import BridgeClient
 from gateway.links.watch import ServiceWatch, WatchConnector
 from gateway.status.cloud import BridgeReport, CloudView
+
+
+_SILENCE_S: Final = 2.4
+"""The bridge reports at least every second; operators see within 2.5 s that it does not."""
 
 
 class BridgeLink(ServiceWatch[BridgeClient, BridgeReport]):
@@ -26,7 +31,7 @@ class BridgeLink(ServiceWatch[BridgeClient, BridgeReport]):
         connector: WatchConnector[BridgeClient],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        super().__init__(name, connector)
+        super().__init__(name, connector, silence_s=_SILENCE_S)
         self._clock = clock
         self.view = CloudView("not connected yet", clock())
 
