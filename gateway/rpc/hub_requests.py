@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from typing import Final, NoReturn
 
-from google.protobuf.message import Message
+from google.protobuf.message import DecodeError, Message
 
 from common import request_id
 from common.backoff import Backoff
@@ -169,7 +169,10 @@ class HubRequests:
             raise PreconditionError("this robot is not set up for recording", Reason.RECORDING_NOT_CONFIGURED)
         method = _METHODS[HubAction.SNAPSHOT]
         data = await self._recorder.call(method, message.SerializeToString(), _who(request), left_s)
-        response = TriggerSnapshotResponse.FromString(data)
+        try:
+            response = TriggerSnapshotResponse.FromString(data)
+        except DecodeError:
+            raise DefectError("the recorder's answer can't be read; see its log") from None
         return Answer(Outcome.DONE, response.message, response.recording.id)
 
 

@@ -46,6 +46,7 @@ class Ground:
         self.actions: list[ControlAction] = []
         self.error: Exception | None = None
         self.deaf: Exception | None = None
+        self.junk = False
         this: Any = self
         self.requests = HubRequests(
             link=this,
@@ -73,6 +74,8 @@ class Ground:
             raise self.error
         assert method == "TriggerSnapshot"
         self.snapshots.append((TriggerSnapshotRequest.FromString(request), caller, remaining_s))
+        if self.junk:
+            return b"\xff"
         response = TriggerSnapshotResponse(message="it is being made")
         response.recording.id = "made"
         return response.SerializeToString()
@@ -166,6 +169,18 @@ async def test_what_the_rules_of_an_operators_request_forbid_is_refused() -> Non
         assert {answer.outcome for _, answer in it.answers} == {Outcome.REFUSED}
         assert not it.snapshots
         assert not it.uploaded
+
+
+async def test_an_answer_of_the_recorder_that_is_none_is_a_failure() -> None:
+    async with running(*HubAction) as it:
+        it.junk = True
+        it.reports(SNAPSHOT)
+        await turns()
+        assert [answer.outcome for _, answer in it.answers] == [Outcome.FAILED]
+        it.junk = False
+        it.reports(replace(SNAPSHOT, request_id="t"))
+        await turns()
+        assert it.answers[-1][1].outcome is Outcome.DONE
 
 
 async def test_a_robot_without_a_recorder_makes_no_snapshot() -> None:
