@@ -148,9 +148,12 @@ class GatewayClient:
     recording_thumbnail = _blocking(AsyncGatewayClient.recording_thumbnail)
     pin_recording = _blocking(AsyncGatewayClient.pin_recording)
     delete_recording = _blocking(AsyncGatewayClient.delete_recording)
+    upload_recording = _blocking(AsyncGatewayClient.upload_recording)
+    cancel_upload = _blocking(AsyncGatewayClient.cancel_upload)
     export_recording = _blocking(AsyncGatewayClient.export_recording)
     recordings = _iterating(AsyncGatewayClient.recordings)
     recording_pages = _iterating(AsyncGatewayClient.recording_pages)
+    upload_progress = _iterating(AsyncGatewayClient.upload_progress)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 

@@ -15,6 +15,7 @@ from console.client.results import (
 from console.monitor.bar_items import BarItem
 from console.monitor.monitor_state import MonitorState
 from console.monitor.recordings import Asked, Change, ExportState, ExportView, RecordingsView
+from console.presentation.cloud import copy_text
 from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.preview_switch import Note
 from console.presentation.recording import is_written, marks, recorder_mark, recording_state, remarks
@@ -324,7 +325,7 @@ def _item(
         recording=each,
         title=_title(each),
         facts=joined(wall_clock(each.started_unix_ms, form=_BEGAN), age(duration_ms), size(count)),
-        state=joined(recording_state(each), marks(each)),
+        state=joined(recording_state(each), copy_text(each.copy, each.size), marks(each)),
         tip=f"{each.id}, {wall_clock(each.started_unix_ms)}. {joined(recording_state(each), remarks(each))}",
         style=_STATE_STYLES.get(each.state, SeverityStyle.QUIET),
         picture=view.pictures.get(each.id) if each.video_frames or is_written(each) else b"",

@@ -3,7 +3,6 @@
 from console.client.exporting import ExportedRecording
 from console.client.results import (
     Recording,
-    RecordingCopyState,
     RecordingKind,
     RecordingState,
     RecordingStatus,
@@ -72,15 +71,14 @@ def is_written(recording: Recording) -> bool:
 
 
 def remarks(recording: Recording) -> str:
-    """Returns what is remarkable about a recording: an incident, pinned, copied, incomplete."""
+    """Returns what is remarkable about a recording: an incident, pinned, incomplete."""
     return joined("" if recording.kind is RecordingKind.MANUAL else recording.kind.value, marks(recording))
 
 
 def marks(recording: Recording) -> str:
-    """Returns what has become of a recording: pinned, copied, incomplete, and why it was made."""
+    """Returns what has become of a recording: pinned, incomplete, and why it was made."""
     return joined(
         "pinned" if recording.pinned else "",
-        "" if recording.copy.state is RecordingCopyState.UNKNOWN else f"copy {recording.copy.state.value}",
         plural(recording.gap_count, "gap") if recording.gap_count else "",
         plural(recording.messages_lost, "message") + " lost" if recording.messages_lost else "",
         recording.trigger,

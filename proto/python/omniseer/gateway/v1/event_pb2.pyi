@@ -6,6 +6,7 @@ isort:skip_file
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from omniseer.gateway.v1 import cloud_pb2 as _cloud_pb2
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
@@ -158,6 +159,8 @@ class Event(_message.Message):
     CONTROL_ACTION_FIELD_NUMBER: _builtins.int
     ROBOT_MODE_CHANGED_FIELD_NUMBER: _builtins.int
     RECORDING_STATE_CHANGED_FIELD_NUMBER: _builtins.int
+    CLOUD_STATE_CHANGED_FIELD_NUMBER: _builtins.int
+    RECORDING_COPY_CHANGED_FIELD_NUMBER: _builtins.int
     run_id: _builtins.str
     """As in EventPosition."""
     sequence: _builtins.int
@@ -208,6 +211,14 @@ class Event(_message.Message):
     def recording_state_changed(self) -> Global___RecordingStateChanged:
         """A recording began or ended, a snapshot is complete, or messages were lost."""
 
+    @_builtins.property
+    def cloud_state_changed(self) -> Global___CloudStateChanged:
+        """The connection to the fleet's hub settled in another state."""
+
+    @_builtins.property
+    def recording_copy_changed(self) -> Global___RecordingCopyChanged:
+        """A recording has been copied to the fleet's store, or copying it has failed."""
+
     def __init__(
         self,
         *,
@@ -227,12 +238,14 @@ class Event(_message.Message):
         control_action: Global___ControlAction | None = ...,
         robot_mode_changed: Global___RobotModeChanged | None = ...,
         recording_state_changed: Global___RecordingStateChanged | None = ...,
+        cloud_state_changed: Global___CloudStateChanged | None = ...,
+        recording_copy_changed: Global___RecordingCopyChanged | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "cloud_state_changed", b"cloud_state_changed", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_copy_changed", b"recording_copy_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "component", b"component", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "message", b"message", "monotonic_ns", b"monotonic_ns", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed", "run_id", b"run_id", "sequence", b"sequence", "severity", b"severity", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["client_joined", b"client_joined", "client_left", b"client_left", "cloud_state_changed", b"cloud_state_changed", "component", b"component", "control_action", b"control_action", "encoder_fallback", b"encoder_fallback", "fault_cleared", b"fault_cleared", "fault_raised", b"fault_raised", "message", b"message", "monotonic_ns", b"monotonic_ns", "payload", b"payload", "preview_state_changed", b"preview_state_changed", "recording_copy_changed", b"recording_copy_changed", "recording_state_changed", b"recording_state_changed", "robot_mode_changed", b"robot_mode_changed", "run_id", b"run_id", "sequence", b"sequence", "severity", b"severity", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_payload: _TypeAlias = _typing.Literal["fault_raised", "fault_cleared", "preview_state_changed", "encoder_fallback", "client_joined", "client_left", "control_action", "robot_mode_changed", "recording_state_changed"]  # noqa: Y015
+    _WhichOneofReturnType_payload: _TypeAlias = _typing.Literal["fault_raised", "fault_cleared", "preview_state_changed", "encoder_fallback", "client_joined", "client_left", "control_action", "robot_mode_changed", "recording_state_changed", "cloud_state_changed", "recording_copy_changed"]  # noqa: Y015
     _WhichOneofArgType_payload: _TypeAlias = _typing.Literal["payload", b"payload"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_payload) -> _WhichOneofReturnType_payload | None: ...
 
@@ -547,3 +560,63 @@ class RecordingStateChanged(_message.Message):
     def WhichOneof(self, oneof_group: _WhichOneofArgType__messages_lost) -> _WhichOneofReturnType__messages_lost | None: ...
 
 Global___RecordingStateChanged: _TypeAlias = RecordingStateChanged  # noqa: Y015
+
+@_typing.final
+class CloudStateChanged(_message.Message):
+    """The connection to the fleet's hub settled in another state: it has lasted for 5 s."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    STATE_FIELD_NUMBER: _builtins.int
+    LAST_ERROR_FIELD_NUMBER: _builtins.int
+    state: _cloud_pb2.CloudState.ValueType
+    """State."""
+    last_error: _builtins.str
+    """As CloudStatus.last_error."""
+    def __init__(
+        self,
+        *,
+        state: _cloud_pb2.CloudState.ValueType = ...,
+        last_error: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["last_error", b"last_error", "state", b"state"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___CloudStateChanged: _TypeAlias = CloudStateChanged  # noqa: Y015
+
+@_typing.final
+class RecordingCopyChanged(_message.Message):
+    """A recording has been copied to the fleet's store (RECORDING_COPY_STATE_VERIFIED), or copying it has failed
+    (RECORDING_COPY_STATE_FAILED; once until it succeeds).
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    RECORDING_ID_FIELD_NUMBER: _builtins.int
+    LABEL_FIELD_NUMBER: _builtins.int
+    COPY_FIELD_NUMBER: _builtins.int
+    recording_id: _builtins.str
+    """Which."""
+    label: _builtins.str
+    """Its label. Empty when none was given, or it is not known."""
+    @_builtins.property
+    def copy(self) -> _recording_pb2.RecordingCopy:
+        """The copy."""
+
+    def __init__(
+        self,
+        *,
+        recording_id: _builtins.str = ...,
+        label: _builtins.str = ...,
+        copy: _recording_pb2.RecordingCopy | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["copy", b"copy"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["copy", b"copy", "label", b"label", "recording_id", b"recording_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RecordingCopyChanged: _TypeAlias = RecordingCopyChanged  # noqa: Y015

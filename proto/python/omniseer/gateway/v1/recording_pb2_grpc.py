@@ -91,6 +91,16 @@ class RecordingServiceStub:
                 request_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingRequest.SerializeToString,
                 response_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingResponse.FromString,
                 _registered_method=True)
+        self.UploadRecording = channel.unary_unary(
+                '/omniseer.gateway.v1.RecordingService/UploadRecording',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingResponse.FromString,
+                _registered_method=True)
+        self.CancelUpload = channel.unary_unary(
+                '/omniseer.gateway.v1.RecordingService/CancelUpload',
+                request_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadRequest.SerializeToString,
+                response_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadResponse.FromString,
+                _registered_method=True)
 
 
 class RecordingServiceServicer:
@@ -198,6 +208,30 @@ class RecordingServiceServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def UploadRecording(self, request, context):
+        """Has a recording copied to the fleet's store, after those that wait. Returns when it is in the queue; Recording.copy
+        says how far it has come. Repeating it changes nothing, and tries a copy that has failed again at once.
+
+        FAILED_PRECONDITION: the robot is not set up for a fleet, or the recording has not ended.
+        UNAVAILABLE: the robot's bridge does not answer.
+        RESOURCE_EXHAUSTED: 1000 recordings wait.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def CancelUpload(self, request, context):
+        """Takes a recording from the queue of those to be copied, also while it is being copied. A copy that is verified
+        stays.
+
+        NOT_FOUND: also, it is not in the queue.
+        FAILED_PRECONDITION: the robot is not set up for a fleet.
+        UNAVAILABLE: the robot's bridge does not answer.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RecordingServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -245,6 +279,16 @@ def add_RecordingServiceServicer_to_server(servicer, server):
                     servicer.DeleteRecording,
                     request_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingRequest.FromString,
                     response_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingResponse.SerializeToString,
+            ),
+            'UploadRecording': grpc.unary_unary_rpc_method_handler(
+                    servicer.UploadRecording,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingResponse.SerializeToString,
+            ),
+            'CancelUpload': grpc.unary_unary_rpc_method_handler(
+                    servicer.CancelUpload,
+                    request_deserializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadRequest.FromString,
+                    response_serializer=omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -502,6 +546,60 @@ class RecordingService:
             '/omniseer.gateway.v1.RecordingService/DeleteRecording',
             omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingRequest.SerializeToString,
             omniseer_dot_gateway_dot_v1_dot_recording__pb2.DeleteRecordingResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def UploadRecording(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RecordingService/UploadRecording',
+            omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_recording__pb2.UploadRecordingResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def CancelUpload(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/omniseer.gateway.v1.RecordingService/CancelUpload',
+            omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadRequest.SerializeToString,
+            omniseer_dot_gateway_dot_v1_dot_recording__pb2.CancelUploadResponse.FromString,
             options,
             channel_credentials,
             insecure,

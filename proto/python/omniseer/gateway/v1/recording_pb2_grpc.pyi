@@ -98,6 +98,22 @@ class RecordingServiceStub:
     expected_sha256 says.
     PERMISSION_DENIED: force without the role of an administrator.
     """
+    UploadRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.UploadRecordingRequest, _recording_pb2.UploadRecordingResponse]
+    """Has a recording copied to the fleet's store, after those that wait. Returns when it is in the queue; Recording.copy
+    says how far it has come. Repeating it changes nothing, and tries a copy that has failed again at once.
+
+    FAILED_PRECONDITION: the robot is not set up for a fleet, or the recording has not ended.
+    UNAVAILABLE: the robot's bridge does not answer.
+    RESOURCE_EXHAUSTED: 1000 recordings wait.
+    """
+    CancelUpload: _grpc.UnaryUnaryMultiCallable[_recording_pb2.CancelUploadRequest, _recording_pb2.CancelUploadResponse]
+    """Takes a recording from the queue of those to be copied, also while it is being copied. A copy that is verified
+    stays.
+
+    NOT_FOUND: also, it is not in the queue.
+    FAILED_PRECONDITION: the robot is not set up for a fleet.
+    UNAVAILABLE: the robot's bridge does not answer.
+    """
 
 @_typing.type_check_only
 class RecordingServiceAsyncStub(RecordingServiceStub):
@@ -168,6 +184,22 @@ class RecordingServiceAsyncStub(RecordingServiceStub):
     FAILED_PRECONDITION: it is running, read-only, pinned or not copied yet (see force), or its content is not what
     expected_sha256 says.
     PERMISSION_DENIED: force without the role of an administrator.
+    """
+    UploadRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.UploadRecordingRequest, _recording_pb2.UploadRecordingResponse]  # type: ignore[assignment]
+    """Has a recording copied to the fleet's store, after those that wait. Returns when it is in the queue; Recording.copy
+    says how far it has come. Repeating it changes nothing, and tries a copy that has failed again at once.
+
+    FAILED_PRECONDITION: the robot is not set up for a fleet, or the recording has not ended.
+    UNAVAILABLE: the robot's bridge does not answer.
+    RESOURCE_EXHAUSTED: 1000 recordings wait.
+    """
+    CancelUpload: _aio.UnaryUnaryMultiCallable[_recording_pb2.CancelUploadRequest, _recording_pb2.CancelUploadResponse]  # type: ignore[assignment]
+    """Takes a recording from the queue of those to be copied, also while it is being copied. A copy that is verified
+    stays.
+
+    NOT_FOUND: also, it is not in the queue.
+    FAILED_PRECONDITION: the robot is not set up for a fleet.
+    UNAVAILABLE: the robot's bridge does not answer.
     """
 
 class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -290,6 +322,34 @@ class RecordingServiceServicer(metaclass=_abc_1.ABCMeta):
         FAILED_PRECONDITION: it is running, read-only, pinned or not copied yet (see force), or its content is not what
         expected_sha256 says.
         PERMISSION_DENIED: force without the role of an administrator.
+        """
+
+    @_abc_1.abstractmethod
+    def UploadRecording(
+        self,
+        request: _recording_pb2.UploadRecordingRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_recording_pb2.UploadRecordingResponse, _abc.Awaitable[_recording_pb2.UploadRecordingResponse]]:
+        """Has a recording copied to the fleet's store, after those that wait. Returns when it is in the queue; Recording.copy
+        says how far it has come. Repeating it changes nothing, and tries a copy that has failed again at once.
+
+        FAILED_PRECONDITION: the robot is not set up for a fleet, or the recording has not ended.
+        UNAVAILABLE: the robot's bridge does not answer.
+        RESOURCE_EXHAUSTED: 1000 recordings wait.
+        """
+
+    @_abc_1.abstractmethod
+    def CancelUpload(
+        self,
+        request: _recording_pb2.CancelUploadRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_recording_pb2.CancelUploadResponse, _abc.Awaitable[_recording_pb2.CancelUploadResponse]]:
+        """Takes a recording from the queue of those to be copied, also while it is being copied. A copy that is verified
+        stays.
+
+        NOT_FOUND: also, it is not in the queue.
+        FAILED_PRECONDITION: the robot is not set up for a fleet.
+        UNAVAILABLE: the robot's bridge does not answer.
         """
 
 def add_RecordingServiceServicer_to_server(servicer: RecordingServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

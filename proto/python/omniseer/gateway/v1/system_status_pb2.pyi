@@ -7,6 +7,7 @@ from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
+from omniseer.gateway.v1 import cloud_pb2 as _cloud_pb2
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
@@ -49,6 +50,7 @@ class SystemStatus(_message.Message):
     SOURCES_FIELD_NUMBER: _builtins.int
     GATEWAY_FIELD_NUMBER: _builtins.int
     RECORDING_FIELD_NUMBER: _builtins.int
+    CLOUD_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -104,6 +106,10 @@ class SystemStatus(_message.Message):
     def recording(self) -> _recording_pb2.RecordingStatus:
         """Recording. Unset where the robot is not set up for it."""
 
+    @_builtins.property
+    def cloud(self) -> _cloud_pb2.CloudStatus:
+        """The connection to the robot's fleet. Unset where the robot is not set up for one."""
+
     def __init__(
         self,
         *,
@@ -121,10 +127,11 @@ class SystemStatus(_message.Message):
         sources: _abc.Iterable[_source_pb2.SourceStatus] | None = ...,
         gateway: _gateway_info_pb2.GatewayFacts | None = ...,
         recording: _recording_pb2.RecordingStatus | None = ...,
+        cloud: _cloud_pb2.CloudStatus | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

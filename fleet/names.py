@@ -1,0 +1,52 @@
+"""Names on the wire: subjects, streams and buckets of a fleet's account (docs/decisions/0011)."""
+
+import re
+from typing import Final
+
+ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
+"""A robot's name, and a fleet's: as a DNS label (RFC 1123 2.1), so that it is one token of a subject and of a key."""
+
+EVENTS: Final = "fleet_events"
+"""Stream of EventBatch. One message per subject; a second one is refused."""
+COMMANDS: Final = "fleet_commands"
+"""Stream of Command. Each robot has a durable consumer of its own name."""
+RESULTS: Final = "fleet_results"
+"""Stream of CommandResult."""
+STATES: Final = "fleet_state"
+"""Key-value bucket of RobotState, by robot."""
+RECORDINGS: Final = "fleet_recordings"
+"""Key-value bucket of StoredRecording, by robot and recording."""
+ROBOTS: Final = "fleet_robots"
+"""Key-value bucket of who is enrolled: written by the hub's administration, read by the console."""
+RECEIVERS: Final = "receivers"
+"""Queue group of the receivers: each request is answered by one of them."""
+
+EVENT_SUBJECTS: Final = "fleet.*.ev.>"
+COMMAND_SUBJECTS: Final = "fleet.*.cmd.*"
+RESULT_SUBJECTS: Final = "fleet.*.res.*"
+UPLOAD_SUBJECTS: Final = "fleet.*.up.*"
+
+
+def event_subject(robot: str, run_id: str, first_sequence: int) -> str:
+    """Returns the subject of a batch of events."""
+    return f"fleet.{robot}.ev.{run_id}.{first_sequence}"
+
+
+def command_subject(robot: str, command_id: str) -> str:
+    """Returns the subject of a command."""
+    return f"fleet.{robot}.cmd.{command_id}"
+
+
+def result_subject(robot: str, command_id: str) -> str:
+    """Returns the subject of a command's result."""
+    return f"fleet.{robot}.res.{command_id}"
+
+
+def upload_subject(robot: str, request: str) -> str:
+    """Returns the subject of a request about an upload: "begin_file", for example."""
+    return f"fleet.{robot}.up.{request}"
+
+
+def inbox_prefix(robot: str) -> str:
+    """Returns the prefix of the inboxes that a robot may subscribe to, and answers to it may be sent to."""
+    return f"_INBOX_{robot}"
