@@ -27,7 +27,7 @@ class State(Enum):
     """State of a recording's copy."""
 
     LOCAL = "local"
-    """Only on the robot, and not in the queue."""
+    """Only on the robot: not in the queue, or taken from it; then no rule puts it back."""
     QUEUED = "queued"
     UPLOADING = "uploading"
     VERIFYING = "verifying"
@@ -57,16 +57,19 @@ class Event(Enum):
     RESUME = "resume"
     """The gates are open, or the pause after a failure has passed."""
     FAILURE = "failure"
+    """Of this recording; it alone is tried again later."""
+    CUT = "cut"
+    """The gateway, the hub or the store fails, and with it all of the queue."""
     RESTART = "restart"
     """The bridge was started again."""
     CHANGED = "changed"
     """The recording has other content than the one that was verified."""
     REMOVE = "remove"
-    """It was cancelled, or deleted on the robot."""
+    """It was cancelled."""
 
 
 _TABLE: Final = {
-    State.LOCAL: {Event.ENQUEUE: State.QUEUED},
+    State.LOCAL: {Event.ENQUEUE: State.QUEUED, Event.RESTART: State.LOCAL},
     State.QUEUED: {
         Event.ENQUEUE: State.QUEUED,
         Event.BEGIN: State.UPLOADING,
@@ -82,6 +85,7 @@ _TABLE: Final = {
         Event.GIVE_WAY: State.QUEUED,
         Event.PAUSE: State.PAUSED,
         Event.FAILURE: State.FAILED,
+        Event.CUT: State.FAILED,
         Event.RESTART: State.QUEUED,
         Event.REMOVE: State.LOCAL,
     },
@@ -91,6 +95,7 @@ _TABLE: Final = {
         Event.GIVE_WAY: State.QUEUED,
         Event.PAUSE: State.PAUSED,
         Event.FAILURE: State.FAILED,
+        Event.CUT: State.FAILED,
         Event.RESTART: State.QUEUED,
         Event.REMOVE: State.LOCAL,
     },
@@ -153,7 +158,7 @@ class Upload:
         state: Where it stands.
         reason: Why it rests or has failed, for people. Otherwise empty.
         bytes_done: Bytes that the store has.
-        failures: Failed attempts in succession.
+        failures: FAILURE events in succession.
         due_s: When a failed one is tried again; monotonic seconds, and so not kept over a restart.
     """
 
@@ -179,13 +184,25 @@ class UploadStore(Protocol):
     """Keeps the queue over restarts and power failures: one row for each recording."""
 
     async def uploads(self) -> list[Upload]:
-        """Returns all rows, with `due_s` 0."""
+        """Returns all rows, with `due_s` 0.
+
+        Raises:
+            OSError: The disk can't be read.
+        """
 
     async def put_upload(self, upload: Upload) -> None:
-        """Writes a row, in place of one of the same recording; returns when it is on the disk."""
+        """Writes a row, in place of one of the same recording; returns when it is on the disk.
+
+        Raises:
+            OSError: The disk can't be written.
+        """
 
     async def delete_upload(self, recording_id: str) -> None:
-        """Deletes a row, if it is there."""
+        """Deletes a row, if it is there.
+
+        Raises:
+            OSError: The disk can't be written.
+        """
 
 
 def step(upload: Upload, event: Event, now_s: float, reason: str = "") -> Upload:
@@ -195,7 +212,7 @@ def step(upload: Upload, event: Event, now_s: float, reason: str = "") -> Upload
         upload: Before it.
         event: What happens.
         now_s: Monotonic seconds.
-        reason: Why, for PAUSE and FAILURE.
+        reason: Why, for PAUSE, FAILURE and CUT.
 
     Raises:
         IllegalEventError: The state has no transition for this event.
@@ -208,7 +225,7 @@ def step(upload: Upload, event: Event, now_s: float, reason: str = "") -> Upload
         case Event.FAILURE:
             failures = upload.failures + 1
             changed = replace(changed, reason=reason, failures=failures, due_s=now_s + pause_s(failures))
-        case Event.PAUSE:
+        case Event.PAUSE | Event.CUT:
             changed = replace(changed, reason=reason)
         case Event.CONFIRMED:
             changed = replace(changed, reason="", bytes_done=upload.size, failures=0, due_s=0.0)
