@@ -47,15 +47,12 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
     async with _opened(settings) as (store, threads), connect(address) as hub:
         service = ReceiverService(party, store, hub, threads)
         metrics = ReceiverMetrics(lambda: service.bytes_read, lambda: hub.link.connected)
-        health = Health(SERVICE)
+        health = Health()
         server = rpc.new_server()
         health.register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()
-        tasks = (
-            asyncio.create_task(_report_health(hub, health), name="health"),
-            asyncio.create_task(_sweep_for_ever(settings, store, threads, metrics), name="sweep"),
-        )
+        tasks: tuple[asyncio.Task[None], ...] = ()
         port = settings.metrics.port
         page = nullcontext() if port is None else serving_metrics(metrics.text, settings.metrics.host, port)
         try:
@@ -64,6 +61,10 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
                     UPLOAD_SUBJECTS, RECEIVERS, _handler(service, metrics), at_once=AT_ONCE, busy=busy()
                 )
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
+                tasks = (
+                    asyncio.create_task(_report_health(hub, health), name="health"),
+                    asyncio.create_task(_sweep_for_ever(settings, store, threads, metrics), name="sweep"),
+                )
                 await _first_of(stop, tasks)
         finally:
             for task in tasks:
