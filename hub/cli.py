@@ -15,6 +15,7 @@ from common.errors import ExitCode, UserError
 from fleet.errors import HubError, HubReason
 from hub import administration
 from hub.directory import HubDirectory, Kind
+from hub.receiver.cli import receiver
 from hub.server_config import Node, Places
 from hub.streams import StreamLimits
 
@@ -164,6 +165,9 @@ def receiver_credentials(
     """Write the files of a receiver of recordings."""
     administration.receiver_files(HubDirectory(directory), name, out, days=days, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+app.command("receiver")(receiver)
 
 
 def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
