@@ -16,7 +16,7 @@ What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
 import asyncio
 import random
 from collections.abc import AsyncGenerator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -217,11 +217,10 @@ class Hub:
             HubError: it can't be read.
         """
         found: dict[str, Entry] = {}
-        async with asyncio.timeout(None) as deadline:
-            deadline.reschedule(asyncio.get_running_loop().time() + 6 * timeout_s)
-            start = Start.last_per_subject()
-            stream, subjects = f"KV_{bucket}", f"$KV.{bucket}.>"
-            async for delivery in consuming.present(self._open(), stream, subjects, start, timeout_s):
+        start = Start.last_per_subject()
+        present = consuming.present(self._open(), f"KV_{bucket}", f"$KV.{bucket}.>", start, timeout_s)
+        async with aclosing(present) as deliveries:
+            async for delivery in deliveries:
                 entry = _entry(bucket, delivery)
                 if not entry.deleted:
                     found[entry.key] = entry
@@ -229,8 +228,10 @@ class Hub:
 
     async def watch_bucket(self, bucket: str) -> AsyncGenerator[Entry, None]:
         """Yields the present entries of a bucket and then every change, over all lost connections."""
-        async for delivery in self.follow(f"KV_{bucket}", f"$KV.{bucket}.>", Start.last_per_subject()):
-            yield _entry(bucket, delivery)
+        start = Start.last_per_subject()
+        async with aclosing(self.follow(f"KV_{bucket}", f"$KV.{bucket}.>", start)) as deliveries:
+            async for delivery in deliveries:
+                yield _entry(bucket, delivery)
 
     async def follow(self, stream: str, subjects: str, start: Start) -> AsyncGenerator[Delivery, None]:
         """Yields the messages of a stream in order, each once, over all lost connections.
@@ -245,10 +246,11 @@ class Hub:
         while True:
             await self.connected()
             try:
-                async for delivery in consuming.follow(self._open(), stream, subjects, place):
-                    pause.reset()
-                    place = Start.after(delivery.sequence)
-                    yield delivery
+                async with aclosing(consuming.follow(self._open(), stream, subjects, place)) as deliveries:
+                    async for delivery in deliveries:
+                        pause.reset()
+                        place = Start.after(delivery.sequence)
+                        yield delivery
             except HubError:
                 await self._pause(pause)
 
@@ -259,9 +261,10 @@ class Hub:
             HubError: it can't be read.
         """
         start = Start.last()
-        async for delivery in consuming.present(self._open(), stream, subjects, start, timeout_s):
-            return delivery
-        return None
+        async with aclosing(
+            consuming.present(self._open(), stream, subjects, start, timeout_s)
+        ) as deliveries:
+            return await anext(deliveries, None)
 
     async def pull(self, stream: str, durable: str, batch: int = 16) -> AsyncGenerator[Delivery, None]:
         """Yields the messages of a durable consumer, over all lost connections. Each needs its `ack`."""
@@ -269,9 +272,10 @@ class Hub:
         while True:
             await self.connected()
             try:
-                async for delivery in consuming.pull(self._open(), stream, durable, batch):
-                    pause.reset()
-                    yield delivery
+                async with aclosing(consuming.pull(self._open(), stream, durable, batch)) as deliveries:
+                    async for delivery in deliveries:
+                        pause.reset()
+                        yield delivery
             except HubError:
                 await self._pause(pause)
 

@@ -33,7 +33,7 @@ _PINGS_WITHOUT_ANSWER: Final = 2
 _MAX_MESSAGE: Final = 4 * 1024 * 1024
 """Longest message that is read, in bytes; the hub's max_payload is 1 MiB."""
 _MAX_WAITING: Final = 8 * 1024 * 1024
-"""Bytes that may wait in one subscription."""
+"""Bytes that may wait in one subscription, or for one caller."""
 _MAX_WAITING_MESSAGES: Final = 4096
 _NO_RESPONDERS: Final = "503"
 
@@ -142,10 +142,13 @@ class Waiter:
     def __init__(self, subject: str) -> None:
         self.subject = subject
         self.replies: asyncio.Queue[Message | HubError] = asyncio.Queue()
+        self._bytes = 0
 
     def take(self, message: Message) -> None:
-        """Keeps a message until it is read; beyond the bound it is dropped."""
-        if self.replies.qsize() < _MAX_WAITING_MESSAGES:
+        """Keeps a message until it is read; beyond the bounds it is dropped."""
+        size = self._bytes + len(message.payload)
+        if self.replies.qsize() < _MAX_WAITING_MESSAGES and size <= _MAX_WAITING:
+            self._bytes = size
             self.replies.put_nowait(message)
 
     async def get(self, timeout_s: float) -> Message:
@@ -162,6 +165,7 @@ class Waiter:
             raise HubError(HubReason.TIMEOUT, text) from error
         if isinstance(reply, HubError):
             raise reply
+        self._bytes -= len(reply.payload)
         return reply
 
 
