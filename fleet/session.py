@@ -54,10 +54,16 @@ class Message:
 
 
 class _BoundedParser(Parser):
-    """Ends a connection whose server announces a message beyond any size that it may have."""
+    """Ends a connection whose server announces a message beyond any size, or says what can't be read.
+
+    At an error that it does not know, the library's loop ends, and the connection is never read again.
+    """
 
     async def parse(self, data: bytes = b"") -> None:
-        await super().parse(data)
+        try:
+            await super().parse(data)
+        except Exception as error:
+            raise nats_errors.ProtocolError from error
         if len(self.buf) > _MAX_MESSAGE:
             raise nats_errors.ProtocolError
 
@@ -109,6 +115,12 @@ class _Client(Client):
         self._transport = _Transport()  # type: ignore[no-untyped-call]  # the library's
         self.farewell = ""
         """What the server said before it closed the connection; the library keeps the last error only."""
+
+    async def _process_pong(self) -> None:
+        # A flush that timed out has left its cancelled future behind, and the library would complete it.
+        if self._pongs and self._pongs[0].done():
+            self._pongs[0] = asyncio.get_running_loop().create_future()
+        await super()._process_pong()
 
     async def _process_err(self, err_msg: str) -> None:
         if PERMISSIONS_ERR not in err_msg:

@@ -11,6 +11,7 @@ import pytest
 from fleet import names
 from fleet.connection import FleetAddress, Published, Request, Start, connect
 from fleet.errors import HubError, HubReason, UnreachableError
+from fleet.session import Message, Session
 from hub import streams
 from tests.support.free import free_tcp_port
 from tests.support.nats_servers import NatsServers, nats_servers
@@ -94,6 +95,29 @@ async def test_a_silent_server_is_found(servers: NatsServers) -> None:
             servers.thaw(0)
         await hub.connected(20)
         await hub.publish_once("fleet.r1.ev.run.1", b"")
+
+
+async def test_an_answer_that_comes_too_late_costs_no_connection(servers: NatsServers) -> None:
+    async with connect(FleetAddress(servers.urls)) as hub:
+        await hub.connected(10)
+        session = await Session.open(servers.urls[0], credentials=None, ca=None, inbox="_INBOX.x", name="")
+        try:
+            servers.freeze(0)
+            waiting = asyncio.ensure_future(session.subscribe("quiet", "", _ignore))
+            await asyncio.sleep(0)
+            done, _ = await asyncio.wait([waiting], timeout=6)
+            assert isinstance(waiting.exception(), UnreachableError), done
+            servers.thaw(0)
+            acknowledgement = await session.request("fleet.r1.ev.run.1", b"", 5)
+            assert b"fleet_events" in acknowledgement.payload
+            assert not session.lost.done()
+        finally:
+            servers.thaw(0)
+            await session.close()
+
+
+async def _ignore(_message: Message) -> None:
+    """Takes a message and does nothing."""
 
 
 async def test_a_bucket_is_read_and_watched(servers: NatsServers) -> None:
