@@ -9,7 +9,7 @@ from bench.rows import Row
 _MODULES = {
     "bench.fleet.failures": ("fleet.lost", "fleet.duplicates", "fleet.disordered", "fleet.gap_s"),
     "bench.fleet.rates": ("fleet.events_s", "fleet.batched_events_s"),
-    "bench.fleet.cost": ("fleet.robot_kib", "fleet.robot_cpu"),
+    "bench.fleet.cost": ("fleet.robot_kib", "fleet.state_cpu_us"),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 
