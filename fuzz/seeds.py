@@ -5,10 +5,10 @@ from typing import Any, Final
 from mcap.records import Channel, Message, Schema
 from rclpy.serialization import serialize_message
 
+from common.ca import new_ca
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
 from fuzz.robot import SOURCES, type_of
-from gateway.access.ca import new_ca
 from omniseer.gateway.v1 import (
     overlay_pb2,
     preview_pb2,

@@ -13,8 +13,10 @@ from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
 
+from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
+from common.metrics_endpoint import respond
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
 from console.capture_time import WRAP_TICKS
@@ -28,13 +30,11 @@ from fuzz.admission import admission
 from fuzz.recording import export_request, segment, video_tap
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
-from gateway.access.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.preview.wire import from_wire
 from gateway.links.watch import LinkLostError
-from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation

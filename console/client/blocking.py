@@ -154,6 +154,7 @@ class GatewayClient:
     recordings = _iterating(AsyncGatewayClient.recordings)
     recording_pages = _iterating(AsyncGatewayClient.recording_pages)
     upload_progress = _iterating(AsyncGatewayClient.upload_progress)
+    read_recording = _iterating(AsyncGatewayClient.read_recording)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 
