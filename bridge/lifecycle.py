@@ -1,7 +1,7 @@
 """Lifecycle of the robot's connection to its fleet: one table of transitions.
 
-Pure. The disk comes first: while the outbox can't be written, the state is FAULTED whatever the connection is; when
-it can be again, the connection is looked at anew.
+Pure. The disk comes first: while the outbox can't be written, the state is FAULTED whatever the connection
+is; when it can be again, the connection is looked at anew.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ class State(Enum):
     REFUSED = "refused"
     """The hub does not accept the robot's credential."""
     FAULTED = "faulted"
-    """The outbox can't be written, so that events stay at the gateway. The robot's state is sent all the same."""
+    """The outbox can't be written: events stay at the gateway. The robot's state is sent all the same."""
 
 
 class Event(Enum):

@@ -165,9 +165,9 @@ class Database:
     def delivered(self, batch: Batch, *, repeated: bool) -> None:
         """Deletes a batch that the hub has.
 
-        Where nothing is known of an earlier outbox, the gap for it may be refused as a repeat, because a batch
-        of that outbox begins with the same sequence. It is then sent once more from the next sequence on: if
-        all are refused, all have been delivered.
+        Where nothing is known of an earlier outbox, the gap for it may be refused as a repeat, because a
+        batch of that outbox begins with the same sequence. It is then sent once more from the next sequence
+        on: if all are refused, all have been delivered.
 
         Args:
             batch: of `next_batch`.
@@ -400,7 +400,16 @@ class Database:
 
     def _insert(self, db: sqlite3.Connection, item: Item) -> None:
         if isinstance(item, Event):
-            values: tuple[Any, ...] = (item.run_id, item.first, item.last, item.severity, item.payload, 0, 0, 0)
+            values: tuple[Any, ...] = (
+                item.run_id,
+                item.first,
+                item.last,
+                item.severity,
+                item.payload,
+                0,
+                0,
+                0,
+            )
         else:
             flags = (int(item.reason), int(item.earlier), item.probes)
             values = (item.run_id, item.first, item.last, item.worst, None, *flags)

@@ -1,4 +1,4 @@
-"""The outbox for the event loop: a thread of its own has the database, so that the loop never waits for it."""
+"""The outbox for the event loop, which never waits for the disk: a thread of its own has the database."""
 
 import asyncio
 import logging
@@ -23,6 +23,7 @@ class Outbox:
         changes: notified after each change of what it holds, and of `error`.
         error: why the newest call failed, for people; empty after one that succeeded.
         refusals: calls that failed.
+        results: of commands that were kept since the start.
     """
 
     def __init__(self, directory: Path, max_bytes: int) -> None:
@@ -32,6 +33,7 @@ class Outbox:
         self.changes = Broadcast()
         self.error = ""
         self.refusals = 0
+        self.results = 0
 
     @property
     def facts(self) -> Facts:
@@ -66,6 +68,8 @@ class Outbox:
     async def end_command(self, command_id: str, result: bytes) -> None:
         """Keeps a command's result until it is sent."""
         await self._call(lambda: self._database.end_command(command_id, result))
+        self.results += 1
+        self.changes.notify_all()
 
     async def unanswered_commands(self) -> list[str]:
         """Returns the commands without a result."""

@@ -1,7 +1,7 @@
 """Takes the gateway's events into the outbox, each once, over all failures of either.
 
-The gateway keeps the newest 1024 events, so nothing is kept here: what could not be written is asked for again, from
-the position that the disk has.
+The gateway keeps the newest 1024 events, so nothing is kept here: what could not be written is asked for
+again, from the position that the disk has.
 """
 
 import logging
@@ -75,7 +75,7 @@ class EventReader:
 
 
 async def _next_items(responses: Responses, feed: Feed, reason: DropReason) -> list[Item]:
-    """Waits for a response and returns its items, with those of all that have come meanwhile, up to a batch."""
+    """Waits for a response and returns its items, with those of all that have come meanwhile."""
     items = feed.take(await responses.read(EVENTS_SILENT_S), reason)
     while len(items) < MOST_ITEMS - 1 and _size(items) < MOST_BYTES / 2:
         try:

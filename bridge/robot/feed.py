@@ -1,7 +1,7 @@
-"""What the gateway's event stream brings, in the order of the outbox: events, and gaps for all that is missing.
+"""What the gateway's event stream brings: events, and gaps for all that is missing, in their order.
 
-Pure. The gateway announces most gaps; a jump of the sequence without one is a gap all the same, and an event that
-was taken already is left out.
+Pure. The gateway announces most gaps; a jump of the sequence without one is a gap all the same, and an event
+that was taken already is left out.
 """
 
 import re
@@ -26,7 +26,8 @@ class Feed:
     """Turns responses of SubscribeEvents into items.
 
     Args:
-        position: after the last event that the outbox has; None if it is new, and begins after all that the gateway
+        position: after the last event that the outbox has; None if it is new, and begins after all that the
+            gateway
             has kept.
         probes: for the first gap of a new outbox.
     """
@@ -47,33 +48,38 @@ class Feed:
         """
         match response.WhichOneof("item"):
             case "event":
-                place = response.event
-                if self.position is None:
-                    return []  # It happened before this outbox; CaughtUp ends such events.
-                items = self._up_to(_run(place.run_id), place.sequence - 1, reason)
-                if place.run_id == self.position.run_id and place.sequence <= self.position.sequence:
-                    return []
-                self.position = Position(place.run_id, place.sequence)
-                return [*items, _event(place)]
+                return self._take_event(response.event, reason)
             case "gap":
-                if self.position is None:
-                    return []
-                here = response.gap.position
-                return self._up_to(_run(here.run_id), here.sequence, reason)
+                return self._up_to(response.gap.position, reason)
+            case "caught_up" if self.position is None:
+                return self._begin_after(response.caught_up)
             case "caught_up":
-                here = response.caught_up
-                if self.position is None:
-                    self.position = Position(_run(here.run_id), here.sequence)
-                    lost = DropReason.OUTBOX_LOST
-                    return [Gap(here.run_id, 1, here.sequence, lost, earlier=True, probes=self._probes)]
-                return self._up_to(_run(here.run_id), here.sequence, reason)
+                return self._up_to(response.caught_up, reason)
             case _:
                 return []  # Of a newer gateway.
 
-    def _up_to(self, run_id: str, sequence: int, reason: DropReason) -> list[Item]:
-        """Returns the gap between the position and the place after an event, if there is one."""
+    def _begin_after(self, here: event_pb2.EventPosition) -> list[Item]:
+        """Returns the gap of a new outbox: all that the run has had."""
+        self.position = Position(_run(here.run_id), here.sequence)
+        reason = DropReason.OUTBOX_LOST
+        return [Gap(here.run_id, 1, here.sequence, reason, earlier=True, probes=self._probes)]
+
+    def _take_event(self, event: event_pb2.Event, reason: DropReason) -> list[Item]:
+        before = event_pb2.EventPosition(run_id=event.run_id, sequence=max(event.sequence, 1) - 1)
+        items = self._up_to(before, reason)
         here = self.position
-        if here is not None and here.run_id == run_id:
+        # In a new outbox all is left out that was before it: CaughtUp ends that.
+        if here is None or (here.run_id == event.run_id and event.sequence <= here.sequence):
+            return []
+        self.position = Position(event.run_id, event.sequence)
+        return [*items, _event(event)]
+
+    def _up_to(self, place: event_pb2.EventPosition, reason: DropReason) -> list[Item]:
+        """Returns the gap between the position and a place, if there is one."""
+        here, run_id, sequence = self.position, _run(place.run_id), place.sequence
+        if here is None:
+            return []
+        if here.run_id == run_id:
             if sequence <= here.sequence:
                 return []
             self.position = Position(run_id, sequence)

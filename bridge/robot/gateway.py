@@ -1,7 +1,8 @@
 """The connection to the gateway: streams whose messages are taken as they are on the wire.
 
-The client library maps answers to values for people; what goes to the hub has to stay as the gateway issued it. So
-this takes the library's connection (deadlines, keepalive, credentials, errors), and the schema's own messages.
+The client library maps answers to values for people; what goes to the hub has to stay as the gateway issued
+it. So this takes the library's connection (deadlines, keepalive, credentials, errors), and the schema's own
+messages.
 """
 
 from collections.abc import AsyncIterator

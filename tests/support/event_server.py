@@ -64,7 +64,7 @@ class EventServer:
 
     async def _start(self) -> None:
         self._runs += 1
-        self._log = EventLog(f"run {self._runs}", self._kept)
+        self._log = EventLog(f"run-{self._runs}", self._kept)
         self._appended = Broadcast()
         stream = EventStream(self._log, self._appended)
 
