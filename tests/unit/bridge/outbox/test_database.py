@@ -154,7 +154,9 @@ def test_gone_databases_go_on_after_what_was_sent(tmp_path: Path) -> None:
     again = opened(tmp_path)
     announced = sent(again)
     assert announced.items == (Gap(RUN, 3, 4, DropReason.OUTBOX_LOST),)
-    assert (announced.run_id, announced.first) == (batch.run_id, batch.first), "refused if the batch was there"
+    assert (announced.run_id, announced.first) == (batch.run_id, batch.first), (
+        "refused if the batch was there"
+    )
     assert again.is_new()
     assert again.facts.position == Position(RUN, 4), "the gateway is asked for the fifth once more"
     again.close()

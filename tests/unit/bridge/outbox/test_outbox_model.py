@@ -1,4 +1,4 @@
-"""The outbox against a model: whatever is done to it, what leaves is what came, with gaps for what was dropped."""
+"""The outbox against a model: what leaves it is what came, with gaps for what was dropped."""
 
 import shutil
 import tempfile
