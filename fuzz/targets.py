@@ -33,7 +33,7 @@ from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.preview.wire import from_wire
 from gateway.links.watch import LinkLostError
-from gateway.metrics.endpoint import respond
+from common.metrics_endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation
