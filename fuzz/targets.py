@@ -17,8 +17,10 @@ from bridge.commands.judgement import LONGEST_EXPIRY_S, Snapshot, Stray, judge
 from bridge.commands.judgement import Request as Handed
 from bridge.robot.feed import Feed, FeedError
 from bridge.values import DropReason, Position
+from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
+from common.metrics_endpoint import respond
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
 from console.capture_time import WRAP_TICKS
@@ -31,13 +33,11 @@ from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
-from gateway.access.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.preview.wire import from_wire
 from gateway.links.watch import LinkLostError
-from common.metrics_endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation
