@@ -15,12 +15,11 @@ from common.errors import ExitCode, UserError
 from fleet.errors import HubError, HubReason
 from hub import administration
 from hub.directory import HubDirectory, Kind
-from hub.receiver.cli import receiver as run_receiver
+from hub.receiver.cli import receiver
 from hub.server_config import Node, Places
 from hub.streams import StreamLimits
 
 app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
-app.command("receiver")(run_receiver)
 
 _DEFAULT_DIR: Final = Path("hub")
 _MIB: Final = 1024 * 1024
@@ -166,6 +165,9 @@ def receiver_credentials(
     """Write the files of a receiver of recordings."""
     administration.receiver_files(HubDirectory(directory), name, out, days=days, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+app.command("receiver")(receiver)
 
 
 def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:

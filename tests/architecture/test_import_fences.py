@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PROGRAMS = ("gateway", "preview", "drive", "recorder", "console", "simrobot")
-OURS = ("common", *PROGRAMS)
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "hub", "console", "simrobot")
+OURS = ("common", "fleet", *PROGRAMS)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,22 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
     ("importer", "forbidden"),
     [
         ("common/", PROGRAMS),
-        *((f"{one}/", tuple(other for other in PROGRAMS if other != one)) for one in PROGRAMS),
+        *(
+            (f"{one}/", tuple(other for other in PROGRAMS if other != one))
+            for one in PROGRAMS
+            if one != "bridge"
+        ),
+        # An ordinary client of the gateway, through the client's library.
+        ("bridge/", tuple(other for other in PROGRAMS if other not in ("bridge", "console"))),
+        ("fleet/", PROGRAMS),
+        *(
+            (f"{one}/", ("fleet",))
+            for one in ("common", "gateway", "preview", "drive", "recorder", "simrobot")
+        ),
+        ("fleet/errors.py", ("asyncio", "fleet", *WIRE)),
+        ("fleet/identity.py", ("asyncio", "fleet.session", "fleet.connection", *WIRE)),
+        ("hub/permissions.py", ("asyncio", "fleet.connection", "hub")),
+        ("hub/server_config.py", ("asyncio", "fleet", "hub")),
         ("drive/", ("omniseer.gateway", "grpc", "asyncio")),
         ("preview/", ("omniseer.gateway",)),
         ("console/", ("omniseer.preview",)),
@@ -101,6 +116,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
         ("gateway/links/watch.py", (*WIRE, "gateway.links")),
         ("gateway/links/recorder/", ("gateway.links.preview", "gateway.links.drive", "gateway.links.link")),
+        (
+            "gateway/links/bridge/",
+            ("gateway.links.preview", "gateway.links.drive", "gateway.links.link", "gateway.teleop"),
+        ),
+        ("gateway/links/bridge/requests.py", (*WIRE, "omniseer", "asyncio", "time", "gateway.links")),
+        ("gateway/rpc/hub_requests.py", ("omniseer.bridge", "gateway.teleop", "gateway.access", "grpc")),
         ("gateway/links/drive/", ("gateway.teleop", "gateway.links.preview")),
         ("gateway/teleop/", (*HEAVY, *WIRE, "omniseer", "gateway.ros", "gateway.rpc", "gateway.config")),
         *(
@@ -178,7 +199,13 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("mcap", ("recorder/mcap/",)),
         ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
-        ("cryptography", ("common/ca.py", "fleet/receipts.py")),
+        ("nats", ("fleet/session.py",)),
+        ("nkeys", ("fleet/identity.py",)),
+        ("nacl", ("fleet/receipts.py", "fleet/receipt_keys.py")),
+        ("boto3", ("hub/receiver/",)),
+        ("botocore", ("hub/receiver/",)),
+        ("aiohttp", ("bridge/uploads/",)),
+        ("cryptography", ("common/ca.py",)),
         ("yaml", ("common/config.py", "recorder/intake/qos.py", "recorder/mcap/rosbag2.py")),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
         ("google_crc32c", ("console/client/exporting.py", "recorder/store/export.py")),
@@ -193,11 +220,30 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "preview/rpc/",
                 "drive/",
                 "console/client/",
+                "fleet/",
+                "bridge/",
+                "hub/receiver/",
+                "console/fleet/",
             ),
         ),
-        ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
+        (
+            "omniseer.gateway",
+            (
+                "gateway/rpc/",
+                "console/client/",
+                "recorder/rpc/",
+                "recorder/doctor/",
+                "fleet/",
+                "bridge/",
+                "hub/receiver/",
+                "console/fleet/",
+            ),
+        ),
+        ("omniseer.bridge", ("gateway/links/", "bridge/")),
+        ("omniseer.fleet", ("fleet/", "bridge/", "hub/", "console/fleet/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
+        ("omniseer.bridge", ("gateway/links/bridge/", "bridge/")),
         ("omniseer.recorder", ("gateway/links/recorder/", "recorder/rpc/", "recorder/doctor/")),
     ],
 )
