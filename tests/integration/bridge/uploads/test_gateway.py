@@ -33,7 +33,5 @@ async def test_what_the_gateway_exports_is_what_the_store_has(
         await running.until("one", lambda each: each is not None and each.state is State.VERIFIED)
         assert running.uploads.cuts == 1, "a damaged chunk is a cut"
     for name, data in FILES.items():
-        found = ground.server.client.get_object(
-            Bucket=ground.store.bucket, Key=f"{FLEET}/{ROBOT}/one/{name}"
-        )
+        found = ground.server.client.get_object(Bucket=ground.store.bucket, Key=f"{FLEET}/{ROBOT}/one/{name}")
         assert found["Body"].read() == data
