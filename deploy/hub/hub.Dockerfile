@@ -1,0 +1,49 @@
+# The receiver of recordings and the exporter of metrics, on Debian 12.
+ARG DEBIAN_IMAGE=debian:bookworm-slim
+
+FROM ${DEBIAN_IMAGE} AS system
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends python3 tini \
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+
+FROM ${DEBIAN_IMAGE} AS built
+RUN apt-get update \
+ && apt-get install -y --no-install-recommends python3-venv \
+ && rm -rf /var/lib/apt/lists/* /var/cache/apt/*
+WORKDIR /opt/robot-gateway
+COPY docker/fetching.sh docker/
+COPY requirements/tools.txt requirements/hub.txt requirements/
+RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh \
+ && python3 -m venv .cache/tools \
+ && .cache/tools/bin/pip install --quiet --no-cache-dir --require-hashes -r requirements/tools.txt \
+ && python3 -m venv --without-pip .venv \
+ && .cache/tools/bin/uv pip install --quiet --require-hashes --no-deps --compile-bytecode --python .venv/bin/python \
+      -r requirements/hub.txt
+COPY pyproject.toml README.md LICENSE ./
+COPY bridge bridge
+COPY common common
+COPY console console
+COPY drive drive
+COPY fleet fleet
+COPY gateway gateway
+COPY hub hub
+COPY preview preview
+COPY recorder recorder
+COPY simrobot simrobot
+COPY proto/python proto/python
+RUN .cache/tools/bin/python -m hatchling build -t wheel \
+ && .cache/tools/bin/uv pip install --quiet --offline --no-deps --compile-bytecode --python .venv/bin/python dist/*.whl \
+ && .venv/bin/robot-bridge hub --help > /dev/null
+
+FROM system
+COPY --from=built /opt/robot-gateway/.venv /opt/robot-gateway/.venv
+RUN install -d -m 0700 -o 10021 -g 10021 /tmp
+ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
+    RECEIVER__LOG_FORMAT=json \
+    PYTHONDONTWRITEBYTECODE=1 \
+    HOME=/tmp
+ARG VERSION=0.0.0
+ARG REVISION=unknown
+LABEL org.opencontainers.image.version=${VERSION} org.opencontainers.image.revision=${REVISION}
+USER 10021:10021
+ENTRYPOINT ["tini", "--"]
