@@ -68,24 +68,22 @@ def as_text(keys: Iterable[bytes]) -> str:
     return "".join(f"{key.hex()}\n" for key in keys)
 
 
-def read_keys(path: Path) -> tuple[bytes, ...]:
-    """Returns the keys of receipts.key or receipts.pub, at least one.
+def read_signer(path: Path) -> ReceiptSigner:
+    """Returns what signs with the key of receipts.key.
 
     Raises:
         UserError: The file can't be read, or has something else.
     """
-    try:
-        with path.open("rb") as file:
-            lines = file.read(_LONGEST_FILE).decode("ascii").split()
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(
-            f"{path} can't be read: {error}", "Copy it again from the hub", exit_code=ExitCode.USAGE
-        ) from error
-    if not lines or len(lines) > _MOST_KEYS or not all(map(_KEY.fullmatch, lines)):
-        raise UserError(
-            f"{path} is no list of keys of receipts", "Copy it again from the hub", exit_code=ExitCode.USAGE
-        )
-    return tuple(map(bytes.fromhex, lines))
+    return ReceiptSigner(_keys(path, most=1)[0])
+
+
+def read_public_keys(path: Path) -> tuple[bytes, ...]:
+    """Returns the keys of receipts.pub, at least one, 32 bytes each.
+
+    Raises:
+        UserError: The file can't be read, or has something else.
+    """
+    return _keys(path, _MOST_KEYS)
 
 
 def confirmed(signed: SignedReceipt, public_keys: Sequence[bytes], expected: Receipt) -> Receipt:
@@ -112,3 +110,20 @@ def digest_of(files: Iterable[RecordingFile]) -> bytes:
     """Returns the SHA-256 of a whole recording: as Recording.sha256, over its files in the order of names."""
     lines = (f"{file.sha256.hex()}  {file.name}\n" for file in sorted(files, key=lambda file: file.name))
     return hashlib.sha256("".join(lines).encode()).digest()
+
+
+def _keys(path: Path, most: int) -> tuple[bytes, ...]:
+    try:
+        with path.open("rb") as file:
+            lines = file.read(_LONGEST_FILE).decode("ascii").split()
+    except OSError as error:
+        raise UserError(
+            f"{path} can't be read: {error.strerror}", "Copy it again from the hub", exit_code=ExitCode.USAGE
+        ) from error
+    except UnicodeDecodeError:
+        lines = []
+    if not 0 < len(lines) <= most or not all(map(_KEY.fullmatch, lines)):
+        raise UserError(
+            f"{path} has no key of receipts", "Copy it again from the hub", exit_code=ExitCode.USAGE
+        )
+    return tuple(map(bytes.fromhex, lines))

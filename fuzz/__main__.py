@@ -39,6 +39,8 @@ NAMES: Final = (
     "video_tap",
     "segment",
     "export_request",
+    "hubs_command",
+    "gateways_event",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

@@ -9,7 +9,9 @@ from common.ca import new_ca
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
 from fuzz.robot import SOURCES, type_of
+from omniseer.fleet.v1 import command_pb2
 from omniseer.gateway.v1 import (
+    event_pb2,
     overlay_pb2,
     preview_pb2,
     recording_pb2,
@@ -125,6 +127,20 @@ _SEEDS: Final = {
     "terminal_text": ["robot healthy\x1b]0;x\x07\u202e\u00fc".encode()],
     "audit_line": [b"enabled: true, profile: LOW_BW"],
     "admission": [bytes((0, 8, 1, 0, 4, 0, 2, 1, 8, 0, 7, 90, 8, 0, 3, 1, 5, 0, 6, 0))],
+    "hubs_command": [
+        command_pb2.Command(
+            command_id="c1",
+            robot="lab2",
+            issued_by="anna",
+            expires_after_s=60,
+            snapshot=command_pb2.SnapshotCommand(pre_s=20, label="door"),
+        ).SerializeToString()
+    ],
+    "gateways_event": [
+        robot_gateway_pb2.SubscribeEventsResponse(
+            event=event_pb2.Event(run_id="a", sequence=5, message="a fault")
+        ).SerializeToString()
+    ],
     "video_stream": [_video("h264"), _video("h265")],
     "video_tap": [_tap()],
     "segment": [b"\0" + recording.unfinished(), b"\1" + _chunk_content()],

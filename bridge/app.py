@@ -1,0 +1,134 @@
+"""Assembles the bridge, starts its parts in order and stops them in reverse."""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from bridge.commands.desk import Desk
+from bridge.commands.taker import CommandTaker
+from bridge.config import BridgeSettings
+from bridge.outbox.outbox import Outbox, outbox
+from bridge.outbox.uploads import StoredUploads
+from bridge.robot.events import EventReader
+from bridge.robot.gateway import credentials
+from bridge.robot.status import StatusReader
+from bridge.rpc.servicer import SERVICE, BridgeServicer
+from bridge.sender import Sender
+from bridge.state import is_charging
+from bridge.state_sender import StateSender
+from bridge.status import Status
+from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
+from common import bind, rpc
+from common.health import Health
+from console.client import AsyncGatewayClient
+from fleet.connection import FleetAddress, Hub, connect
+from fleet.names import inbox_prefix
+
+if TYPE_CHECKING:
+    from bridge.uploads.uploads import Uploads
+
+_log = logging.getLogger(__name__)
+
+_RUN_ID_BYTES = 8
+
+
+async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
+    """Connects the robot with its fleet, and serves the gateway, until `stop`.
+
+    Raises:
+        UserError: the socket can't be used, or a file of the robot's credentials or enrolment can't be read.
+    """
+    robot, run_id = settings.hub.robot, secrets.token_hex(_RUN_ID_BYTES)
+    async with (
+        outbox(settings.root, settings.outbox.max_bytes) as kept,
+        connect(_address(settings)) as hub,
+        AsyncGatewayClient(settings.gateway.target, credentials=credentials(settings.gateway)) as gateway,
+    ):
+        robot_status = StatusReader(settings.gateway)
+        queue = _queue(settings, kept, hub, gateway, robot_status)
+        uploads: Uploading = QueuedUploads(queue) if queue else NoUploads()
+        sender = Sender(robot, kept, hub)
+        status = Status(robot, settings.hub.fleet, outbox=kept, hub=hub, sender=sender, uploads=uploads)
+        desk = Desk(robot, kept, status.changes.notify_all)
+        states = StateSender(
+            robot,
+            settings.advertised_target,
+            run_id,
+            status=robot_status,
+            outbox=kept,
+            uploads=uploads,
+            hub=hub,
+        )
+        parts: list[Callable[[], Coroutine[Any, Any, None]]] = [
+            EventReader(settings.gateway, kept).run,
+            robot_status.run,
+            sender.run,
+            states.run,
+        ]
+        if queue:
+            parts += [partial(queue.run, stop), partial(apply_rule, queue, gateway)]
+        if settings.commands.allowed:
+            parts.append(CommandTaker(settings, hub, desk).run)
+        server = rpc.new_server()
+        BridgeServicer(run_id, status, uploads, desk).register(server)
+        Health(SERVICE).register(server)
+        bind.bind_unix(server, settings.socket)
+        await server.start()
+        _log.info("serving on %s; robot %s of fleet %s", settings.socket, robot, settings.hub.fleet)
+        try:
+            await _run(parts, stop)
+        finally:
+            await server.stop(rpc.STOP_GRACE_S)
+            settings.socket.unlink(missing_ok=True)
+
+
+def _queue(
+    settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: AsyncGatewayClient, status: StatusReader
+) -> "Uploads | None":
+    """Returns the uploads; None for a robot that has no receivers' keys."""
+    if settings.hub.receipts is None:
+        return None
+    # Late: a robot that uploads nothing does without the memory of their libraries.
+    from bridge.uploads.uploads import Fleet, Uploads  # noqa: PLC0415
+    from fleet.receipt_keys import read_public_keys  # noqa: PLC0415
+
+    fleet = Fleet(
+        fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_public_keys(settings.hub.receipts)
+    )
+    return Uploads(
+        settings.uploads,
+        fleet,
+        store=StoredUploads(kept),
+        source=gateway,
+        hub=hub,
+        charging=lambda: is_charging(status.newest),
+        changed=status.changes.notify_all,
+    )
+
+
+def _address(settings: BridgeSettings) -> FleetAddress:
+    hub = settings.hub
+    return FleetAddress(
+        hub.servers,
+        credentials=hub.credentials,
+        ca=hub.ca,
+        inbox=inbox_prefix(hub.robot),
+        name=f"robot-bridge {hub.robot}",
+    )
+
+
+async def _run(parts: list[Callable[[], Coroutine[Any, Any, None]]], stop: asyncio.Event) -> None:
+    """Runs the parts until `stop`; a defect in one of them ends the program, which is then restarted."""
+    tasks = [asyncio.create_task(part()) for part in parts]
+    stopping = asyncio.create_task(stop.wait())
+    try:
+        done, _ = await asyncio.wait([*tasks, stopping], return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in (*tasks, stopping):
+            task.cancel()
+        await asyncio.gather(*tasks, stopping, return_exceptions=True)
