@@ -8,7 +8,6 @@ from gateway.links.bridge.wire import BridgeClient
 from gateway.links.watch import ServiceWatch, WatchConnector
 from gateway.status.cloud import BridgeReport, CloudView
 
-
 _SILENCE_S: Final = 2.4
 """The bridge reports at least every second; operators see within 2.5 s that it does not."""
 
