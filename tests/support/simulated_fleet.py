@@ -16,6 +16,7 @@ from fleet.errors import HubError
 CONNECTIONS = 8
 _ANSWER_S = 5.0
 _PAUSE_S = 0.5
+_SETTLED_WITHIN_S = 10.0
 _PAYLOAD = b"x" * 300
 """Of about the size of an event."""
 
@@ -83,6 +84,19 @@ async def simulated_fleet(servers: Sequence[str], count: int, batch: int = 1) ->
         yield Fleet(hubs, count, batch)
 
 
+async def _settled(hub: Hub, expected: int) -> int:
+    """The number of messages in the stream. A new leader has all that was acknowledged, but has to apply it."""
+    deadline = time.monotonic() + _SETTLED_WITHIN_S
+    while True:
+        try:
+            count = int((await hub.api(f"STREAM.INFO.{names.EVENTS}"))["state"]["messages"])
+        except HubError:
+            count = 0
+        if count >= expected or time.monotonic() > deadline:
+            return count
+        await asyncio.sleep(_PAUSE_S)
+
+
 @dataclass(frozen=True)
 class Received:
     """What the hub has of a fleet."""
@@ -97,7 +111,7 @@ async def received(servers: Sequence[str], robots: int, messages: int) -> Receiv
     sequences: dict[str, list[int]] = {}
     async with connect(FleetAddress(tuple(servers))) as hub:
         await hub.connected(20)
-        count = (await hub.api(f"STREAM.INFO.{names.EVENTS}"))["state"]["messages"]
+        count = await _settled(hub, robots * messages)
         seen = 0
         follow = hub.follow(names.EVENTS, names.EVENT_SUBJECTS, Start.all())
         while seen < count:

@@ -86,4 +86,4 @@ async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> Non
                     else:
                         break
         result = await received(servers.urls, 1, 1)
-    assert (result.lost, result.duplicates) == (0, 0)
+    assert (result.lost, result.duplicates) == (0, 0), result
