@@ -149,14 +149,14 @@ def _last_known(row: FleetRow, style: SeverityStyle | None) -> SeverityStyle | N
 
 _GAP: Final = 2
 COLUMNS: Final = (
-    Column("robot", 20, lambda row: Cell(shortened(row.robot))),
+    Column("robot", 16, lambda row: Cell(shortened(row.robot))),
     Column("", 12, _standing),
-    Column("since", 12, lambda row: Cell(age(row.since_ms)), right=True),
-    Column("health", 40, _health),
+    Column("since", 11, lambda row: Cell(age(row.since_ms)), right=True),
+    Column("health", 36, _health),
     Column("battery", 8, _of_state(_battery), right=True),
-    Column("disk", 6, _of_state(_disk), right=True, wide=True),
-    Column("mode", 12, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), wide=True),
-    Column("uploads", 24, _of_state(_uploads), wide=True),
-    Column("outbox", 10, _of_state(_outbox), right=True, wide=True),
-    Column("seen", 12, lambda row: Cell(age(row.last_seen_ms), SeverityStyle.QUIET), right=True),
+    Column("disk", 5, _of_state(_disk), right=True, wide=True),
+    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), wide=True),
+    Column("uploads", 20, _of_state(_uploads), wide=True),
+    Column("outbox", 8, _of_state(_outbox), right=True, wide=True),
+    Column("seen", 11, lambda row: Cell(age(row.last_seen_ms), SeverityStyle.QUIET), right=True),
 )
