@@ -4,7 +4,7 @@ import re
 from typing import Final
 
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
-"""A robot's name, and a fleet's: a DNS label (RFC 1123 2.1), so that it is one token of subjects and keys."""
+"""A robot's name, and a fleet's: a DNS label (RFC 1123 2.1), and so one token of a subject and a key."""
 
 EVENTS: Final = "fleet_events"
 """Stream of EventBatch. One message per subject; a second one is refused."""

@@ -1,0 +1,476 @@
+"""The connection to the hub, as programs use it: always there, and honest about whether it stands.
+
+`connect` returns at once. A supervisor keeps one session (fleet/session.py) with one of the servers. While
+there is none, calls fail at once with `UnreachableError`: nothing is buffered here, an outbox is its owner's.
+What runs for long (`follow`, `pull`, `serve`) outlives the sessions.
+
+| what happens | what follows |
+|---|---|
+| no server answers | every server once in random order, then a pause of 1 s to 60 s with jitter, for ever |
+| the hub does not accept the credentials | the same; `link.reason` is REFUSED |
+| the connection is half-open | found by pings within 15 s, then as lost |
+| the connection is lost | what waits for an answer fails with UNREACHABLE; at once on to the next server |
+| a node dies | as lost; until its streams have a leader again, they fail with NO_RESPONDERS or TIMEOUT |
+"""
+
+import asyncio
+import random
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, Final
+
+from common.backoff import Backoff
+from common.broadcast import Broadcast
+from fleet import consuming, names
+from fleet.consuming import Delivery, Start
+from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
+from fleet.session import Message, Session, parsed
+
+__all__ = ["Delivery", "Entry", "FleetAddress", "Hub", "Link", "Published", "Request", "Start", "connect"]
+
+FIRST_PAUSE_S: Final = 1.0
+LONGEST_PAUSE_S: Final = 60.0
+REQUEST_TIMEOUT_S: Final = 5.0
+"""For an answer of the hub. A stream elects a leader in about that time."""
+_STEADY_S: Final = 10.0
+"""A connection that stood this long was a success: the next pause is short again."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetAddress:
+    """Where the hub is, and as whom to connect.
+
+    Attributes:
+        servers: as "tls://host:4222", in any order; all are nodes of one hub. Without port: 4222.
+        credentials: a .creds file; None connects without (tests).
+        ca: PEM file of the authority of the servers' certificates; with it a connection without TLS is
+            refused. None connects without TLS (tests).
+        inbox: prefix of the subjects that answers come to: `names.inbox_prefix(robot)` for a robot.
+        name: shown in the servers' lists of connections.
+    """
+
+    servers: tuple[str, ...]
+    credentials: Path | None = None
+    ca: Path | None = None
+    inbox: str = "_INBOX"
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """Whether there is a connection.
+
+    Attributes:
+        connected: whether one stands.
+        server: to which one; empty without.
+        reason: why there is none: UNREACHABLE or REFUSED. None while there is one, and before the first try.
+        text: the same for people.
+        since_s: of the event loop's clock: since when it is so.
+        connections: that stood so far.
+    """
+
+    connected: bool
+    server: str
+    reason: HubReason | None
+    text: str
+    since_s: float
+    connections: int
+
+
+class Published(Enum):
+    """What became of a message in a stream with one message per subject."""
+
+    DELIVERED = "delivered"
+    REPEATED = "repeated"
+    """The stream has one with this subject: an earlier attempt was delivered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A key of a bucket.
+
+    Attributes:
+        key: without the bucket.
+        value: empty if deleted.
+        revision: counts up with each change in the bucket.
+        unix_s: when the hub took it, by the hub's clock.
+        deleted: whether it was deleted.
+        pending: values of the bucket still to come when this one was sent; 0: it is the newest one.
+    """
+
+    key: str
+    value: bytes
+    revision: int
+    unix_s: float
+    deleted: bool
+    pending: int
+
+
+class Request:
+    """A robot's request, whose answers go to that robot.
+
+    Attributes:
+        robot: by the subject, which the hub enforces.
+        name: last part of the subject: "begin_file".
+        payload: as sent by the robot.
+    """
+
+    def __init__(self, robot: str, name: str, payload: bytes, session: Session, reply: str) -> None:
+        self.robot = robot
+        self.name = name
+        self.payload = payload
+        self._session = session
+        self._reply = reply
+
+    async def respond(self, payload: bytes) -> None:
+        """Sends an answer; there may be several.
+
+        Raises:
+            HubError: it can't be sent.
+        """
+        await self._session.publish(self._reply, payload)
+
+
+Handler = Callable[[Request], Awaitable[None]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Service:
+    subject: str
+    queue: str
+    handler: Handler
+    at_once: int
+    busy: bytes
+
+
+class Hub:
+    """The hub as seen from one program. Made by `connect`."""
+
+    def __init__(self, address: FleetAddress) -> None:
+        self._address = address
+        self._session: Session | None = None
+        self._services: list[_Service] = []
+        self._calls: set[asyncio.Task[None]] = set()
+        self._link = Link(False, "", None, "", asyncio.get_running_loop().time(), 0)
+        self.changed = Broadcast()
+        """Notified after each change of `link`."""
+
+    @property
+    def link(self) -> Link:
+        """Whether there is a connection."""
+        return self._link
+
+    async def connected(self, timeout_s: float | None = None) -> None:
+        """Waits until there is a connection.
+
+        Raises:
+            HubError: there was none within `timeout_s`; its reason is that of the last attempt.
+        """
+        if await self.changed.wait_until(lambda: self._link.connected, timeout_s):
+            return
+        if self._link.reason is HubReason.REFUSED:
+            raise RefusedError(self._link.text)
+        raise UnreachableError(self._link.text or f"the hub does not answer within {timeout_s:g} s")
+
+    async def publish_once(
+        self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S
+    ) -> Published:
+        """Publishes to a stream that keeps one message per subject, and returns once it is on its disks.
+
+        Raises:
+            HubError: it is not certain that the stream has it. Publish the same again.
+        """
+        try:
+            acknowledged(await self._open().request(subject, payload, timeout_s))
+        except HubError as error:
+            if is_repeat(error):
+                return Published.REPEATED
+            raise
+        return Published.DELIVERED
+
+    async def put(self, bucket: str, key: str, value: bytes, timeout_s: float = REQUEST_TIMEOUT_S) -> None:
+        """Sets a key of a bucket.
+
+        Raises:
+            HubError: it is not certain that the bucket has it.
+        """
+        acknowledged(await self._open().request(f"$KV.{bucket}.{key}", value, timeout_s))
+
+    async def delete(self, bucket: str, key: str, timeout_s: float = REQUEST_TIMEOUT_S) -> None:
+        """Deletes a key of a bucket; it need not exist.
+
+        Raises:
+            HubError: it is not certain that it is deleted.
+        """
+        headers = {"KV-Operation": "DEL"}
+        acknowledged(await self._open().request(f"$KV.{bucket}.{key}", b"", timeout_s, headers))
+
+    async def entries(self, bucket: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Entry]:
+        """Returns the present entries of a bucket, by key.
+
+        Raises:
+            HubError: it can't be read.
+        """
+        found: dict[str, Entry] = {}
+        async with asyncio.timeout(None) as deadline:
+            deadline.reschedule(asyncio.get_running_loop().time() + 6 * timeout_s)
+            start = Start.last_per_subject()
+            stream, subjects = f"KV_{bucket}", f"$KV.{bucket}.>"
+            async for delivery in consuming.present(self._open(), stream, subjects, start, timeout_s):
+                entry = _entry(bucket, delivery)
+                if not entry.deleted:
+                    found[entry.key] = entry
+        return found
+
+    async def watch_bucket(self, bucket: str) -> AsyncGenerator[Entry, None]:
+        """Yields the present entries of a bucket and then every change, over all lost connections."""
+        async for delivery in self.follow(f"KV_{bucket}", f"$KV.{bucket}.>", Start.last_per_subject()):
+            yield _entry(bucket, delivery)
+
+    async def follow(self, stream: str, subjects: str, start: Start) -> AsyncGenerator[Delivery, None]:
+        """Yields the messages of a stream in order, each once, over all lost connections.
+
+        Args:
+            stream: its name.
+            subjects: which of it, as "fleet.r1.ev.>".
+            start: where to begin.
+        """
+        place = start
+        pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        while True:
+            await self.connected()
+            try:
+                async for delivery in consuming.follow(self._open(), stream, subjects, place):
+                    pause.reset()
+                    place = Start.after(delivery.sequence)
+                    yield delivery
+            except HubError:
+                await self._pause(pause)
+
+    async def last(self, stream: str, subjects: str, timeout_s: float = REQUEST_TIMEOUT_S) -> Delivery | None:
+        """Returns the newest message of a stream with such a subject; None if there is none.
+
+        Raises:
+            HubError: it can't be read.
+        """
+        start = Start.last()
+        async for delivery in consuming.present(self._open(), stream, subjects, start, timeout_s):
+            return delivery
+        return None
+
+    async def pull(self, stream: str, durable: str, batch: int = 16) -> AsyncGenerator[Delivery, None]:
+        """Yields the messages of a durable consumer, over all lost connections. Each needs its `ack`."""
+        pause = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        while True:
+            await self.connected()
+            try:
+                async for delivery in consuming.pull(self._open(), stream, durable, batch):
+                    pause.reset()
+                    yield delivery
+            except HubError:
+                await self._pause(pause)
+
+    async def request(self, subject: str, payload: bytes, timeout_s: float = REQUEST_TIMEOUT_S) -> bytes:
+        """Sends a request to another program and returns its answer.
+
+        Raises:
+            HubError: NO_RESPONDERS if no program serves the subject, TIMEOUT, UNREACHABLE ...
+        """
+        return (await self._open().request(subject, payload, timeout_s)).payload
+
+    async def request_many(
+        self, subject: str, payload: bytes, silence_s: float = REQUEST_TIMEOUT_S
+    ) -> AsyncGenerator[bytes, None]:
+        """Sends a request and yields its answers for as long as the caller asks for more.
+
+        Args:
+            subject: of the request.
+            payload: of the request.
+            silence_s: longest time between two answers.
+
+        Raises:
+            HubError: NO_RESPONDERS if no program serves the subject, TIMEOUT after a silence, UNREACHABLE ...
+        """
+        session = self._open()
+        with session.waiter(subject) as (waiter, reply):
+            await session.send(subject, payload, reply)
+            while True:
+                message = await waiter.get(silence_s)
+                if message.status == "503" and not message.payload:
+                    raise HubError(HubReason.NO_RESPONDERS, f"no program at the hub takes {subject}")
+                yield message.payload
+
+    async def serve(
+        self, subject: str, queue: str, handler: Handler, *, at_once: int = 8, busy: bytes = b""
+    ) -> None:
+        """Answers requests of robots, on subjects "fleet.<robot>.<kind>.<name>", over all lost connections.
+
+        A request whose answer would not go to the inbox of the robot in its subject is dropped: a hostile
+        robot could name another one's.
+
+        Args:
+            subject: which requests.
+            queue: group of programs of which one gets each request.
+            handler: answers one; it handles its own errors.
+            at_once: requests in hand at any moment.
+            busy: answer to requests beyond that.
+        """
+        service = _Service(subject, queue, handler, at_once, busy)
+        self._services.append(service)
+        if self._session is not None:
+            await self._serve_in(self._session, service)
+
+    async def api(
+        self, call: str, request: Any = None, timeout_s: float = REQUEST_TIMEOUT_S
+    ) -> dict[str, Any]:
+        """Calls JetStream's API, as "STREAM.INFO.fleet_events".
+
+        Raises:
+            HubError: with JetStream's code.
+        """
+        return await self._open().api(f"$JS.API.{call}", request, timeout_s)
+
+    async def run(self) -> None:
+        """Keeps a connection until it is cancelled."""
+        backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        loop = asyncio.get_running_loop()
+        while True:
+            session = await self._try_servers()
+            if session is None:
+                # Full jitter between half and all of it: a fleet does not come back in step.
+                await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
+                continue
+            since_s = loop.time()
+            try:
+                await self._use(session)
+            finally:
+                await session.close()
+            if loop.time() - since_s >= _STEADY_S:
+                backoff.reset()
+            else:
+                await asyncio.sleep(backoff.next_s() * random.uniform(0.5, 1.0))  # noqa: S311
+
+    async def close(self) -> None:
+        """Ends the requests in hand."""
+        for task in self._calls:
+            task.cancel()
+        await asyncio.gather(*self._calls, return_exceptions=True)
+
+    async def _try_servers(self) -> Session | None:
+        """Tries every server once, in random order."""
+        address = self._address
+        servers = list(address.servers)
+        random.shuffle(servers)
+        worst: HubError = UnreachableError("no server of the hub is configured")
+        for server in servers:
+            try:
+                return await Session.open(
+                    server,
+                    credentials=address.credentials,
+                    ca=address.ca,
+                    inbox=address.inbox,
+                    name=address.name,
+                )
+            except HubError as error:
+                # One that refuses says more than one that is silent.
+                worst = worst if worst.reason is HubReason.REFUSED else error
+        self._set(False, "", worst)
+        return None
+
+    async def _use(self, session: Session) -> None:
+        try:
+            for service in self._services:
+                await self._serve_in(session, service)
+        except HubError as error:
+            self._set(False, "", error)
+            return
+        self._session = session
+        self._set(True, session.server, None)
+        try:
+            reason = await asyncio.shield(session.lost)
+        finally:
+            self._session = None
+        self._set(False, "", reason)
+
+    def _set(self, connected: bool, server: str, error: HubError | None) -> None:
+        now_s = asyncio.get_running_loop().time()
+        same = connected == self._link.connected
+        self._link = Link(
+            connected,
+            server,
+            error.reason if error else None,
+            str(error) if error else "",
+            self._link.since_s if same else now_s,
+            self._link.connections + connected,
+        )
+        self.changed.notify_all()
+
+    def _open(self) -> Session:
+        if self._session is None:
+            if self._link.reason is HubReason.REFUSED:
+                raise RefusedError(self._link.text)
+            raise UnreachableError(self._link.text or "there is no connection to the hub yet")
+        return self._session
+
+    async def _pause(self, backoff: Backoff) -> None:
+        """Waits before something is set up again; no longer than until the connection is lost or made."""
+        connections = self._link.connections
+        await self.changed.wait_until(
+            lambda: self._link.connections != connections,
+            backoff.next_s() * random.uniform(0.5, 1.0),  # noqa: S311
+        )
+
+    async def _serve_in(self, session: Session, service: _Service) -> None:
+        running: set[asyncio.Task[None]] = set()
+
+        async def on_message(message: Message) -> None:
+            parts = message.subject.split(".")
+            if len(parts) < 3 or not message.reply.startswith(names.inbox_prefix(parts[1]) + "."):
+                return
+            request = Request(parts[1], parts[-1], message.payload, session, message.reply)
+            if len(running) >= service.at_once:
+                await request.respond(service.busy)
+                return
+            task = asyncio.ensure_future(service.handler(request))
+            for tasks in (running, self._calls):
+                tasks.add(task)
+                task.add_done_callback(tasks.discard)
+
+        await session.subscribe(service.subject, service.queue, on_message)
+
+
+@asynccontextmanager
+async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
+    """Keeps a connection to the hub while the block runs. It need not stand yet when the block begins."""
+    hub = Hub(address)
+    supervisor = asyncio.create_task(hub.run())
+    try:
+        yield hub
+    finally:
+        supervisor.cancel()
+        await asyncio.gather(supervisor, return_exceptions=True)
+        await hub.close()
+
+
+def acknowledged(message: Message) -> None:
+    """Checks that a message is the acknowledgement of a stream.
+
+    Raises:
+        HubError: it is an error, or anything else.
+    """
+    if "stream" not in parsed(message.payload):
+        raise api_error({"description": "the answer to a message is no acknowledgement"})
+
+
+def _entry(bucket: str, delivery: Delivery) -> Entry:
+    return Entry(
+        key=delivery.subject.removeprefix(f"$KV.{bucket}."),
+        value=delivery.payload,
+        revision=delivery.sequence,
+        unix_s=delivery.unix_s,
+        deleted=delivery.headers.get("KV-Operation") in {"DEL", "PURGE"},
+        pending=delivery.pending,
+    )

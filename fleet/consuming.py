@@ -1,0 +1,282 @@
+"""Reading streams: pull requests to a consumer, and what comes back, within one session."""
+
+import json
+import secrets
+from collections.abc import AsyncGenerator, Mapping
+from contextlib import aclosing, asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from fleet.errors import HubError, HubReason
+from fleet.session import Message, Session, Waiter
+
+_PULL_EXPIRES_S: Final = 20.0
+"""A pull request waits this long at the hub for messages."""
+_HEARTBEAT_S: Final = 2.0
+"""The hub says this often that it still knows the pull request; two missing ones end it."""
+_INACTIVE_S: Final = 60.0
+"""The hub forgets a consumer of ours that is not read for this long."""
+_BATCH: Final = 256
+"""Messages requested at once."""
+_MAX_BYTES: Final = 4 * 1024 * 1024
+"""Bytes requested at once; more than any single message may have."""
+_TIMEOUT_S: Final = 5.0
+_NANOSECONDS: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where in a stream to begin."""
+
+    config: Mapping[str, Any] = field(default_factory=lambda: {"deliver_policy": "all"})
+
+    @classmethod
+    def all(cls) -> "Start":
+        """With the oldest message."""
+        return cls()
+
+    @classmethod
+    def new(cls) -> "Start":
+        """With the first message after now."""
+        return cls({"deliver_policy": "new"})
+
+    @classmethod
+    def last(cls) -> "Start":
+        """With the newest message."""
+        return cls({"deliver_policy": "last"})
+
+    @classmethod
+    def last_per_subject(cls) -> "Start":
+        """With the newest message of each subject."""
+        return cls({"deliver_policy": "last_per_subject"})
+
+    @classmethod
+    def after(cls, sequence: int) -> "Start":
+        """With the first message after that of this sequence."""
+        return cls({"deliver_policy": "by_start_sequence", "opt_start_seq": sequence + 1})
+
+    @classmethod
+    def at(cls, rfc3339: str) -> "Start":
+        """With the first message that the stream took at or after this time, as "2026-01-31T12:00:00Z"."""
+        return cls({"deliver_policy": "by_start_time", "opt_start_time": rfc3339})
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """A message of a stream.
+
+    Attributes:
+        subject: of the message.
+        payload: of the message.
+        headers: of the message.
+        sequence: its place in the stream.
+        consumer_sequence: its place among what this consumer was sent.
+        deliveries: how often it was delivered, with this time.
+        unix_s: when the stream took it, by the hub's clock.
+        pending: messages still to come when it was sent.
+    """
+
+    subject: str
+    payload: bytes
+    headers: Mapping[str, str]
+    sequence: int
+    consumer_sequence: int
+    deliveries: int
+    unix_s: float
+    pending: int
+    _session: Session
+    _reply: str
+
+    async def ack(self, timeout_s: float = _TIMEOUT_S) -> None:
+        """Acknowledges it, and returns when the hub knows.
+
+        Raises:
+            HubError: the hub may deliver it again.
+        """
+        await self._session.request(self._reply, b"+ACK", timeout_s)
+
+
+async def pull(session: Session, stream: str, consumer: str, batch: int) -> AsyncGenerator[Delivery, None]:
+    """Yields what a consumer delivers, until the session is lost.
+
+    Raises:
+        HubError: it is lost, or the consumer is.
+    """
+    async with _Puller.open(session, stream, consumer) as puller:
+        while True:
+            async with aclosing(puller.request(batch, _PULL_EXPIRES_S)) as deliveries:
+                async for delivery in deliveries:
+                    yield delivery
+
+
+async def follow(
+    session: Session, stream: str, subjects: str, start: Start
+) -> AsyncGenerator[Delivery, None]:
+    """Yields a stream's messages in order, through a consumer that the hub keeps in memory.
+
+    Raises:
+        HubError: the session is lost, or messages are: begin again after the last one.
+    """
+    consumer, _ = await _new_consumer(session, stream, subjects, start, _TIMEOUT_S)
+    try:
+        expected = 1
+        async with aclosing(pull(session, stream, consumer, _BATCH)) as deliveries:
+            async for delivery in deliveries:
+                if delivery.consumer_sequence != expected:
+                    raise HubError(HubReason.INVALID, "messages were lost on their way")
+                expected += 1
+                yield delivery
+    finally:
+        await _forget(session, stream, consumer)
+
+
+async def present(
+    session: Session, stream: str, subjects: str, start: Start, timeout_s: float
+) -> AsyncGenerator[Delivery, None]:
+    """Yields the messages that are in a stream now, and ends.
+
+    Raises:
+        HubError: it can't be read.
+    """
+    consumer, pending = await _new_consumer(session, stream, subjects, start, timeout_s)
+    try:
+        async with _Puller.open(session, stream, consumer) as puller:
+            while pending > 0:
+                before = pending
+                async with aclosing(puller.request(min(pending, _BATCH), timeout_s)) as deliveries:
+                    async for delivery in deliveries:
+                        pending = delivery.pending
+                        yield delivery
+                if pending == before:
+                    raise HubError(HubReason.TIMEOUT, f"the hub sends nothing of {stream} in {timeout_s:g} s")
+    finally:
+        await _forget(session, stream, consumer)
+
+
+async def _new_consumer(
+    session: Session, stream: str, subjects: str, start: Start, timeout_s: float
+) -> tuple[str, int]:
+    """Makes a consumer that the hub forgets by itself; returns its name and how much it has to deliver."""
+    name = secrets.token_hex(8)
+    config = {
+        "name": name,
+        "ack_policy": "none",
+        "filter_subject": subjects,
+        "inactive_threshold": int(_INACTIVE_S * _NANOSECONDS),
+        "mem_storage": True,
+        "num_replicas": 1,
+        **start.config,
+    }
+    call = f"$JS.API.CONSUMER.CREATE.{stream}.{name}.{subjects}"
+    info = await session.api(call, {"stream_name": stream, "config": config}, timeout_s)
+    pending = info.get("num_pending", 0)
+    return name, pending if isinstance(pending, int) else 0
+
+
+async def _forget(session: Session, stream: str, consumer: str) -> None:
+    """Deletes a consumer; one that can't be deleted now, the hub forgets by itself."""
+    if session.lost.done():
+        return
+    try:
+        await session.publish(f"$JS.API.CONSUMER.DELETE.{stream}.{consumer}", b"")
+    except HubError:
+        return
+
+
+class _Puller:
+    """Pull requests to one consumer, one after the other."""
+
+    def __init__(self, session: Session, stream: str, consumer: str, waiter: Waiter, reply: str) -> None:
+        self._session = session
+        self._consumer = consumer
+        self._subject = _next_subject(stream, consumer)
+        self._waiter = waiter
+        self._reply = reply
+
+    @classmethod
+    @asynccontextmanager
+    async def open(cls, session: Session, stream: str, consumer: str) -> AsyncGenerator["_Puller", None]:
+        """Subscribes to what the consumer delivers, for the block.
+
+        Raises:
+            UnreachableError: the session is lost.
+        """
+        async with session.channel(_next_subject(stream, consumer)) as (waiter, reply):
+            yield cls(session, stream, consumer, waiter, reply)
+
+    async def request(self, batch: int, expires_s: float) -> AsyncGenerator[Delivery, None]:
+        """Yields what answers one pull request; ends when it is complete or expires.
+
+        Raises:
+            HubError: the session is lost, or the consumer is.
+        """
+        heartbeat_s = min(_HEARTBEAT_S, expires_s / 3)
+        request = {
+            "batch": batch,
+            "max_bytes": _MAX_BYTES,
+            "expires": int(expires_s * _NANOSECONDS),
+            "idle_heartbeat": int(heartbeat_s * _NANOSECONDS),
+        }
+        await self._session.send(self._subject, json.dumps(request).encode(), self._reply)
+        received = 0
+        while received < batch:
+            message = await self._waiter.get(2 * heartbeat_s + _TIMEOUT_S / 2)
+            if not message.status:
+                received += 1
+                yield delivery(self._session, message)
+            elif self._is_end(message):
+                return
+
+    def _is_end(self, message: Message) -> bool:
+        """Whether a status ends the request, as opposed to a heartbeat.
+
+        Raises:
+            HubError: it says that the consumer can't be read.
+        """
+        description = message.headers.get("Description", "")
+        match message.status:
+            case "100":
+                return False
+            case "404" | "408":
+                return True
+            case "409" if "batch completed" in description.lower() or "maxbytes" in description.lower():
+                return True
+            case "503":
+                raise HubError(
+                    HubReason.NO_RESPONDERS, f"the hub does not know the consumer {self._consumer}"
+                )
+            case "409":
+                raise HubError(HubReason.MISSING, f"the consumer {self._consumer}: {description}")
+            case status:
+                raise HubError(HubReason.INVALID, f"the hub refuses to deliver: {status} {description}")
+
+
+def _next_subject(stream: str, consumer: str) -> str:
+    return f"$JS.API.CONSUMER.MSG.NEXT.{stream}.{consumer}"
+
+
+def delivery(session: Session, message: Message) -> Delivery:
+    """Reads what JetStream says of a message in its reply subject (ADR-15, with and without a domain).
+
+    Raises:
+        HubError: it says nothing that can be understood.
+    """
+    parts = message.reply.split(".")
+    first = 4 if len(parts) == 9 else 6
+    try:
+        numbers = [int(part) for part in parts[first : first + 5]]
+        deliveries, sequence, consumer_sequence, unix_ns, pending = numbers
+    except ValueError as error:
+        raise HubError(HubReason.INVALID, "a delivery has no place in its stream") from error
+    return Delivery(
+        subject=message.subject,
+        payload=message.payload,
+        headers=message.headers,
+        sequence=sequence,
+        consumer_sequence=consumer_sequence,
+        deliveries=deliveries,
+        unix_s=unix_ns / _NANOSECONDS,
+        pending=pending,
+        _session=session,
+        _reply=message.reply,
+    )

@@ -1,0 +1,430 @@
+"""One connection to one server of the hub: the only importer of the NATS library.
+
+It never reconnects and buffers nothing: when it is lost, everything that waits for it fails at once, and
+`fleet.connection` opens another one. What a hostile server may cost is bounded: the size of a message, of
+what waits to be read, and of the list of servers, to which it can add none.
+"""
+
+import asyncio
+import base64
+import json
+import ssl
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import nkeys
+from nats import errors as nats_errors
+from nats.aio.client import Client
+from nats.aio.msg import Msg
+from nats.protocol.parser import Parser
+
+from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
+
+CONNECT_TIMEOUT_S: Final = 5.0
+"""For one server: name resolution, TCP, TLS and authentication."""
+_PING_INTERVAL_S: Final = 4
+_PINGS_WITHOUT_ANSWER: Final = 2
+"""A connection without an answer for (2 + 1) x 4 s is lost: half-open TCP is found within 15 s."""
+_MAX_MESSAGE: Final = 4 * 1024 * 1024
+"""Longest message that is read, in bytes; the hub's max_payload is 1 MiB."""
+_MAX_WAITING: Final = 8 * 1024 * 1024
+"""Bytes that may wait in one subscription."""
+_MAX_WAITING_MESSAGES: Final = 4096
+_NO_RESPONDERS: Final = "503"
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message from the hub."""
+
+    subject: str
+    payload: bytes
+    headers: Mapping[str, str]
+    reply: str
+
+    @property
+    def status(self) -> str:
+        """JetStream's status code of a message without content, as "404"; empty for an ordinary one."""
+        return self.headers.get("Status", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Credentials:
+    """Contents of a .creds file: a user's JWT and the seed of its key."""
+
+    jwt: str
+    seed: bytes
+
+    @classmethod
+    def read(cls, path: Path) -> "Credentials":
+        """Parses a .creds file.
+
+        Raises:
+            RefusedError: it can't be read, or is none.
+        """
+        try:
+            lines = path.read_text(encoding="ascii").splitlines()
+            jwt = lines[lines.index("-----BEGIN NATS USER JWT-----") + 1]
+            seed = lines[lines.index("-----BEGIN USER NKEY SEED-----") + 1]
+        except OSError as error:
+            raise RefusedError(f"the credentials {path} can't be read: {error.strerror}") from error
+        except (ValueError, IndexError) as error:
+            raise RefusedError(
+                f"{path} contains no credentials: expected a file made by enrolling"
+            ) from error
+        return cls(jwt.strip(), seed.strip().encode())
+
+
+class _BoundedParser(Parser):
+    """Ends a connection whose server announces a message beyond any size that it may have."""
+
+    async def parse(self, data: bytes = b"") -> None:
+        await super().parse(data)
+        if len(self.buf) > _MAX_MESSAGE:
+            raise nats_errors.ProtocolError
+
+
+class _Client(Client):
+    """The library's client, with bounds on what a server can make it do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._ps = _BoundedParser(self)
+
+    async def _process_info(self, info: dict[str, Any], initial_connection: bool = False) -> None:
+        # Servers are those of the configuration, and TLS names with them.
+        info.pop("connect_urls", None)
+        await super()._process_info(info, initial_connection)
+
+    def encrypted(self) -> bool:
+        """Whether TLS is in use; asked before anything is said to the server."""
+        return bool(self._server_info.get("tls_required"))
+
+    def check(self, *, encrypted: bool) -> None:
+        """Checks that the connection is one as required.
+
+        Raises:
+            UnreachableError: it is not.
+        """
+        if not self.is_connected:
+            raise UnreachableError("it does not speak as a NATS server does")
+        if encrypted and not self.encrypted():
+            raise UnreachableError("it does not offer TLS")
+
+
+class Waiter:
+    """Where the replies to one request arrive."""
+
+    def __init__(self, subject: str) -> None:
+        self.subject = subject
+        self.replies: asyncio.Queue[Message | HubError] = asyncio.Queue()
+
+    def take(self, message: Message) -> None:
+        """Keeps a message until it is read; beyond the bound it is dropped."""
+        if self.replies.qsize() < _MAX_WAITING_MESSAGES:
+            self.replies.put_nowait(message)
+
+    async def get(self, timeout_s: float) -> Message:
+        """Returns the next one.
+
+        Raises:
+            HubError: there is none in time, or the connection is lost.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                reply = await self.replies.get()
+        except TimeoutError as error:
+            text = f"no answer from the hub within {timeout_s:g} s"
+            raise HubError(HubReason.TIMEOUT, text) from error
+        if isinstance(reply, HubError):
+            raise reply
+        return reply
+
+
+class Session:
+    """A connection that stands, until it is lost."""
+
+    def __init__(self, client: Client, server: str, inbox: str) -> None:
+        self._client = client
+        self.server = server
+        self._inbox = inbox
+        self._count = 0
+        self._waiters: dict[str, Waiter] = {}
+        self.lost: asyncio.Future[HubError] = asyncio.get_running_loop().create_future()
+        """Done when the connection is lost, with why."""
+
+    @classmethod
+    async def open(
+        cls, server: str, *, credentials: Path | None, ca: Path | None, inbox: str, name: str
+    ) -> "Session":
+        """Connects to a server.
+
+        Raises:
+            UnreachableError: it can't be reached, or is not who it has to be.
+            RefusedError: it does not accept the credentials.
+        """
+        client = _Client()
+        errors: list[Exception] = []
+        sessions: list[Session] = []
+
+        async def on_error(error: Exception) -> None:
+            errors[:] = [error]
+            for session in sessions:
+                session.note(error)
+
+        async def on_closed() -> None:
+            for session in sessions:
+                session.note_closed(client.last_error)
+
+        options: dict[str, Any] = {}
+        if ca is not None:
+            options["tls"] = _tls_context(ca)
+        if credentials is not None:
+            creds = Credentials.read(credentials)
+            options["user_jwt_cb"] = creds.jwt.encode
+            options["signature_cb"] = lambda nonce: _sign(client, creds, nonce, encrypted=ca is not None)
+        try:
+            async with asyncio.timeout(CONNECT_TIMEOUT_S):
+                await client.connect(
+                    servers=[server],
+                    name=name,
+                    error_cb=on_error,
+                    closed_cb=on_closed,
+                    allow_reconnect=False,
+                    # How often the library tries again in here; 0 would be for ever.
+                    max_reconnect_attempts=1,
+                    reconnect_time_wait=0,
+                    connect_timeout=CONNECT_TIMEOUT_S,  # type: ignore[arg-type]  # any number of seconds
+                    ping_interval=_PING_INTERVAL_S,
+                    max_outstanding_pings=_PINGS_WITHOUT_ANSWER,
+                    flush_timeout=CONNECT_TIMEOUT_S,
+                    **options,
+                )
+                client.check(encrypted=ca is not None)
+                session = cls(client, server, f"{inbox}.{client._nuid.next().decode()}")
+                sessions.append(session)
+                await client.subscribe(f"{session._inbox}.*", cb=session._on_reply, **_BOUNDS)
+                await client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
+        except (OSError, ValueError, nats_errors.Error, ssl.SSLError, HubError) as error:
+            await _close(client)
+            raise _connect_error(server, errors[-1] if errors else error) from error
+        except BaseException:
+            await _close(client)
+            raise
+        return session
+
+    async def close(self) -> None:
+        """Closes the connection; what waits for an answer fails."""
+        await _close(self._client)
+        self.note_closed(None)
+
+    async def publish(self, subject: str, payload: bytes) -> None:
+        """Hands a message to the connection, without an answer.
+
+        Raises:
+            UnreachableError, HubError: it can't be sent.
+        """
+        await self._publish(subject, payload, "", None)
+
+    async def request(
+        self, subject: str, payload: bytes, timeout_s: float, headers: dict[str, str] | None = None
+    ) -> Message:
+        """Sends a request and returns the first reply.
+
+        Raises:
+            HubError: there is none in time, or none can be.
+        """
+        with self.waiter(subject) as (waiter, reply):
+            await self._publish(subject, payload, reply, headers)
+            message = await waiter.get(timeout_s)
+        if message.status == _NO_RESPONDERS and not message.payload:
+            raise HubError(HubReason.NO_RESPONDERS, f"nothing at the hub takes {subject}")
+        return message
+
+    async def api(self, subject: str, request: Any, timeout_s: float) -> dict[str, Any]:
+        """Calls JetStream's API; an empty request is None.
+
+        Raises:
+            HubError: with JetStream's code.
+        """
+        payload = b"" if request is None else json.dumps(request).encode()
+        return parsed((await self.request(subject, payload, timeout_s)).payload)
+
+    async def send(self, subject: str, payload: bytes, reply: str) -> None:
+        """Sends a request whose replies go to a subject from `waiter`.
+
+        Raises:
+            UnreachableError, HubError: it can't be sent.
+        """
+        await self._publish(subject, payload, reply, None)
+
+    @contextmanager
+    def waiter(self, subject: str) -> Iterator[tuple[Waiter, str]]:
+        """Yields where the replies to a request on this subject arrive, and the subject that they go to."""
+        if self.lost.done():
+            raise self.lost.result()
+        self._count += 1
+        token = str(self._count)
+        self._waiters[token] = waiter = Waiter(subject)
+        try:
+            yield waiter, f"{self._inbox}.{token}"
+        finally:
+            del self._waiters[token]
+
+    @asynccontextmanager
+    async def channel(self, subject: str) -> AsyncIterator[tuple[Waiter, str]]:
+        """As `waiter`, for requests that a stream answers: messages of a stream keep their own subjects.
+
+        Raises:
+            UnreachableError: the connection is lost.
+        """
+        with self.waiter(subject) as (waiter, reply):
+
+            async def on_message(msg: Msg) -> None:
+                waiter.take(_message(msg))
+
+            inbox = reply.replace(".", ".s.", 1)
+            try:
+                subscription = await self._client.subscribe(inbox, cb=on_message, **_BOUNDS)
+            except nats_errors.Error as error:
+                raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
+            try:
+                yield waiter, inbox
+            finally:
+                if not self.lost.done() and self._client.is_connected:
+                    await subscription.unsubscribe()
+
+    async def subscribe(
+        self, subject: str, queue: str, callback: Callable[[Message], Awaitable[None]]
+    ) -> None:
+        """Subscribes for as long as the connection stands; what comes too fast is dropped."""
+
+        async def on_message(msg: Msg) -> None:
+            await callback(_message(msg))
+
+        try:
+            await self._client.subscribe(subject, queue=queue, cb=on_message, **_BOUNDS)
+        except nats_errors.Error as error:
+            raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
+
+    def note(self, error: Exception) -> None:
+        """Takes an error that the library reports beside the calls."""
+        text = _text(error)
+        if "permissions violation" not in text:
+            return
+        # The library makes it lower case.
+        for waiter in list(self._waiters.values()):
+            if f'"{waiter.subject.lower()}"' in text:
+                waiter.replies.put_nowait(RefusedError(f"the credentials do not permit {waiter.subject}"))
+
+    def note_closed(self, error: Exception | None) -> None:
+        """Takes the end of the connection."""
+        if self.lost.done():
+            return
+        reason = _connect_error(self.server, error or nats_errors.ConnectionClosedError())
+        self.lost.set_result(reason)
+        for waiter in self._waiters.values():
+            waiter.replies.put_nowait(reason)
+
+    async def _publish(
+        self, subject: str, payload: bytes, reply: str, headers: dict[str, str] | None
+    ) -> None:
+        if self.lost.done():
+            raise self.lost.result()
+        if not self._client.is_connected:
+            raise UnreachableError("the connection to the hub is lost")
+        try:
+            await self._client.publish(subject, payload, reply, headers)
+        except nats_errors.MaxPayloadError as error:
+            text = f"{len(payload)} bytes exceed the hub's limit for one message"
+            raise HubError(HubReason.TOO_LARGE, text) from error
+        except (nats_errors.BadSubjectError, nats_errors.BadHeaderError) as error:
+            raise HubError(HubReason.INVALID, f"'{subject[:100]}' is no subject") from error
+        except (OSError, nats_errors.Error) as error:
+            raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
+
+    async def _on_reply(self, msg: Msg) -> None:
+        waiter = self._waiters.get(msg.subject.rpartition(".")[2])
+        if waiter is not None:
+            waiter.take(_message(msg))
+
+
+_BOUNDS: Final[dict[str, Any]] = {
+    "pending_msgs_limit": _MAX_WAITING_MESSAGES,
+    "pending_bytes_limit": _MAX_WAITING,
+}
+
+
+def parsed(payload: bytes) -> dict[str, Any]:
+    """Parses an answer of JetStream.
+
+    Raises:
+        HubError: it is an error, or no JSON object.
+    """
+    try:
+        answer = json.loads(payload)
+    except ValueError as error:
+        raise HubError(HubReason.INVALID, "the hub's answer is no JSON") from error
+    if not isinstance(answer, dict):
+        raise HubError(HubReason.INVALID, "the hub's answer is no JSON object")
+    if "error" in answer:
+        raise api_error(answer["error"])
+    return answer
+
+
+def _sign(client: _Client, creds: Credentials, nonce: str, *, encrypted: bool) -> bytes:
+    """Signs the server's challenge.
+
+    Raises:
+        UnreachableError: TLS is required but not in use; who sits in between could pass the signature on.
+    """
+    if encrypted and not client.encrypted():
+        raise UnreachableError("the server does not offer TLS")
+    try:
+        return base64.b64encode(nkeys.from_seed(bytearray(creds.seed)).sign(nonce.encode()))
+    except Exception as error:  # the library's errors have no common base
+        raise RefusedError("the credentials have no valid seed") from error
+
+
+def _tls_context(ca: Path) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_verify_locations(ca)
+    except (OSError, ssl.SSLError) as error:
+        raise UnreachableError(f"the CA certificate {ca} can't be read: {error}") from error
+    return context
+
+
+def _message(msg: Msg) -> Message:
+    return Message(msg.subject, msg.data, msg.headers or {}, msg.reply)
+
+
+def _text(error: Exception) -> str:
+    return (str(error) or type(error).__name__).removeprefix("nats: ").strip("'").lower()
+
+
+_REFUSALS: Final = ("authorization violation", "authentication", "credentials", "account", "jwt")
+
+
+def _connect_error(server: str, error: Exception) -> HubError:
+    if isinstance(error, HubError):
+        return error
+    text = _text(error)
+    if any(word in text for word in _REFUSALS) or isinstance(error, nats_errors.AuthorizationError):
+        return RefusedError(
+            f"{server} does not accept the credentials ({text}): revoked, expired, or not of this hub"
+        )
+    return UnreachableError(f"{server} can't be reached: {text}")
+
+
+async def _close(client: Client) -> None:
+    try:
+        async with asyncio.timeout(CONNECT_TIMEOUT_S):
+            await client.close()
+    except (TimeoutError, OSError, nats_errors.Error):
+        # It is gone in any case.
+        return

@@ -1,0 +1,127 @@
+"""The hub's streams and buckets: one table, and how it is made so."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from fleet import names
+from fleet.connection import Hub
+from fleet.errors import HubError, HubReason
+
+_DAY_NS: Final = 86_400 * 1_000_000_000
+_MIB: Final = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class StreamLimits:
+    """What the streams may take. Defaults suit a hundred robots on one disk of 32 GB.
+
+    Attributes:
+        events_bytes: of events; when it is reached, robots keep theirs until older ones have expired.
+        events_days: how long events and results are kept.
+    """
+
+    events_bytes: int = 8192 * _MIB
+    events_days: int = 30
+
+
+def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict[str, dict[str, Any]]:
+    """Returns the configuration of every stream, by name, in the form of JetStream's API.
+
+    Args:
+        replicas: nodes that keep each message: 1, or 3 in a cluster.
+        limits: what they may take.
+    """
+    once = {"max_msgs_per_subject": 1, "discard": "new", "discard_new_per_subject": True}
+    days = limits.events_days * _DAY_NS
+    streams = {
+        names.EVENTS: _stream(names.EVENT_SUBJECTS, limits.events_bytes, days, once),
+        names.RESULTS: _stream(names.RESULT_SUBJECTS, 256 * _MIB, days, once),
+        # A command expires after a day at the latest.
+        names.COMMANDS: _stream(names.COMMAND_SUBJECTS, 64 * _MIB, 2 * _DAY_NS, once),
+        f"KV_{names.STATES}": _bucket(names.STATES, 256 * _MIB),
+        f"KV_{names.RECORDINGS}": _bucket(names.RECORDINGS, 1024 * _MIB),
+        f"KV_{names.ROBOTS}": _bucket(names.ROBOTS, 64 * _MIB),
+    }
+    return {name: {"name": name, "num_replicas": replicas, **config} for name, config in streams.items()}
+
+
+async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits()) -> list[str]:
+    """Makes the streams and buckets that are missing; changes none that exists.
+
+    Returns:
+        What differs in existing ones, as "fleet_events: max_bytes is 1, expected 2".
+
+    Raises:
+        HubError: the hub does not do it.
+    """
+    differences: list[str] = []
+    for name, config in stream_configs(replicas, limits).items():
+        try:
+            info = await hub.api(f"STREAM.INFO.{name}")
+        except HubError as error:
+            if error.reason is not HubReason.MISSING:
+                raise
+            await hub.api(f"STREAM.CREATE.{name}", config)
+        else:
+            differences += _differences(name, config, info.get("config", {}))
+    return differences
+
+
+async def add_command_consumer(hub: Hub, robot: str) -> None:
+    """Makes the durable consumer through which a robot reads its commands, if it does not exist.
+
+    Raises:
+        HubError: the hub does not do it.
+    """
+    subjects = names.command_subject(robot, "*")
+    config = {
+        "durable_name": robot,
+        "name": robot,
+        "filter_subject": subjects,
+        "ack_policy": "explicit",
+        "deliver_policy": "all",
+        "ack_wait": 60 * 1_000_000_000,
+        "max_ack_pending": 16,
+    }
+    call = f"CONSUMER.CREATE.{names.COMMANDS}.{robot}.{subjects}"
+    await hub.api(call, {"stream_name": names.COMMANDS, "config": config})
+
+
+def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "subjects": [subjects],
+        "retention": "limits",
+        "storage": "file",
+        "max_bytes": max_bytes,
+        "max_age": max_age_ns,
+        "max_msg_size": 512 * 1024,
+        # Repeats are recognised by their subject, without a window of time.
+        "duplicate_window": 1_000_000_000,
+        "deny_delete": True,
+        **more,
+    }
+
+
+def _bucket(name: str, max_bytes: int) -> dict[str, Any]:
+    """A key-value bucket, as the clients of NATS define it (ADR-8)."""
+    return {
+        "subjects": [f"$KV.{name}.>"],
+        "retention": "limits",
+        "storage": "file",
+        "max_msgs_per_subject": 1,
+        "max_bytes": max_bytes,
+        "max_msg_size": 512 * 1024,
+        "discard": "new",
+        "allow_rollup_hdrs": True,
+        "deny_delete": True,
+        "duplicate_window": 1_000_000_000,
+    }
+
+
+def _differences(name: str, expected: Mapping[str, Any], actual: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{name}: {key} is {actual.get(key)}, expected {value}"
+        for key, value in expected.items()
+        if actual.get(key) != value
+    ]
