@@ -1,4 +1,4 @@
-"""The hub's clock, by which ages are computed: neither the robots' clocks nor this computer's have to be right."""
+"""The hub's clock, by which ages are computed: neither the robots' nor this computer's have to be right."""
 
 import secrets
 import time
@@ -35,8 +35,8 @@ class HubClock:
 async def read_clock(hub: Hub, monotonic: Callable[[], float] = time.monotonic) -> HubClock:
     """Reads the hub's clock, within the time of one answer.
 
-    No call of JetStream's API is for that in all releases from 2.9 on. But the hub says when it has made a consumer:
-    one that delivers nothing, and that it forgets by itself.
+    No call of JetStream's API is for that in all releases from 2.9 on. But the hub says when it has made a
+    consumer: one that delivers nothing, and that it forgets by itself.
 
     Raises:
         HubError: The hub does not answer, or has not been set up.

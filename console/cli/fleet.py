@@ -13,7 +13,7 @@ import typer
 
 from common.errors import ExitCode, UserError
 from console.cli.fleet_events import events
-from console.cli.fleet_session import FleetSession, HubUnreachable, with_fleet
+from console.cli.fleet_session import FleetSession, HubUnreachableError, with_fleet
 from console.cli.fleet_tables import answer_line, fleet_view, recordings_table
 from console.cli.fleet_watch import fleet_json, watch
 from console.cli.login import STANDARD_INPUT, login_text
@@ -40,7 +40,7 @@ fleet_app.command("events")(events)
 
 _REACHED_WITHIN_S: Final = 3.0
 _MOST_EXPIRY_S: Final = 86_400
-_ANSWER_AFTER_EXPIRY_S: Final = 10.0
+ANSWER_AFTER_EXPIRY_S: Final = 10.0
 """A command that was begun in time may take so long to be answered."""
 RobotArgument = Annotated[str, typer.Argument(metavar="ROBOT", help="Its name in the fleet.")]
 
@@ -79,7 +79,9 @@ def command(
     recording_id: Annotated[
         str, typer.Argument(metavar="[ID]", help="Of upload: the recording.", show_default=False)
     ] = "",
-    label: Annotated[str, typer.Option("--label", metavar="TEXT", help="Of snapshot: a name for people.")] = "",
+    label: Annotated[
+        str, typer.Option("--label", metavar="TEXT", help="Of snapshot: a name for people.")
+    ] = "",
     before: Annotated[
         int | None,
         typer.Option("--before", metavar="SECONDS", min=0, max=3600, help="Of snapshot: seconds until now."),
@@ -110,7 +112,9 @@ def command(
         else snapshot_command(pre_s=before, post_s=after, label=label)
     )
     answered = asyncio.run(_command(session, robot, wanted, expires_s))
-    session.show({"ok": answered.outcome is CommandOutcome.DONE, **json_form(answered)}, answer_line(answered))
+    session.show(
+        {"ok": answered.outcome is CommandOutcome.DONE, **json_form(answered)}, answer_line(answered)
+    )
     if answered.outcome is not CommandOutcome.DONE:
         raise typer.Exit(int(ExitCode.FAILED))
 
@@ -192,12 +196,12 @@ async def _command(session: FleetSession, robot: str, wanted: "Command", expires
         issued_by = session.login.name or f"{getpass.getuser()}@{socket.gethostname()}"
         command_id = await send_command(hub, clock, robot, wanted, issued_by=issued_by, expires_s=expires_s)
         with suppress(TimeoutError):
-            async with asyncio.timeout(expires_s + _ANSWER_AFTER_EXPIRY_S):
+            async with asyncio.timeout(expires_s + ANSWER_AFTER_EXPIRY_S):
                 found = await answer(hub, robot, command_id)
                 if isinstance(found, Unreadable):
                     raise UserError(f"the answer of {robot} is unreadable: {found.problem}")
                 return found
-    raise HubUnreachable(
+    raise HubUnreachableError(
         f"{robot} has not answered the command before it expired",
         "It was not begun: a robot that is away refuses it when it is back",
         exit_code=ExitCode.UNREACHABLE,
@@ -238,8 +242,8 @@ def _require_reachable(robot: str, target: str) -> None:
     try:
         socket.create_connection((host.strip("[]"), int(port)), _REACHED_WITHIN_S).close()
     except OSError as error:
-        raise HubUnreachable(
+        raise HubUnreachableError(
             f"the gateway of {robot} can't be reached from here at {target}: {error.strerror or error}",
-            "The fleet's hub passes on no connections: use a network that has a way to the robot, its VPN for example",
+            "The hub passes on no connections: use a network that has a way to the robot, a VPN for example",
             exit_code=ExitCode.UNREACHABLE,
         ) from error

@@ -2,7 +2,6 @@
 
 import asyncio
 import re
-from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from typing import Annotated, Final, Literal
 
@@ -34,7 +33,9 @@ def events(
     ] = False,
     since: Annotated[
         str,
-        typer.Option("--since", metavar="TIME", help="30m, 6h or 2d ago, or a time in UTC: 2026-11-22T09:30."),
+        typer.Option(
+            "--since", metavar="TIME", help="30m, 6h or 2d ago, or a time in UTC: 2026-11-22T09:30."
+        ),
     ] = "1d",
     severity: Annotated[
         Literal["info", "warning", "error"],
@@ -115,12 +116,8 @@ async def _events(
 
 def item_json(item: FleetItem) -> dict[str, object]:
     """Returns the JSON form of an item: of its three keys one is not null."""
-    kinds: Iterable[tuple[str, type]] = (
-        ("event", RobotEvent),
-        ("gap", EventsDropped),
-        ("unreadable", Unreadable),
-    )
-    return {name: json_form(item) if isinstance(item, kind) else None for name, kind in kinds}
+    kinds = {"event": RobotEvent, "gap": EventsDropped, "unreadable": Unreadable}
+    return {name: json_form(item) if isinstance(item, kind) else None for name, kind in kinds.items()}
 
 
 def _show(session: FleetSession, item: FleetItem) -> None:

@@ -46,13 +46,13 @@ HubOption: TypeAlias = Annotated[
 ]
 
 
-class HubUnreachable(UserError):
+class HubUnreachableError(UserError):
     """The hub does not answer."""
 
     kind: ClassVar[str] = "unreachable"
 
 
-class HubRefusal(UserError):
+class HubRefusalError(UserError):
     """The hub answers, and does not do what was requested."""
 
     kind: ClassVar[str] = "hub-refused"
@@ -87,11 +87,15 @@ class FleetSession:
         address = FleetAddress(login.servers, login.credentials_file, login.ca_file, name="robotctl")
         try:
             async with connect(address) as hub:
-                await hub.connected(ANSWERS_WITHIN_S)
+                # A hub whose servers have all been tried once is not waited for.
+                await hub.changed.wait_until(
+                    lambda: hub.link.connected or hub.link.reason is not None, ANSWERS_WITHIN_S
+                )
+                await hub.connected(0)
                 yield hub
         except HubError as error:
-            kind = HubUnreachable if error.reason.value in _UNREACHABLE else HubRefusal
-            code = ExitCode.UNREACHABLE if kind is HubUnreachable else ExitCode.FAILED
+            kind = HubUnreachableError if error.reason.value in _UNREACHABLE else HubRefusalError
+            code = ExitCode.UNREACHABLE if kind is HubUnreachableError else ExitCode.FAILED
             raise kind(str(error), _REMEDIES.get(error.reason.value, ""), exit_code=code) from error
 
     def show(self, document: Mapping[str, Any], view: RenderableType) -> None:
@@ -128,4 +132,6 @@ def _require_nats() -> None:
     except ModuleNotFoundError as error:
         if error.name not in ("nats", "nkeys"):
             raise
-        raise UserError(f"the fleet needs the package {error.name}, which is not installed", _INSTALL) from error
+        raise UserError(
+            f"the fleet needs the package {error.name}, which is not installed", _INSTALL
+        ) from error

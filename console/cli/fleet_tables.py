@@ -66,7 +66,11 @@ def rows_table(rows: tuple[FleetRow, ...], width: int) -> Table:
 def fleet_view(rows: tuple[FleetRow, ...], width: int) -> RenderableType:
     """Returns the whole fleet above its summary."""
     line = Text(summary_line(summary(rows)), style="dim")
-    return Group(rows_table(rows, width), Text(), line) if rows else Text("No robot is enrolled yet.", style="dim")
+    return (
+        Group(rows_table(rows, width), Text(), line)
+        if rows
+        else Text("No robot is enrolled yet.", style="dim")
+    )
 
 
 def item_line(item: FleetItem) -> Text:
@@ -122,7 +126,11 @@ def answer_line(answer: CommandAnswer) -> Text:
 
 
 def _missing(item: EventsDropped) -> str:
-    worst = "" if item.worst_severity is FaultSeverity.UNKNOWN else f", the worst of severity {item.worst_severity.value}"
+    worst = (
+        ""
+        if item.worst_severity is FaultSeverity.UNKNOWN
+        else f", the worst of severity {item.worst_severity.value}"
+    )
     earlier = "; of an earlier run, too, an unknown number" if item.earlier_run_incomplete else ""
     return f"{plural(item.count, 'event')} missing{worst}: {_DROP_REASONS[item.reason]}{earlier}"
 

@@ -35,7 +35,9 @@ def watch(
     *,
     interval_s: Annotated[
         float,
-        typer.Option("--interval", min=0.25, max=3600, metavar="SECONDS", help="Shortest time between updates."),
+        typer.Option(
+            "--interval", min=0.25, max=3600, metavar="SECONDS", help="Shortest time between updates."
+        ),
     ] = 1.0,
     count: Annotated[
         int | None,

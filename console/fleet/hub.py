@@ -46,7 +46,7 @@ async def read_recordings(
     Raises:
         HubError: The hub does not answer.
     """
-    found = []
+    found: list[StoredRecording | Unreadable] = []
     for key, entry in sorted((await hub.entries(names.RECORDINGS)).items()):
         read = recording_of(key, entry.value)
         if isinstance(read, Unreadable):

@@ -176,5 +176,7 @@ def _not_a_login(why: str) -> UserError:
 
 def _wrong_file(path: Path, why: str) -> UserError:
     return UserError(
-        f"{path}: {why}", "Store the login again: robotctl fleet login FILE --replace", exit_code=ExitCode.USAGE
+        f"{path}: {why}",
+        "Store the login again: robotctl fleet login FILE --replace",
+        exit_code=ExitCode.USAGE,
     )

@@ -8,6 +8,7 @@ from console.client.mapping.events import event
 from console.client.mapping.reader import read
 from console.fleet import values
 from console.printable import printable
+from fleet.enrolment import is_revoked
 from fleet.reading import (
     NotReadableError,
     command_result,
@@ -124,3 +125,14 @@ def _dropped(batch: event_pb2.EventBatch, message: event_pb2.DroppedEvents) -> v
 
 def _unreadable(robot: str, error: NotReadableError) -> values.Unreadable:
     return values.Unreadable(robot=printable(robot), problem=str(error))
+
+
+def enrolment_of(key: str, payload: bytes, since_unix_ms: int) -> values.Enrolment:
+    """Returns an entry of the bucket of enrolled robots, which the hub's administration writes.
+
+    Args:
+        key: The robot.
+        payload: The entry.
+        since_unix_ms: When it was written, by the hub's clock: at its enrolment, or its revocation.
+    """
+    return values.Enrolment(printable(key), is_revoked(payload), since_unix_ms)
