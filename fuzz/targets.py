@@ -15,6 +15,7 @@ from google.protobuf.message import DecodeError, Message
 
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
+from common.metrics_endpoint import respond
 from common.request_id import begin, current
 from common.trial import TrialError, parse_result
 from console.capture_time import WRAP_TICKS
@@ -33,7 +34,6 @@ from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings
 from gateway.links.preview.wire import from_wire
 from gateway.links.watch import LinkLostError
-from gateway.metrics.endpoint import respond
 from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation

@@ -11,11 +11,11 @@ import grpc
 
 from common.advertisement import Advertisement
 from common.findings import Verdict
+from common.metrics_endpoint import serving_metrics
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
 from gateway.links.preview.control import PreviewLink
 from gateway.links.preview.exposure import video_exposure
-from gateway.metrics.endpoint import serving_metrics
 from gateway.platform.advertising import advertise
 from gateway.rpc.server import SERVICE, serving
 from gateway.status.preview import Listener

@@ -422,7 +422,7 @@ def test_the_table_is_redrawn_in_place(hub: FleetHub) -> None:
 
 def test_a_pipe_gets_a_line_for_each_robot_that_has_changed(hub: FleetHub) -> None:
     hub.enroll("lab1", "lab2")
-    command = [ROBOTCTL, "fleet", "watch", "--interval", "0.25", "--hub", hub.urls]
+    command = [str(ROBOTCTL), "fleet", "watch", "--interval", "0.25", "--hub", hub.urls]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment()) as process:
         try:
             assert process.stdout

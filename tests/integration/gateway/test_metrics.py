@@ -11,7 +11,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.errors import UserError
-from gateway.metrics.endpoint import serving_metrics
+from common.metrics_endpoint import serving_metrics
 from omniseer.gateway.v1.robot_gateway_pb2 import WatchSystemStatusRequest
 from tests.support.eventually import eventually
 from tests.support.free import free_tcp_port

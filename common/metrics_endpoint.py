@@ -1,4 +1,4 @@
-"""Serves the metrics over plain HTTP on the gateway's event loop.
+"""Serves the metrics over plain HTTP on a program's event loop.
 
 The server of prometheus_client gives every connection a thread and unlimited time; this one bounds both.
 """
