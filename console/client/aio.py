@@ -11,7 +11,7 @@ from console.client.clock import Clock, Offset
 from console.client.driving import DriveOptions, DriveSession
 from console.client.errors import DeadlineExceeded, Unreachable
 from console.client.event_feed import EventFeed
-from console.client.exporting import Export, ExportedRecording, ExportOptions
+from console.client.exporting import Export, ExportedRecording, ExportOptions, file_bytes
 from console.client.mapping import recording
 from console.client.mapping.driving import (
     enabled_request,
@@ -381,6 +381,25 @@ class AsyncGatewayClient:
         """
         found = await self.recording(recording_id)
         return await Export(self._transport, found, folder, options or ExportOptions()).run()
+
+    def read_recording(
+        self, recording_id: str, file: results.RecordingFile, offset: int = 0
+    ) -> AsyncGenerator[bytes]:
+        """Yields the bytes of one final file of a recording, in chunks of at most 256 KiB.
+
+        Over one connection: after a cut, the caller goes on at the offset that it has reached. Each chunk is
+        checked against its CRC-32C, and `file.sha256` makes sure that it is still the same file. Closing the
+        iterator ends the stream on the robot.
+
+        Args:
+            recording_id: Which.
+            file: One of `Recording.files`.
+            offset: Where to begin, in bytes.
+
+        Raises:
+            GatewayError: The connection is cut or silent for 30 s, a chunk is damaged, or the robot refuses.
+        """
+        return file_bytes(self._transport, recording_id, file, offset)
 
     async def _call_recording(self, method: Method[ResultT], request: bytes) -> ResultT:
         return await self._calls.call(method, request, self._options.recording_within_s)

@@ -150,6 +150,7 @@ class GatewayClient:
     delete_recording = _blocking(AsyncGatewayClient.delete_recording)
     export_recording = _blocking(AsyncGatewayClient.export_recording)
     recordings = _iterating(AsyncGatewayClient.recordings)
+    read_recording = _iterating(AsyncGatewayClient.read_recording)
     watch_status = _iterating(AsyncGatewayClient.watch_status)
     events = _iterating(AsyncGatewayClient.events)
 

@@ -18,7 +18,8 @@ import asyncio
 import hashlib
 import os
 import time
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
+from contextlib import aclosing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Final, Protocol
@@ -269,26 +270,18 @@ class Export:
                 await self._transport.sleep(pause_s)
 
     async def _receive_once(self, partial: _Partial, file: RecordingFile, number: int) -> None:
-        request = export_request(
+        chunks = file_bytes(
+            self._transport,
             self._recording.id,
-            file.name,
-            offset=partial.size,
-            expected_sha256=file.sha256,
+            file,
+            partial.size,
             max_bytes_per_s=self._options.max_bytes_per_s,
         )
-        stream = self._transport.pull(EXPORT_RECORDING, request)
-        try:
-            header = await stream.read(SILENT_S)
-            if not isinstance(header, ExportHeader) or header.size != file.size:
-                raise GatewayFailed(f"the robot sent no valid header for {file.name}")
-            while partial.size < file.size:
-                chunk = await stream.read(SILENT_S)
-                data = _checked(chunk, partial.size, file)
+        async with aclosing(chunks):
+            async for data in chunks:
                 self._received += len(data)
                 partial.append(data)
                 self._report(file, number, partial.size)
-        finally:
-            stream.cancel()
 
     def _report(self, file: RecordingFile, number: int, size: int, waiting: str = "") -> None:
         self._options.progress(
@@ -302,6 +295,43 @@ class Export:
                 waiting,
             )
         )
+
+
+async def file_bytes(
+    transport: ExportTransport,
+    recording_id: str,
+    file: RecordingFile,
+    offset: int = 0,
+    *,
+    max_bytes_per_s: int = 0,
+) -> AsyncGenerator[bytes]:
+    """Yields the bytes of a file, each checked against its CRC-32C, over one connection.
+
+    Args:
+        transport: Carries the stream out.
+        recording_id: Of the file's recording.
+        file: As the robot has listed it.
+        offset: Where to begin.
+        max_bytes_per_s: 0: as configured on the robot.
+
+    Raises:
+        GatewayError: The connection is cut or silent for SILENT_S, a chunk is damaged, or the robot refuses.
+    """
+    request = export_request(
+        recording_id, file.name, offset=offset, expected_sha256=file.sha256, max_bytes_per_s=max_bytes_per_s
+    )
+    stream = transport.pull(EXPORT_RECORDING, request)
+    try:
+        header = await stream.read(SILENT_S)
+        if not isinstance(header, ExportHeader) or header.size != file.size:
+            raise GatewayFailed(f"the robot sent no valid header for {file.name}")
+        while offset < file.size:
+            chunk = await stream.read(SILENT_S)
+            data = _checked(chunk, offset, file)
+            offset += len(data)
+            yield data
+    finally:
+        stream.cancel()
 
 
 def _checked(chunk: Any, expected_offset: int, file: RecordingFile) -> bytes:

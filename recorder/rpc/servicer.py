@@ -13,6 +13,7 @@ from common.errors import (
     NotFoundError,
     PreconditionError,
 )
+from common.pace import Pace
 from common.reasons import Reason
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
@@ -21,7 +22,7 @@ from recorder.config import RecorderSettings
 from recorder.recorder import Recorder
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
-from recorder.store.export import Content, Pace, UnreadableError, chunks
+from recorder.store.export import Content, UnreadableError, chunks
 from recorder.store.manifest import Manifest
 from recorder.store.run_bundles import Bundle, RunBundles
 from recorder.thumbnail import find_thumbnail

@@ -11,6 +11,8 @@ from typing import Any, Final
 
 import google_crc32c
 
+from common.pace import Pace
+
 CHUNK_BYTES: Final = 256 * 1024
 _BLOCK_CHUNKS: Final = 4
 """What one hand-over to a thread reads: each costs some 0.1 ms."""
@@ -38,26 +40,6 @@ class Chunk:
     offset: int
     data: bytes
     crc32c: int
-
-
-class Pace:
-    """Limits a rate of bytes: a token bucket without burst, by virtual scheduling (ITU-T I.371). Pure.
-
-    Args:
-        bytes_per_s: the limit; 0 for none.
-    """
-
-    def __init__(self, bytes_per_s: int) -> None:
-        self.bytes_per_s = bytes_per_s
-        self._due_s = 0.0
-
-    def delay_s(self, now_s: float, size: int) -> float:
-        """Returns how long to wait before so many bytes may leave, and counts them."""
-        if not self.bytes_per_s:
-            return 0.0
-        due_s = max(self._due_s, now_s)
-        self._due_s = due_s + size / self.bytes_per_s
-        return due_s - now_s
 
 
 async def chunks(

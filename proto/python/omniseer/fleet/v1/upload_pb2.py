@@ -25,15 +25,15 @@ _sym_db = _symbol_database.Default()
 from omniseer.gateway.v1 import recording_pb2 as omniseer_dot_gateway_dot_v1_dot_recording__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eomniseer/fleet/v1/upload.proto\x12\x11omniseer.fleet.v1\x1a#omniseer/gateway/v1/recording.proto\"\x87\x01\n\x0bUploadBrief\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\r\n\x05label\x18\x02 \x01(\t\x12\x30\n\x04\x63opy\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x0c\n\x04size\x18\x04 \x01(\x04\x12\x13\n\x0b\x62ytes_per_s\x18\x05 \x01(\x04\"G\n\x12\x42\x65ginUploadRequest\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\"H\n\x13\x42\x65ginUploadResponse\x12\x31\n\x07receipt\x18\x01 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"Z\n\x10\x42\x65ginFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x66ile\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingFile\"\x94\x01\n\x11\x42\x65ginFileResponse\x12\x11\n\tupload_id\x18\x01 \x01(\t\x12\x11\n\tpart_size\x18\x02 \x01(\x04\x12&\n\x05parts\x18\x03 \x03(\x0b\x32\x17.omniseer.fleet.v1.Part\x12\x31\n\x07receipt\x18\x04 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"$\n\x04Part\x12\x0e\n\x06number\x18\x01 \x01(\r\x12\x0c\n\x04\x65tag\x18\x02 \x01(\t\"^\n\x0fGetPartsRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x11\n\tfile_name\x18\x02 \x01(\t\x12\x11\n\tupload_id\x18\x03 \x01(\t\x12\x0f\n\x07numbers\x18\x04 \x03(\r\"<\n\x10GetPartsResponse\x12(\n\x04urls\x18\x01 \x03(\x0b\x32\x1a.omniseer.fleet.v1.PartUrl\"<\n\x07PartUrl\x12\x0e\n\x06number\x18\x01 \x01(\r\x12\x0b\n\x03url\x18\x02 \x01(\t\x12\x14\n\x0c\x65xpires_in_s\x18\x03 \x01(\r\"y\n\x13\x43ompleteFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x11\n\tfile_name\x18\x02 \x01(\t\x12\x11\n\tupload_id\x18\x03 \x01(\t\x12&\n\x05parts\x18\x04 \x03(\x0b\x32\x17.omniseer.fleet.v1.Part\"\x16\n\x14\x43ompleteFileResponse\"[\n\x11VerifyFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x66ile\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingFile\"[\n\x12VerifyFileResponse\x12\x12\n\nbytes_done\x18\x01 \x01(\x04\x12\x31\n\x07receipt\x18\x02 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"^\n\x15\x43ompleteUploadRequest\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x12\n\nfile_names\x18\x02 \x03(\t\"K\n\x16\x43ompleteUploadResponse\x12\x31\n\x07receipt\x18\x01 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"P\n\x0bUploadError\x12\x30\n\x04\x63ode\x18\x01 \x01(\x0e\x32\".omniseer.fleet.v1.UploadErrorCode\x12\x0f\n\x07message\x18\x02 \x01(\t\"\xc9\x03\n\x0eUploadResponse\x12/\n\x05\x65rror\x18\x01 \x01(\x0b\x32\x1e.omniseer.fleet.v1.UploadErrorH\x00\x12>\n\x0c\x62\x65gin_upload\x18\x02 \x01(\x0b\x32&.omniseer.fleet.v1.BeginUploadResponseH\x00\x12:\n\nbegin_file\x18\x03 \x01(\x0b\x32$.omniseer.fleet.v1.BeginFileResponseH\x00\x12\x38\n\tget_parts\x18\x04 \x01(\x0b\x32#.omniseer.fleet.v1.GetPartsResponseH\x00\x12@\n\rcomplete_file\x18\x05 \x01(\x0b\x32\'.omniseer.fleet.v1.CompleteFileResponseH\x00\x12<\n\x0bverify_file\x18\x06 \x01(\x0b\x32%.omniseer.fleet.v1.VerifyFileResponseH\x00\x12\x44\n\x0f\x63omplete_upload\x18\x07 \x01(\x0b\x32).omniseer.fleet.v1.CompleteUploadResponseH\x00\x42\n\n\x08response\"\x9a\x01\n\x07Receipt\x12\r\n\x05\x66leet\x18\x01 \x01(\t\x12\r\n\x05robot\x18\x02 \x01(\t\x12\x14\n\x0crecording_id\x18\x03 \x01(\t\x12\x11\n\tfile_name\x18\x04 \x01(\t\x12\x0c\n\x04size\x18\x05 \x01(\x04\x12\x0e\n\x06sha256\x18\x06 \x01(\x0c\x12\x18\n\x10verified_unix_ms\x18\x07 \x01(\x04\x12\x10\n\x08location\x18\x08 \x01(\t\"C\n\rSignedReceipt\x12\x0f\n\x07receipt\x18\x01 \x01(\x0c\x12\x11\n\tsignature\x18\x02 \x01(\x0c\x12\x0e\n\x06key_id\x18\x03 \x01(\x0c\"\xaa\x01\n\x0fStoredRecording\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x31\n\x07receipt\x18\x02 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\x12\x31\n\x05\x66iles\x18\x03 \x03(\x0b\x32\".omniseer.gateway.v1.RecordingFile*\x9a\x02\n\x0fUploadErrorCode\x12!\n\x1dUPLOAD_ERROR_CODE_UNSPECIFIED\x10\x00\x12\x1d\n\x19UPLOAD_ERROR_CODE_INVALID\x10\x01\x12$\n UPLOAD_ERROR_CODE_NO_SUCH_UPLOAD\x10\x02\x12#\n\x1fUPLOAD_ERROR_CODE_WRONG_CONTENT\x10\x03\x12\x1d\n\x19UPLOAD_ERROR_CODE_NO_ROOM\x10\x04\x12\x1b\n\x17UPLOAD_ERROR_CODE_STORE\x10\x05\x12\"\n\x1eUPLOAD_ERROR_CODE_NOT_VERIFIED\x10\x06\x12\x1a\n\x16UPLOAD_ERROR_CODE_BUSY\x10\x07\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eomniseer/fleet/v1/upload.proto\x12\x11omniseer.fleet.v1\x1a#omniseer/gateway/v1/recording.proto\"\x87\x01\n\x0bUploadBrief\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\r\n\x05label\x18\x02 \x01(\t\x12\x30\n\x04\x63opy\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy\x12\x0c\n\x04size\x18\x04 \x01(\x04\x12\x13\n\x0b\x62ytes_per_s\x18\x05 \x01(\x04\"G\n\x12\x42\x65ginUploadRequest\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\"H\n\x13\x42\x65ginUploadResponse\x12\x31\n\x07receipt\x18\x01 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"Z\n\x10\x42\x65ginFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x66ile\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingFile\"\x94\x01\n\x11\x42\x65ginFileResponse\x12\x11\n\tupload_id\x18\x01 \x01(\t\x12\x11\n\tpart_size\x18\x02 \x01(\x04\x12&\n\x05parts\x18\x03 \x03(\x0b\x32\x17.omniseer.fleet.v1.Part\x12\x31\n\x07receipt\x18\x04 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"$\n\x04Part\x12\x0e\n\x06number\x18\x01 \x01(\r\x12\x0c\n\x04\x65tag\x18\x02 \x01(\t\"q\n\x0fGetPartsRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x11\n\tfile_name\x18\x02 \x01(\t\x12\x11\n\tupload_id\x18\x03 \x01(\t\x12\x0f\n\x07numbers\x18\x04 \x03(\r\x12\x11\n\tfile_size\x18\x05 \x01(\x04\"<\n\x10GetPartsResponse\x12(\n\x04urls\x18\x01 \x03(\x0b\x32\x1a.omniseer.fleet.v1.PartUrl\"<\n\x07PartUrl\x12\x0e\n\x06number\x18\x01 \x01(\r\x12\x0b\n\x03url\x18\x02 \x01(\t\x12\x14\n\x0c\x65xpires_in_s\x18\x03 \x01(\r\"y\n\x13\x43ompleteFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x11\n\tfile_name\x18\x02 \x01(\t\x12\x11\n\tupload_id\x18\x03 \x01(\t\x12&\n\x05parts\x18\x04 \x03(\x0b\x32\x17.omniseer.fleet.v1.Part\"\x16\n\x14\x43ompleteFileResponse\"[\n\x11VerifyFileRequest\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\x30\n\x04\x66ile\x18\x02 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingFile\"[\n\x12VerifyFileResponse\x12\x12\n\nbytes_done\x18\x01 \x01(\x04\x12\x31\n\x07receipt\x18\x02 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\"^\n\x15\x43ompleteUploadRequest\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x12\n\nfile_names\x18\x02 \x03(\t\"_\n\x16\x43ompleteUploadResponse\x12\x31\n\x07receipt\x18\x01 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\x12\x12\n\nfiles_done\x18\x02 \x01(\r\"P\n\x0bUploadError\x12\x30\n\x04\x63ode\x18\x01 \x01(\x0e\x32\".omniseer.fleet.v1.UploadErrorCode\x12\x0f\n\x07message\x18\x02 \x01(\t\"\xc9\x03\n\x0eUploadResponse\x12/\n\x05\x65rror\x18\x01 \x01(\x0b\x32\x1e.omniseer.fleet.v1.UploadErrorH\x00\x12>\n\x0c\x62\x65gin_upload\x18\x02 \x01(\x0b\x32&.omniseer.fleet.v1.BeginUploadResponseH\x00\x12:\n\nbegin_file\x18\x03 \x01(\x0b\x32$.omniseer.fleet.v1.BeginFileResponseH\x00\x12\x38\n\tget_parts\x18\x04 \x01(\x0b\x32#.omniseer.fleet.v1.GetPartsResponseH\x00\x12@\n\rcomplete_file\x18\x05 \x01(\x0b\x32\'.omniseer.fleet.v1.CompleteFileResponseH\x00\x12<\n\x0bverify_file\x18\x06 \x01(\x0b\x32%.omniseer.fleet.v1.VerifyFileResponseH\x00\x12\x44\n\x0f\x63omplete_upload\x18\x07 \x01(\x0b\x32).omniseer.fleet.v1.CompleteUploadResponseH\x00\x42\n\n\x08response\"\x9a\x01\n\x07Receipt\x12\r\n\x05\x66leet\x18\x01 \x01(\t\x12\r\n\x05robot\x18\x02 \x01(\t\x12\x14\n\x0crecording_id\x18\x03 \x01(\t\x12\x11\n\tfile_name\x18\x04 \x01(\t\x12\x0c\n\x04size\x18\x05 \x01(\x04\x12\x0e\n\x06sha256\x18\x06 \x01(\x0c\x12\x18\n\x10verified_unix_ms\x18\x07 \x01(\x04\x12\x10\n\x08location\x18\x08 \x01(\t\"C\n\rSignedReceipt\x12\x0f\n\x07receipt\x18\x01 \x01(\x0c\x12\x11\n\tsignature\x18\x02 \x01(\x0c\x12\x0e\n\x06key_id\x18\x03 \x01(\x0c\"\xaa\x01\n\x0fStoredRecording\x12\x31\n\trecording\x18\x01 \x01(\x0b\x32\x1e.omniseer.gateway.v1.Recording\x12\x31\n\x07receipt\x18\x02 \x01(\x0b\x32 .omniseer.fleet.v1.SignedReceipt\x12\x31\n\x05\x66iles\x18\x03 \x03(\x0b\x32\".omniseer.gateway.v1.RecordingFile*\x9a\x02\n\x0fUploadErrorCode\x12!\n\x1dUPLOAD_ERROR_CODE_UNSPECIFIED\x10\x00\x12\x1d\n\x19UPLOAD_ERROR_CODE_INVALID\x10\x01\x12$\n UPLOAD_ERROR_CODE_NO_SUCH_UPLOAD\x10\x02\x12#\n\x1fUPLOAD_ERROR_CODE_WRONG_CONTENT\x10\x03\x12\x1d\n\x19UPLOAD_ERROR_CODE_NO_ROOM\x10\x04\x12\x1b\n\x17UPLOAD_ERROR_CODE_STORE\x10\x05\x12\"\n\x1eUPLOAD_ERROR_CODE_NOT_VERIFIED\x10\x06\x12\x1a\n\x16UPLOAD_ERROR_CODE_BUSY\x10\x07\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.fleet.v1.upload_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_UPLOADERRORCODE']._serialized_start=2324
-  _globals['_UPLOADERRORCODE']._serialized_end=2606
+  _globals['_UPLOADERRORCODE']._serialized_start=2363
+  _globals['_UPLOADERRORCODE']._serialized_end=2645
   _globals['_UPLOADBRIEF']._serialized_start=91
   _globals['_UPLOADBRIEF']._serialized_end=226
   _globals['_BEGINUPLOADREQUEST']._serialized_start=228
@@ -47,31 +47,31 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_PART']._serialized_start=618
   _globals['_PART']._serialized_end=654
   _globals['_GETPARTSREQUEST']._serialized_start=656
-  _globals['_GETPARTSREQUEST']._serialized_end=750
-  _globals['_GETPARTSRESPONSE']._serialized_start=752
-  _globals['_GETPARTSRESPONSE']._serialized_end=812
-  _globals['_PARTURL']._serialized_start=814
-  _globals['_PARTURL']._serialized_end=874
-  _globals['_COMPLETEFILEREQUEST']._serialized_start=876
-  _globals['_COMPLETEFILEREQUEST']._serialized_end=997
-  _globals['_COMPLETEFILERESPONSE']._serialized_start=999
-  _globals['_COMPLETEFILERESPONSE']._serialized_end=1021
-  _globals['_VERIFYFILEREQUEST']._serialized_start=1023
-  _globals['_VERIFYFILEREQUEST']._serialized_end=1114
-  _globals['_VERIFYFILERESPONSE']._serialized_start=1116
-  _globals['_VERIFYFILERESPONSE']._serialized_end=1207
-  _globals['_COMPLETEUPLOADREQUEST']._serialized_start=1209
-  _globals['_COMPLETEUPLOADREQUEST']._serialized_end=1303
-  _globals['_COMPLETEUPLOADRESPONSE']._serialized_start=1305
-  _globals['_COMPLETEUPLOADRESPONSE']._serialized_end=1380
-  _globals['_UPLOADERROR']._serialized_start=1382
-  _globals['_UPLOADERROR']._serialized_end=1462
-  _globals['_UPLOADRESPONSE']._serialized_start=1465
-  _globals['_UPLOADRESPONSE']._serialized_end=1922
-  _globals['_RECEIPT']._serialized_start=1925
-  _globals['_RECEIPT']._serialized_end=2079
-  _globals['_SIGNEDRECEIPT']._serialized_start=2081
-  _globals['_SIGNEDRECEIPT']._serialized_end=2148
-  _globals['_STOREDRECORDING']._serialized_start=2151
-  _globals['_STOREDRECORDING']._serialized_end=2321
+  _globals['_GETPARTSREQUEST']._serialized_end=769
+  _globals['_GETPARTSRESPONSE']._serialized_start=771
+  _globals['_GETPARTSRESPONSE']._serialized_end=831
+  _globals['_PARTURL']._serialized_start=833
+  _globals['_PARTURL']._serialized_end=893
+  _globals['_COMPLETEFILEREQUEST']._serialized_start=895
+  _globals['_COMPLETEFILEREQUEST']._serialized_end=1016
+  _globals['_COMPLETEFILERESPONSE']._serialized_start=1018
+  _globals['_COMPLETEFILERESPONSE']._serialized_end=1040
+  _globals['_VERIFYFILEREQUEST']._serialized_start=1042
+  _globals['_VERIFYFILEREQUEST']._serialized_end=1133
+  _globals['_VERIFYFILERESPONSE']._serialized_start=1135
+  _globals['_VERIFYFILERESPONSE']._serialized_end=1226
+  _globals['_COMPLETEUPLOADREQUEST']._serialized_start=1228
+  _globals['_COMPLETEUPLOADREQUEST']._serialized_end=1322
+  _globals['_COMPLETEUPLOADRESPONSE']._serialized_start=1324
+  _globals['_COMPLETEUPLOADRESPONSE']._serialized_end=1419
+  _globals['_UPLOADERROR']._serialized_start=1421
+  _globals['_UPLOADERROR']._serialized_end=1501
+  _globals['_UPLOADRESPONSE']._serialized_start=1504
+  _globals['_UPLOADRESPONSE']._serialized_end=1961
+  _globals['_RECEIPT']._serialized_start=1964
+  _globals['_RECEIPT']._serialized_end=2118
+  _globals['_SIGNEDRECEIPT']._serialized_start=2120
+  _globals['_SIGNEDRECEIPT']._serialized_end=2187
+  _globals['_STOREDRECORDING']._serialized_start=2190
+  _globals['_STOREDRECORDING']._serialized_end=2360
 # @@protoc_insertion_point(module_scope)

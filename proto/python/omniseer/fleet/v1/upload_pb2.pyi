@@ -264,12 +264,15 @@ class GetPartsRequest(_message.Message):
     FILE_NAME_FIELD_NUMBER: _builtins.int
     UPLOAD_ID_FIELD_NUMBER: _builtins.int
     NUMBERS_FIELD_NUMBER: _builtins.int
+    FILE_SIZE_FIELD_NUMBER: _builtins.int
     recording_id: _builtins.str
     """The recording."""
     file_name: _builtins.str
     """The file's name."""
     upload_id: _builtins.str
     """As in BeginFileResponse."""
+    file_size: _builtins.int
+    """The file's size in bytes: each URL is good for as many bytes as its part has."""
     @_builtins.property
     def numbers(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Which parts, from 1."""
@@ -281,10 +284,11 @@ class GetPartsRequest(_message.Message):
         file_name: _builtins.str = ...,
         upload_id: _builtins.str = ...,
         numbers: _abc.Iterable[_builtins.int] | None = ...,
+        file_size: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["file_name", b"file_name", "numbers", b"numbers", "recording_id", b"recording_id", "upload_id", b"upload_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["file_name", b"file_name", "file_size", b"file_size", "numbers", b"numbers", "recording_id", b"recording_id", "upload_id", b"upload_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -457,7 +461,9 @@ Global___VerifyFileResponse: _TypeAlias = VerifyFileResponse  # noqa: Y015
 
 @_typing.final
 class CompleteUploadRequest(_message.Message):
-    """Has the receipt of the whole recording made, from those of its files. Repeating it is harmless."""
+    """Has the receipt of the whole recording made, from those of its files. Answered as VerifyFileRequest is. Repeating it
+    is harmless.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -489,23 +495,27 @@ Global___CompleteUploadRequest: _TypeAlias = CompleteUploadRequest  # noqa: Y015
 
 @_typing.final
 class CompleteUploadResponse(_message.Message):
-    """The recording is verified."""
+    """How far it has come, or the end."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     RECEIPT_FIELD_NUMBER: _builtins.int
+    FILES_DONE_FIELD_NUMBER: _builtins.int
+    files_done: _builtins.int
+    """Receipts read so far."""
     @_builtins.property
     def receipt(self) -> Global___SignedReceipt:
-        """Its receipt."""
+        """Its receipt, once that of each file has been read."""
 
     def __init__(
         self,
         *,
         receipt: Global___SignedReceipt | None = ...,
+        files_done: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["receipt", b"receipt"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["receipt", b"receipt"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["files_done", b"files_done", "receipt", b"receipt"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

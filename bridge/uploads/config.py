@@ -1,0 +1,46 @@
+"""Settings of uploads: the section `uploads` of the bridge's configuration."""
+
+from pathlib import Path
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, model_validator
+
+from common.config import Section
+
+_TIME: Final = r"([01][0-9]|2[0-3]):[0-5][0-9]"
+_HOST: Final = r"^[a-z0-9]([a-z0-9.-]{0,251}[a-z0-9])?(:[0-9]{1,5})?$"
+_MOST: Final = 16
+LOOPBACK: Final = frozenset({"127.0.0.1", "localhost"})
+
+
+class UploadSettings(Section):
+    """Which recordings are copied to the fleet's store, and when."""
+
+    rule: Literal["none", "incidents", "pinned", "all"] = "none"
+    """What is copied by itself once it has ended: nothing, incidents, these and pinned recordings, or all."""
+    max_bytes_per_s: int = Field(default=0, ge=0)
+    """0: no limit. Otherwise at least 64 KiB, so that a part is sent while its URL is valid."""
+    interfaces: tuple[Annotated[str, Field(pattern=r"^[A-Za-z0-9_.*-]{1,15}$")], ...] = Field(
+        default=(), max_length=_MOST
+    )
+    """Network interfaces through which the store may be reached, "*" for any characters. Empty: all."""
+    hours: tuple[Annotated[str, Field(pattern=f"^{_TIME}-{_TIME}$")], ...] = Field(
+        default=(), max_length=_MOST
+    )
+    """When, "22:00-06:00" for example, by the local time of the robot's computer. Empty: at all times."""
+    only_while_charging: bool = False
+    store_hosts: tuple[Annotated[str, Field(pattern=_HOST)], ...] = Field(default=(), max_length=_MOST)
+    """HOST or HOST:PORT of the store, from the robot's enrolment. Recordings are sent nowhere else, whatever
+    URL the hub returns. Empty: nothing can be uploaded."""
+    ca: Path | None = None
+    """Certificate authority of the store. None: those of the system."""
+    insecure_store: bool = False
+    """Accepts a store without TLS on this machine, for tests."""
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if 0 < self.max_bytes_per_s < 65_536:
+            raise ValueError("max_bytes_per_s must be 0 or at least 65536")
+        if self.insecure_store and any(host.partition(":")[0] not in LOOPBACK for host in self.store_hosts):
+            raise ValueError("insecure_store is for stores on 127.0.0.1 alone")
+        return self

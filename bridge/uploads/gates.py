@@ -1,0 +1,61 @@
+"""When recordings may be uploaded: pure functions that return why not, in words for people."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import time
+from fnmatch import fnmatchcase
+from typing import Final
+
+from bridge.uploads.config import UploadSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What the gates depend on, at one instant.
+
+    Attributes:
+        interface: Through which the store is reached. Empty: not known, or not needed.
+        local_time: By the clock on the wall where the robot is.
+        charging: Whether the main battery is being charged; None if unknown.
+    """
+
+    interface: str
+    local_time: time
+    charging: bool | None
+
+
+def closed(settings: UploadSettings, conditions: Conditions) -> str:
+    """Returns why no recording may be uploaded now; empty if it may."""
+    return next(filter(None, (gate(settings, conditions) for gate in _GATES)), "")
+
+
+def _interface(settings: UploadSettings, conditions: Conditions) -> str:
+    allowed, name = settings.interfaces, conditions.interface
+    if not allowed or any(fnmatchcase(name, pattern) for pattern in allowed):
+        return ""
+    through = f"the store is reached through {name}" if name else "the route to the store is not known"
+    return f"{through}; uploads are allowed through {', '.join(allowed)}"
+
+
+def _hours(settings: UploadSettings, conditions: Conditions) -> str:
+    now = f"{conditions.local_time:%H:%M}"
+    if not settings.hours or any(_is_within(hours, now) for hours in settings.hours):
+        return ""
+    return f"it is {now}; uploads are allowed at {', '.join(settings.hours)}"
+
+
+def _is_within(hours: str, now: str) -> bool:
+    """Returns whether "HH:MM" is within "HH:MM-HH:MM", which may last over midnight; the end is not."""
+    begin, _, end = hours.partition("-")
+    return begin <= now < end if begin < end else now >= begin or now < end
+
+
+def _charging(settings: UploadSettings, conditions: Conditions) -> str:
+    if not settings.only_while_charging or conditions.charging:
+        return ""
+    if conditions.charging is None:
+        return "it is not known whether the robot is charging; uploads are allowed only while it is"
+    return "the robot is not charging; uploads are allowed only while it is"
+
+
+_GATES: Final[tuple[Callable[[UploadSettings, Conditions], str], ...]] = (_interface, _hours, _charging)

@@ -1,0 +1,465 @@
+"""Uploads recordings: one at a time, while the gates are open, for ever.
+
+| what happens | what follows |
+|---|---|
+| a gate closes | the attempt ends within a second: PAUSED; later it goes on at the first missing part |
+| a more urgent recording is queued | it takes the place of the one that is uploaded |
+| an attempt fails because of this recording | FAILED; again after 1, 2, 4 ... 300 s; others go on |
+| gateway, hub or store fail | FAILED; all wait 1, 2, 4 ... 300 s, and from 1 s again after progress |
+| the recording is deleted on the robot | it leaves the queue |
+| the bridge's disk fails | the queue goes on in memory; `disk_error` says why; a new request is refused |
+"""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Final
+
+from bridge.uploads import gates
+from bridge.uploads.attempt import Attempt, Parties, RecordingSource, ended
+from bridge.uploads.config import UploadSettings
+from bridge.uploads.gates import Conditions
+from bridge.uploads.parts import PartSender
+from bridge.uploads.problems import AttemptError, CutError, GoneError
+from bridge.uploads.queue import (
+    FIRST_PAUSE_S,
+    LONGEST_PAUSE_S,
+    MOST_KEPT,
+    MOST_WAITING,
+    WAITING,
+    Event,
+    Priority,
+    State,
+    Upload,
+    UploadStore,
+    in_order,
+    next_upload,
+    step,
+)
+from bridge.uploads.receivers import Receivers, Requests
+from bridge.uploads.route import interface_to
+from common.backoff import Backoff
+from common.errors import NotFoundError, PreconditionError, TooMuchError
+from common.reasons import Reason
+from console.client import results
+from console.client.errors import Refused
+from fleet.receipts import ReceiptKeys
+
+_log = logging.getLogger(__name__)
+
+_TICK_S: Final = 1.0
+"""How often the gates are looked at."""
+_RATE_TICKS: Final = 5
+"""Over how many the rate is measured."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fleet:
+    """As whom the robot uploads, from its enrolment.
+
+    Attributes:
+        fleet, robot: The names under which the robot is enrolled.
+        keys: Of the fleet's receivers.
+    """
+
+    fleet: str
+    robot: str
+    keys: ReceiptKeys
+
+
+class Uploads:
+    """The queue of uploads and what works on it. Used on one event loop.
+
+    Args:
+        settings: When, and where to.
+        fleet: As whom.
+        store: Keeps the queue.
+        source: The robot's gateway, with the role of a viewer.
+        hub: The connection to the hub.
+        charging: Returns whether the main battery is being charged; None if unknown.
+        changed: Called after each change that is worth a report.
+    """
+
+    def __init__(
+        self,
+        settings: UploadSettings,
+        fleet: Fleet,
+        *,
+        store: UploadStore,
+        source: RecordingSource,
+        hub: Requests,
+        charging: Callable[[], bool | None],
+        changed: Callable[[], None],
+    ) -> None:
+        self._settings, self._fleet = settings, fleet
+        self._store, self._source, self._hub = store, source, hub
+        self._charging, self._changed = charging, changed
+        self._uploads: dict[str, Upload] = {}
+        self._wake = asyncio.Event()
+        self._path = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)
+        self._path_due_s = 0.0
+        self._running: tuple[str, asyncio.Task[None]] | None = None
+        self._ending = set[asyncio.Task[None]]()
+        """Attempts that were cancelled and still close their connections."""
+        self._disk = asyncio.Lock()
+        self._sender: PartSender | None = None
+        self._sent = deque[tuple[float, int]](maxlen=_RATE_TICKS)
+        self.loaded = asyncio.Event()
+        """Set once the queue has been read from the disk."""
+        self.paused = ""
+        """Why nothing is uploaded although something waits, for people. Otherwise empty."""
+        self.disk_error = ""
+        """Why the queue can't be kept on the disk; empty when all is well."""
+        self.cuts = 0
+        """Attempts that ended because the gateway, the hub or the store failed, since the start."""
+
+    @property
+    def waiting(self) -> list[Upload]:
+        """The uploads that run or wait, the one that runs first."""
+        return in_order(self._uploads.values())
+
+    @property
+    def settled(self) -> list[Upload]:
+        """Those that are verified, or were taken from the queue; the newest first."""
+        return [each for each in reversed(self._uploads.values()) if each.state not in WAITING]
+
+    @property
+    def current(self) -> Upload | None:
+        """The one that is being uploaded or verified."""
+        return self._uploads.get(self._running[0]) if self._running else None
+
+    @property
+    def bytes_per_s(self) -> int:
+        """Bytes a second that are sent at present."""
+        if len(self._sent) < 2:
+            return 0
+        (first_s, first), (last_s, last) = self._sent[0], self._sent[-1]
+        return round((last - first) / (last_s - first_s)) if last_s > first_s else 0
+
+    @property
+    def sent_bytes(self) -> int:
+        """Bytes of parts sent since the start, those that were sent twice included."""
+        return self._sender.sent_bytes if self._sender else 0
+
+    async def enqueue(self, recording_id: str) -> Upload:
+        """Puts a recording into the queue on request, or has a failed one tried again at once.
+
+        Raises:
+            GatewayError: The gateway does not answer.
+            NotFoundError: There is no such recording.
+            PreconditionError: It has not ended.
+            TooMuchError: The queue, or the bridge's disk, is full.
+        """
+        await self.loaded.wait()
+        recording = await self._look_up(recording_id)
+        upload = self._uploads.get(recording_id) or _new(recording, Priority.BY_HAND)
+        if upload.state is State.VERIFIED and _differs(upload, recording):
+            upload = step(upload, Event.CHANGED, self._now_s)
+        else:
+            upload = step(upload, Event.ENQUEUE, self._now_s)
+        upload = replace(upload, priority=min(upload.priority, Priority.BY_HAND))
+        if upload.state in WAITING and not self._has_room_for(recording_id):
+            raise TooMuchError(f"{MOST_WAITING} recordings wait to be uploaded", Reason.TOO_MANY_REQUESTS)
+        is_new = recording_id not in self._uploads
+        self._put(upload)
+        try:
+            await self._write(recording_id)
+        except OSError as error:
+            if is_new:
+                self._drop(recording_id)
+            raise TooMuchError(f"the bridge's disk can't be written: {error}", Reason.DISK_FULL) from error
+        # An operator who asks again does not wait for the end of a pause.
+        self._path_due_s = 0.0
+        self._wake.set()
+        return self._uploads.get(recording_id, upload)
+
+    async def cancel(self, recording_id: str) -> Upload:
+        """Takes a recording from the queue; a copy that is verified stays. No rule puts it back.
+
+        Returns:
+            The upload as it was.
+
+        Raises:
+            NotFoundError: It is not in the queue.
+        """
+        await self.loaded.wait()
+        upload = self._uploads.get(recording_id)
+        if upload is None or upload.state is State.LOCAL:
+            raise NotFoundError(f"{recording_id} is not in the queue of uploads", Reason.RECORDING_NOT_FOUND)
+        if upload.state is not State.VERIFIED:
+            self._end_attempt(recording_id)
+            await self._apply(recording_id, Event.REMOVE)
+            self._wake.set()
+        return upload
+
+    async def consider(self, recordings: Iterable[results.Recording]) -> None:
+        """Queues those of some recordings that the rule selects, and that have ended."""
+        await self.loaded.wait()
+        for recording in sorted(recordings, key=lambda each: each.started_unix_ms):
+            known = self._uploads.get(recording.id)
+            if not ended(recording) or not _selects(self._settings.rule, recording):
+                continue
+            if known is None and recording.copy.state is not results.RecordingCopyState.VERIFIED:
+                if self._has_room_for(recording.id):
+                    await self._keep(step(_new(recording), Event.ENQUEUE, self._now_s))
+            elif known and known.state is State.VERIFIED and _differs(known, recording):
+                await self._keep(step(known, Event.CHANGED, self._now_s))
+        self._wake.set()
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Uploads until `stop`; what is being sent then goes on where it was, after the next start.
+
+        Raises:
+            UserError: The store's certificate authority can't be read.
+        """
+        waiter = asyncio.ensure_future(stop.wait())
+        waiter.add_done_callback(lambda _: self._wake.set())
+        try:
+            async with PartSender(self._settings) as sender:
+                self._sender = sender
+                await self._load()
+                while not stop.is_set():
+                    await self._tick()
+                    await self._next_tick()
+        finally:
+            waiter.cancel()
+            if self._running:
+                self._end_attempt(self._running[0])
+            await asyncio.gather(*self._ending, return_exceptions=True)
+
+    async def _load(self) -> None:
+        try:
+            rows = await self._store.uploads()
+        except OSError as error:
+            self._note_disk(error)
+            rows = []
+        for upload in rows:
+            self._uploads[upload.recording_id] = step(upload, Event.RESTART, self._now_s)
+        self.loaded.set()
+
+    async def _next_tick(self) -> None:
+        try:
+            async with asyncio.timeout(_TICK_S):
+                await self._wake.wait()
+        except TimeoutError:
+            pass
+        self._wake.clear()
+
+    async def _tick(self) -> None:
+        """Ends and begins attempts, as the gates and the queue have it."""
+        self._sent.append((self._now_s, self.sent_bytes))
+        if self._running and self._running[1].done():
+            await self._finish(*self._running)
+        closed = await self._closed() if self.waiting else ""
+        if closed != self.paused:
+            self.paused = closed
+            self._changed()
+        if not closed:
+            for each in self.waiting:
+                if each.state is State.PAUSED:
+                    await self._apply(each.recording_id, Event.RESUME)
+        head = next_upload(self._uploads.values(), self._now_s)
+        if closed:
+            await self._pause(head, closed)
+        elif head:
+            await self._advance(head)
+
+    async def _pause(self, head: Upload | None, closed: str) -> None:
+        current = self.current
+        # A receiver reads without this robot's network.
+        if current and current.state is State.UPLOADING:
+            self._end_attempt(current.recording_id)
+            await self._apply(current.recording_id, Event.PAUSE, closed)
+        elif head and not current and head.reason != closed:
+            if head.state is State.FAILED:
+                await self._apply(head.recording_id, Event.RESUME)
+            await self._apply(head.recording_id, Event.PAUSE, closed)
+
+    async def _advance(self, head: Upload) -> None:
+        current = self.current
+        if current and head.priority < current.priority and current.state is State.UPLOADING:
+            self._end_attempt(current.recording_id)
+            await self._apply(current.recording_id, Event.GIVE_WAY)
+        if not self._running and self._now_s >= self._path_due_s:
+            if head.state is not State.QUEUED:
+                await self._apply(head.recording_id, Event.RESUME)
+            await self._apply(head.recording_id, Event.BEGIN)
+            self._begin(head.recording_id)
+
+    def _begin(self, recording_id: str) -> None:
+        assert self._sender, "an attempt begins while it runs"  # noqa: S101  # run() has set it
+        parties = Parties(
+            fleet=self._fleet.fleet,
+            robot=self._fleet.robot,
+            source=self._source,
+            receivers=Receivers(self._hub, self._fleet.robot),
+            sender=self._sender,
+            keys=self._fleet.keys,
+        )
+
+        def begun(size: int, sha256: bytes) -> None:
+            self._put(replace(self._uploads[recording_id], size=size, sha256=sha256))
+
+        def progress(done: int) -> None:
+            upload = self._uploads[recording_id]
+            if done > upload.bytes_done:
+                self._path.reset()
+            self._put(replace(upload, bytes_done=min(done, upload.size)))
+
+        def sent() -> None:
+            self._put(step(self._uploads[recording_id], Event.SENT, self._now_s))
+
+        attempt = Attempt(parties, recording_id, begun=begun, progress=progress, sent=sent)
+        task = asyncio.create_task(attempt.run(), name=f"upload {recording_id}")
+        task.add_done_callback(lambda _: self._wake.set())
+        self._running = recording_id, task
+
+    async def _finish(self, recording_id: str, task: asyncio.Task[None]) -> None:
+        """Takes the outcome of an attempt that has ended by itself."""
+        self._running = None
+        try:
+            await task
+        except GoneError:
+            await self._forget(recording_id)
+        except CutError as error:
+            self.cuts += 1
+            self._path_due_s = self._now_s + self._path.next_s()
+            await self._apply(recording_id, Event.CUT, str(error))
+        except AttemptError as error:
+            _log.warning("the upload of %s failed: %s", recording_id, error)
+            await self._apply(recording_id, Event.FAILURE, str(error))
+        else:
+            self._path.reset()
+            await self._apply(recording_id, Event.CONFIRMED)
+
+    def _end_attempt(self, recording_id: str) -> None:
+        """Ends the attempt on a recording, if there is one. Its callbacks are not called any more."""
+        if self._running and self._running[0] == recording_id:
+            _, task = self._running
+            self._running = None
+            task.cancel()
+            self._ending.add(task)
+            task.add_done_callback(self._ended)
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        self._ending.discard(task)
+        # What it may have ended with in this instant does not count: it is uploaded again.
+        if not task.cancelled():
+            task.exception()
+
+    async def _closed(self) -> str:
+        if not self._settings.store_hosts:
+            return "no store is configured: copy uploads.store_hosts from the robot's enrolment"
+        interface = await interface_to(self._settings.store_hosts[0]) if self._settings.interfaces else ""
+        now = datetime.now().astimezone().time()
+        return gates.closed(self._settings, Conditions(interface, now, self._charging()))
+
+    async def _look_up(self, recording_id: str) -> results.Recording:
+        try:
+            recording = await self._source.recording(recording_id)
+        except Refused as error:
+            if error.reason != Reason.RECORDING_NOT_FOUND:
+                raise
+            raise NotFoundError(f"there is no recording {recording_id}", Reason.RECORDING_NOT_FOUND) from None
+        if not ended(recording):
+            raise PreconditionError(f"{recording_id} has not ended", Reason.RECORDING_RUNS)
+        return recording
+
+    async def _apply(self, recording_id: str, event: Event, reason: str = "") -> None:
+        """Changes an upload, if it is still there."""
+        if upload := self._uploads.get(recording_id):
+            await self._keep(step(upload, event, self._now_s, reason))
+
+    async def _keep(self, upload: Upload) -> None:
+        """Takes an upload into the queue, and onto the disk."""
+        self._put(upload)
+        try:
+            await self._write(upload.recording_id)
+            if len(self._uploads) > MOST_WAITING + MOST_KEPT and (oldest := self._oldest_settled()):
+                await self._forget(oldest)
+        except OSError as error:
+            self._note_disk(error)
+
+    async def _forget(self, recording_id: str) -> None:
+        self._drop(recording_id)
+        try:
+            await self._write(recording_id)
+        except OSError as error:
+            self._note_disk(error)
+
+    async def _write(self, recording_id: str) -> None:
+        """Brings the row of a recording to what it is now; rows are written one after the other.
+
+        Raises:
+            OSError: The disk can't be written.
+        """
+        async with self._disk:
+            if upload := self._uploads.get(recording_id):
+                await self._store.put_upload(upload)
+            else:
+                await self._store.delete_upload(recording_id)
+        self.disk_error = ""
+
+    def _drop(self, recording_id: str) -> None:
+        self._uploads.pop(recording_id, None)
+        self._changed()
+
+    def _put(self, upload: Upload) -> None:
+        before = self._uploads.get(upload.recording_id)
+        if before and before.state is not upload.state:
+            # In the order of their changes.
+            del self._uploads[upload.recording_id]
+        self._uploads[upload.recording_id] = upload
+        self._changed()
+
+    def _note_disk(self, error: OSError) -> None:
+        self.disk_error = f"the queue of uploads can't be kept on the disk: {error}"
+        _log.error("%s", self.disk_error)
+        self._changed()
+
+    def _oldest_settled(self) -> str | None:
+        return next((key for key, each in self._uploads.items() if each.state not in WAITING), None)
+
+    def _has_room_for(self, recording_id: str) -> bool:
+        known = self._uploads.get(recording_id)
+        return (known is not None and known.state in WAITING) or len(self.waiting) < MOST_WAITING
+
+    @property
+    def _now_s(self) -> float:
+        return asyncio.get_running_loop().time()
+
+
+def _new(recording: results.Recording, lowest: Priority = Priority.OTHER) -> Upload:
+    """Returns the upload of a recording that is not in the queue yet."""
+    priority = lowest
+    if recording.kind is results.RecordingKind.INCIDENT:
+        priority = Priority.INCIDENT
+    elif recording.pinned:
+        priority = Priority.PINNED
+    return Upload(
+        recording_id=recording.id,
+        label=recording.label,
+        priority=priority,
+        started_unix_ms=recording.started_unix_ms,
+        size=recording.size,
+    )
+
+
+def _differs(upload: Upload, recording: results.Recording) -> bool:
+    """Returns whether a recording is not the one that was verified: a folder of experiments may grow."""
+    return recording.size != upload.size or bool(
+        recording.sha256 and upload.sha256 and recording.sha256 != upload.sha256
+    )
+
+
+def _selects(rule: str, recording: results.Recording) -> bool:
+    incident = recording.kind is results.RecordingKind.INCIDENT
+    return {
+        "none": False,
+        "incidents": incident,
+        "pinned": incident or recording.pinned,
+        "all": True,
+    }[rule]
