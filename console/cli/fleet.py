@@ -7,7 +7,7 @@ import socket
 import sys
 from contextlib import suppress
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -65,9 +65,9 @@ def recordings(
 ) -> None:
     """List the recordings in the hub's store, the newest first, with their receipts checked."""
     found = [item for item in asyncio.run(_recordings(session)) if robot in ("", item.robot)]
-    document = {"recordings": [json_form(item) for item in found if not isinstance(item, Unreadable)]}
-    document["unreadable"] = [json_form(item) for item in found if isinstance(item, Unreadable)]
-    session.show(document, recordings_table(found) if found else "No recording was uploaded yet.")
+    session.show(
+        recordings_json(found), recordings_table(found) if found else "No recording was uploaded yet."
+    )
 
 
 @fleet_app.command("command")
@@ -162,6 +162,14 @@ def login(
         print_json(out, {"fleet": stored.fleet, "name": stored.name, "servers": list(stored.servers)})
         return
     out.print(f"Fleet {stored.fleet}: stored in {path}.\nType: robotctl fleet list", soft_wrap=True)
+
+
+def recordings_json(found: list[StoredRecording | Unreadable]) -> dict[str, Any]:
+    """Returns the JSON form of the recordings in the store."""
+    return {
+        "recordings": [json_form(item) for item in found if isinstance(item, StoredRecording)],
+        "unreadable": [json_form(item) for item in found if isinstance(item, Unreadable)],
+    }
 
 
 async def _rows(session: FleetSession) -> tuple[FleetRow, ...]:

@@ -23,7 +23,7 @@ HUB_VARIABLE: Final = "ROBOTCTL_HUB"
 ANSWERS_WITHIN_S: Final = 5.0
 """For a connection with one of the hub's servers."""
 _INSTALL: Final = "Type, in a clone of the project: scripts/install-console"
-_NOT_SET_UP: Final = "The hub's administrator types: robot-bridge hub init"
+_NOT_SET_UP: Final = "The hub's administrator types: robot-bridge hub apply"
 _REMEDIES: Final = {
     "unreachable": "Check the network to the hub; docs/fleet.md lists what else it can be",
     "refused": "Ask the hub's administrator for a new login, and type: robotctl fleet login FILE --replace",

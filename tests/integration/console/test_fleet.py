@@ -330,7 +330,7 @@ def test_a_hub_that_is_not_set_up(tmp_path: Path) -> None:
     with nats_servers(tmp_path) as servers:
         done = robotctl("fleet", "list", "--hub", servers.urls[0])
     assert done.returncode == 1
-    assert only_line(done.stderr).endswith("robot-bridge hub init")
+    assert only_line(done.stderr).endswith("robot-bridge hub apply")
 
 
 def test_the_installed_program_without_a_login() -> None:
