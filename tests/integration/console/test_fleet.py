@@ -429,3 +429,12 @@ def test_a_pipe_gets_a_line_for_each_robot_that_has_changed(hub: FleetHub) -> No
             assert process.stdout.read() == ""
         finally:
             process.kill()
+
+
+def test_a_fleet_of_more_robots_than_are_read_at_once(hub: FleetHub) -> None:
+    names = [f"r{number}" for number in range(600)]
+    hub.enroll(*names)
+    hub.put_state(healthy_state("r7"))
+    document = answer(hub, "list")
+    assert {row["robot"] for row in document["robots"]} == set(names)
+    assert document["summary"]["up"] == 1
