@@ -35,6 +35,8 @@ FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0
 REQUEST_TIMEOUT_S: Final = 5.0
 """For an answer of the hub. A stream elects a leader in about that time."""
+_ROUTED: Final = "_R_."
+"""Reply subjects that the server makes for a request from another account; clients can't name such a one."""
 _STEADY_S: Final = 10.0
 """A connection that stood this long was a success: the next pause is short again."""
 
@@ -428,7 +430,7 @@ class Hub:
 
         async def on_message(message: Message) -> None:
             parts = message.subject.split(".")
-            if len(parts) < 3 or not message.reply.startswith(names.inbox_prefix(parts[1]) + "."):
+            if len(parts) < 3 or not message.reply.startswith((f"{names.inbox_prefix(parts[1])}.", _ROUTED)):
                 return
             request = Request(parts[1], parts[-1], message.payload, session, message.reply)
             if len(running) >= service.at_once:

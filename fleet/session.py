@@ -14,14 +14,16 @@ from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import ParseResult
 
-import nkeys
 from nats import errors as nats_errors
 from nats.aio.client import Client
 from nats.aio.msg import Msg
-from nats.protocol.parser import Parser
+from nats.aio.transport import TcpTransport
+from nats.protocol.parser import PERMISSIONS_ERR, Parser
 
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
+from fleet.identity import Credentials
 
 CONNECT_TIMEOUT_S: Final = 5.0
 """For one server: name resolution, TCP, TLS and authentication."""
@@ -51,33 +53,6 @@ class Message:
         return self.headers.get("Status", "")
 
 
-@dataclass(frozen=True, slots=True)
-class Credentials:
-    """Contents of a .creds file: a user's JWT and the seed of its key."""
-
-    jwt: str
-    seed: bytes
-
-    @classmethod
-    def read(cls, path: Path) -> "Credentials":
-        """Parses a .creds file.
-
-        Raises:
-            RefusedError: it can't be read, or is none.
-        """
-        try:
-            lines = path.read_text(encoding="ascii").splitlines()
-            jwt = lines[lines.index("-----BEGIN NATS USER JWT-----") + 1]
-            seed = lines[lines.index("-----BEGIN USER NKEY SEED-----") + 1]
-        except OSError as error:
-            raise RefusedError(f"the credentials {path} can't be read: {error.strerror}") from error
-        except (ValueError, IndexError) as error:
-            raise RefusedError(
-                f"{path} contains no credentials: expected a file made by enrolling"
-            ) from error
-        return cls(jwt.strip(), seed.strip().encode())
-
-
 class _BoundedParser(Parser):
     """Ends a connection whose server announces a message beyond any size that it may have."""
 
@@ -87,12 +62,58 @@ class _BoundedParser(Parser):
             raise nats_errors.ProtocolError
 
 
+class _Transport(TcpTransport):
+    """Sends CONNECT and the PING after it in one piece.
+
+    A server that refuses the credentials answers CONNECT and closes. A PING that is sent after that breaks
+    the connection before the answer is read, and a refusal would look like a network failure.
+    """
+
+    _held = b""
+
+    def __bool__(self) -> bool:
+        # The client makes a transport of its own in the place of a false one.
+        return True
+
+    def write(self, payload: bytes) -> None:
+        if payload.startswith(b"CONNECT "):
+            self._held = payload
+            return
+        self._writer().write(self._held + payload)
+        self._held = b""
+
+    async def connect_tls(
+        self,
+        uri: str | ParseResult,
+        ssl_context: ssl.SSLContext,
+        buffer_size: int,  # noqa: ARG002  # the library's signature
+        connect_timeout: int,
+    ) -> None:
+        # As the streams of asyncio do it; by hand, each end of a connection would be a warning in the log.
+        host = uri if isinstance(uri, str) else uri.hostname
+        async with asyncio.timeout(connect_timeout):
+            await self._writer().start_tls(ssl_context, server_hostname=host)
+
+    def _writer(self) -> asyncio.StreamWriter:
+        if self._io_writer is None:
+            raise ConnectionError("there is no connection")
+        return self._io_writer
+
+
 class _Client(Client):
     """The library's client, with bounds on what a server can make it do."""
 
     def __init__(self) -> None:
         super().__init__()
         self._ps = _BoundedParser(self)
+        self._transport = _Transport()  # type: ignore[no-untyped-call]  # the library's
+        self.farewell = ""
+        """What the server said before it closed the connection; the library keeps the last error only."""
+
+    async def _process_err(self, err_msg: str) -> None:
+        if PERMISSIONS_ERR not in err_msg:
+            self.farewell = self.farewell or err_msg.strip("'")
+        await super()._process_err(err_msg)
 
     async def _process_info(self, info: dict[str, Any], initial_connection: bool = False) -> None:
         # Servers are those of the configuration, and TLS names with them.
@@ -177,7 +198,9 @@ class Session:
 
         async def on_closed() -> None:
             for session in sessions:
-                session.note_closed(client.last_error)
+                session.note_closed(
+                    nats_errors.Error(client.farewell) if client.farewell else client.last_error
+                )
 
         options: dict[str, Any] = {}
         if ca is not None:
@@ -383,10 +406,7 @@ def _sign(client: _Client, creds: Credentials, nonce: str, *, encrypted: bool) -
     """
     if encrypted and not client.encrypted():
         raise UnreachableError("the server does not offer TLS")
-    try:
-        return base64.b64encode(nkeys.from_seed(bytearray(creds.seed)).sign(nonce.encode()))
-    except Exception as error:  # the library's errors have no common base
-        raise RefusedError("the credentials have no valid seed") from error
+    return base64.b64encode(creds.key.sign(nonce.encode()))
 
 
 def _tls_context(ca: Path) -> ssl.SSLContext:

@@ -28,7 +28,7 @@ from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
-from gateway.access.ca import certificate_info
+from common.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings

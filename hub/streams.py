@@ -99,6 +99,7 @@ def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, A
         # Repeats are recognised by their subject, without a window of time.
         "duplicate_window": 1_000_000_000,
         "deny_delete": True,
+        "deny_purge": True,
         **more,
     }
 
@@ -113,8 +114,10 @@ def _bucket(name: str, max_bytes: int) -> dict[str, Any]:
         "max_bytes": max_bytes,
         "max_msg_size": 512 * 1024,
         "discard": "new",
-        "allow_rollup_hdrs": True,
+        # A robot's "Nats-Rollup: all" would delete the values of all others.
+        "allow_rollup_hdrs": False,
         "deny_delete": True,
+        "deny_purge": True,
         "duplicate_window": 1_000_000_000,
     }
 

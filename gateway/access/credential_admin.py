@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 from common.errors import UserError
 from common.private_files import directory_lock, write_all_private
-from gateway.access.ca import (
+from common.ca import (
     certificate_info,
     issue_client_certificate,
     issue_server_certificate,

@@ -6,7 +6,7 @@ It contains a secret. It is output once, and the robot keeps no copy.
 from dataclasses import dataclass, field
 from typing import Final
 
-from gateway.access.ca import KeyPair
+from common.ca import KeyPair
 
 _HEADER: Final = "# Robot Gateway login 1"
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from common.errors import UserError
-from gateway.access.ca import KeyPair, certificate_info
+from common.ca import KeyPair, certificate_info
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store

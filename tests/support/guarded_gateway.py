@@ -10,7 +10,7 @@ from typing import Any
 import grpc
 import pytest
 
-from gateway.access.ca import KeyPair
+from common.ca import KeyPair
 from gateway.access.credential import Credential, Kind
 from gateway.access.credential_admin import CredentialAdmin, CredentialRequest
 from gateway.access.directory import CredentialDirectory

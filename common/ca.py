@@ -1,7 +1,7 @@
-"""The robot's certificate authority (CA); the only importer of `cryptography`.
+"""Certificate authorities (CA) of robots and hubs.
 
-Each robot has its own CA, so that no certificate of one robot is valid on another. Keys are on the curve
-P-256, with which a handshake takes an SBC a millisecond or two.
+Each robot has its own CA, and so has each hub, so that no certificate of one is valid on another. Keys are on
+the curve P-256, with which a handshake takes an SBC a millisecond or two.
 """
 
 import ipaddress
@@ -84,12 +84,24 @@ def issue_server_certificate(ca: KeyPair, name: str, hosts: Iterable[str], days:
         UserError: a host is neither a name nor an address.
     """
     names = x509.SubjectAlternativeName([_general_name(host) for host in hosts])
-    return _issue_leaf(ca, name, days, ExtendedKeyUsageOID.SERVER_AUTH, names)
+    return _issue_leaf(ca, name, days, (ExtendedKeyUsageOID.SERVER_AUTH,), names)
+
+
+def issue_node_certificate(ca: KeyPair, name: str, hosts: Iterable[str], days: float) -> KeyPair:
+    """Issues the certificate of a cluster's node: it is a server to clients, and both to other nodes.
+
+    Raises:
+        UserError: a host is neither a name nor an address.
+    """
+    names = x509.SubjectAlternativeName([_general_name(host) for host in hosts])
+    return _issue_leaf(
+        ca, name, days, (ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH), names
+    )
 
 
 def issue_client_certificate(ca: KeyPair, name: str, days: float) -> KeyPair:
     """Issues the certificate that a person or program of this name presents to the gateway."""
-    return _issue_leaf(ca, name, days, ExtendedKeyUsageOID.CLIENT_AUTH)
+    return _issue_leaf(ca, name, days, (ExtendedKeyUsageOID.CLIENT_AUTH,))
 
 
 def certificate_info(pem: bytes) -> CertificateInfo:
@@ -130,11 +142,15 @@ def key_matches(pair: KeyPair) -> bool:
 
 
 def _issue_leaf(
-    ca: KeyPair, name: str, days: float, purpose: x509.ObjectIdentifier, *extensions: x509.ExtensionType
+    ca: KeyPair,
+    name: str,
+    days: float,
+    purposes: tuple[x509.ObjectIdentifier, ...],
+    *extensions: x509.ExtensionType,
 ) -> KeyPair:
     constraints = x509.BasicConstraints(ca=False, path_length=None)
     usage = _key_usage("digital_signature")
-    return _issue(ca, name, days, constraints, usage, x509.ExtendedKeyUsage([purpose]), *extensions)
+    return _issue(ca, name, days, constraints, usage, x509.ExtendedKeyUsage(purposes), *extensions)
 
 
 def _issue(ca: KeyPair | None, name: str, days: float, *extensions: x509.ExtensionType) -> KeyPair:

@@ -1,0 +1,348 @@
+"""What the hub's administrator does: make a hub, enroll, revoke, list.
+
+| what happens | what follows |
+|---|---|
+| `init` is interrupted | there is no hub.json: it can be repeated |
+| the hub is unreachable during `enroll` | the robot's files are not written; repeat it |
+| `enroll` for an enrolled robot | refused, unless `again`: then new keys, and the old ones are revoked |
+| a server is down during `revoke` | the others refuse the robot at once, it as soon as it is back |
+| nothing of the hub answers during `revoke` | the revocation is in the directory; `apply` repeats it |
+"""
+
+import json
+import time
+from collections.abc import AsyncGenerator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+import yaml
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+from common.ca import KeyPair, issue_node_certificate, new_ca
+from common.errors import ExitCode, UserError
+from common.private_files import write_all_private
+from fleet import names
+from fleet.connection import Hub, connect
+from fleet.errors import HubError, HubReason
+from fleet.identity import (
+    Account,
+    Credentials,
+    Key,
+    KeyKind,
+    Permissions,
+    account_jwt,
+    new_user,
+    operator_jwt,
+)
+from hub import permissions, streams
+from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User
+from hub.server_config import Node, Places, server_config
+
+_CONNECT_S: Final = 10.0
+_CA_DAYS: Final = 3650.0
+_SYSTEM: Final = Permissions(publish=("$SYS.REQ.CLAIMS.UPDATE",), subscribe=("_INBOX.>",))
+_PUSH_WITHIN_S: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class HubPlan:
+    """What `create` makes.
+
+    Attributes:
+        fleet: its name.
+        nodes: one, or three.
+        places: directories on the servers.
+        max_store: disk space for streams on each, as "32GB".
+        sync_always: as `server_config`.
+    """
+
+    fleet: str
+    nodes: tuple[Node, ...]
+    places: Places = field(default_factory=Places)
+    max_store: str = "32GB"
+    sync_always: bool = True
+
+
+def create(directory: HubDirectory, plan: HubPlan) -> None:
+    """Creates keys, certificates and the servers' configuration. Nothing of it needs a server.
+
+    Raises:
+        UserError: there is a hub in this directory, or it can't be written.
+    """
+    if not names.ROBOT_NAME.fullmatch(plan.fleet):
+        raise _no_name(plan.fleet)
+    with directory.locked():
+        if directory.exists:
+            raise UserError(f"{directory.path} has a hub already", "Choose another directory with --out")
+        keys = {name: Key.new(kind) for name, kind in _KEYS.items()}
+        ca = new_ca(f"{plan.fleet} hub", _CA_DAYS)
+        admin, _ = new_user(keys["fleet"], "administrator", permissions.administrator())
+        system, _ = new_user(keys["system"], "administrator", _SYSTEM)
+        signing, checking = _receipt_keys()
+        root = directory.path
+        files = {
+            **{root / "keys" / f"{name}.nk": key.seed for name, key in keys.items()},
+            root / "keys" / "ca.pem": ca.certificate,
+            root / "keys" / "ca.key": ca.key,
+            root / "admin.creds": admin.text().encode(),
+            root / "system.creds": system.text().encode(),
+            root / "receipts.key": signing,
+            root / "receipts.pub": checking,
+        }
+        for node in plan.nodes:
+            files |= _node_files(root / "nodes" / node.name, node, plan, keys, ca)
+        write_all_private(files)
+        servers = tuple(f"tls://{node.host}:{node.port}" for node in plan.nodes)
+        directory.write(HubRecord(plan.fleet, servers, replicas=len(plan.nodes)))
+
+
+async def apply(directory: HubDirectory, limits: streams.StreamLimits | None = None) -> list[str]:
+    """Makes the streams and buckets that are missing, and repeats all revocations.
+
+    Returns:
+        What differs in existing streams.
+
+    Raises:
+        UserError: the hub can't be reached, or refuses.
+    """
+    record = directory.read()
+    await _push_accounts(directory, record)
+    async with _connected(directory) as hub:
+        differences = await streams.set_up(hub, record.replicas, limits or streams.StreamLimits())
+        for user in record.users:
+            if user.kind == "robot":
+                await _list_robot(hub, user)
+    return differences
+
+
+async def enroll(
+    directory: HubDirectory, robot: str, out: Path, *, days: float | None = None, again: bool = False
+) -> None:
+    """Enrolls a robot and writes its files: bridge.creds, ca.pem, receipts.pub, fleet.yaml.
+
+    Args:
+        directory: the hub's.
+        robot: its name.
+        out: where its files go.
+        days: of validity; None: until it is revoked.
+        again: whether a robot of this name gets new keys, and the old ones are revoked.
+
+    Raises:
+        UserError: there is one of this name, or the hub can't be reached or refuses.
+    """
+    with directory.locked():
+        record, creds = _issue(directory, "robot", robot, permissions.robot(robot), days, again=again)
+        user = record.user("robot", robot)
+        assert user is not None  # noqa: S101  # it has just been issued
+        async with _connected(directory) as hub:
+            await streams.add_command_consumer(hub, robot)
+            await _list_robot(hub, user)
+        settings = {"servers": list(record.servers), "robot": robot, "fleet": record.fleet}
+        write_all_private(
+            {
+                out / "bridge.creds": creds.text().encode(),
+                out / "ca.pem": directory.secret("keys/ca.pem"),
+                out / "receipts.pub": directory.secret("receipts.pub"),
+                out / "fleet.yaml": yaml.safe_dump(settings, sort_keys=False).encode(),
+            }
+        )
+        directory.write(record)
+        if again:
+            await _push_accounts(directory, record)
+
+
+async def revoke(directory: HubDirectory, kind: Kind, name: str) -> None:
+    """Makes all credentials of a user invalid; its connections are closed.
+
+    Raises:
+        UserError: there is no such user, or the hub can't be reached; the revocation is kept for `apply`.
+    """
+    with directory.locked():
+        record = directory.read()
+        user = record.user(kind, name)
+        if user is None:
+            raise UserError(f"the hub has no {kind} '{name}'", "List them: robot-bridge hub robots --all")
+        user = replace(user, revoked=int(time.time()))
+        record = _with_revoked(record.with_user(user), user.keys)
+        directory.write(record)
+        await _push_accounts(directory, record)
+        if kind == "robot":
+            async with _connected(directory) as hub:
+                await _list_robot(hub, user)
+
+
+def operator_login(
+    directory: HubDirectory, name: str, *, commands: bool, days: float | None, again: bool
+) -> str:
+    """Issues credentials for a person; returns the text that `robotctl fleet login` takes.
+
+    Raises:
+        UserError: there is one of this name.
+    """
+    with directory.locked():
+        allowed = permissions.operator(commands=commands)
+        record, creds = _issue(directory, "operator", name, allowed, days, again=again)
+        directory.write(record)
+    keys = ", ".join(key.hex() for key in _public_keys(directory.secret("receipts.pub")))
+    return (
+        "# Robot Gateway fleet login 1\n"
+        f"fleet: {record.fleet}\nname: {name}\nservers: {', '.join(record.servers)}\nreceivers: {keys}\n"
+        f"credentials:\n{creds.text()}authority:\n{directory.secret('keys/ca.pem').decode()}"
+    )
+
+
+def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float | None, again: bool) -> None:
+    """Issues credentials for receivers: receiver.creds, ca.pem, receipts.key, fleet.yaml.
+
+    Raises:
+        UserError: there is one of this name.
+    """
+    with directory.locked():
+        record, creds = _issue(directory, "receiver", name, permissions.receiver(), days, again=again)
+        settings = {"servers": list(record.servers), "fleet": record.fleet}
+        write_all_private(
+            {
+                out / "receiver.creds": creds.text().encode(),
+                out / "ca.pem": directory.secret("keys/ca.pem"),
+                out / "receipts.key": directory.secret("receipts.key"),
+                out / "fleet.yaml": yaml.safe_dump(settings, sort_keys=False).encode(),
+            }
+        )
+        directory.write(record)
+
+
+_KEYS: Final[dict[KeyName, KeyKind]] = {
+    "operator": KeyKind.OPERATOR,
+    "fleet": KeyKind.ACCOUNT,
+    "robots": KeyKind.ACCOUNT,
+    "system": KeyKind.ACCOUNT,
+}
+
+
+def _account_tokens(keys: Mapping[KeyName, Key], fleet: str, revoked: Mapping[str, int]) -> dict[str, str]:
+    """Returns the tokens of the three accounts, by public key."""
+    services = permissions.SERVICES
+    fleet_key = keys["fleet"].public
+    accounts = {
+        "system": Account("system"),
+        "fleet": Account(fleet, stores=True, exports=services, revoked=revoked),
+        "robots": Account(
+            f"{fleet} robots", imports=tuple((fleet_key, each) for each in services), revoked=revoked
+        ),
+    }
+    named = {name: keys[name] for name in _ACCOUNTS}
+    return {
+        key.public: account_jwt(keys["operator"], key.public, accounts[name]) for name, key in named.items()
+    }
+
+
+_ACCOUNTS: Final[tuple[KeyName, ...]] = ("system", "fleet", "robots")
+
+
+def _node_files(
+    out: Path, node: Node, plan: HubPlan, keys: Mapping[KeyName, Key], ca: KeyPair
+) -> dict[Path, bytes]:
+    certificate = issue_node_certificate(ca, node.name, [node.host, "localhost", "127.0.0.1"], _CA_DAYS)
+    operator = keys["operator"]
+    text = server_config(
+        node,
+        plan.nodes,
+        operator=operator_jwt(operator, f"{plan.fleet} hub", keys["system"].public),
+        system_account=keys["system"].public,
+        accounts=_account_tokens(keys, plan.fleet, {}),
+        places=plan.places,
+        max_store=plan.max_store,
+        sync_always=plan.sync_always,
+    )
+    return {
+        out / "nats.conf": text.encode(),
+        out / "ca.pem": ca.certificate,
+        out / "server.pem": certificate.certificate,
+        out / "server.key": certificate.key,
+    }
+
+
+def _issue(
+    directory: HubDirectory,
+    kind: Kind,
+    name: str,
+    allowed: Permissions,
+    days: float | None,
+    *,
+    again: bool,
+) -> tuple[HubRecord, Credentials]:
+    """Makes a user's credentials; returns them with the record that lists it."""
+    if not names.ROBOT_NAME.fullmatch(name):
+        raise _no_name(name)
+    record = directory.read()
+    old = record.user(kind, name)
+    if old is not None and not again:
+        state = "was revoked" if old.revoked else "has credentials already"
+        raise UserError(f"the {kind} '{name}' {state}", "Add --again for new ones; the old ones end")
+    if old is not None:
+        record = _with_revoked(record, old.keys)
+    expires = None if days is None else int(time.time() + days * 86_400)
+    creds, key = new_user(directory.key("robots" if kind == "robot" else "fleet"), name, allowed, expires)
+    keys = (*(old.keys if old else ()), key)
+    return record.with_user(User(name, kind, keys)), creds
+
+
+def _with_revoked(record: HubRecord, keys: Sequence[str]) -> HubRecord:
+    now_s = int(time.time())
+    return replace(record, revoked={**record.revoked, **dict.fromkeys(keys, now_s)})
+
+
+async def _push_accounts(directory: HubDirectory, record: HubRecord) -> None:
+    """Gives the servers the accounts' tokens, with all revocations."""
+    keys = {name: directory.key(name) for name in _KEYS}
+    async with _connected(directory, system=True) as hub:
+        for token in _account_tokens(keys, record.fleet, record.revoked).values():
+            answer = await hub.request("$SYS.REQ.CLAIMS.UPDATE", token.encode(), _PUSH_WITHIN_S)
+            try:
+                error = json.loads(answer).get("error")
+            except (ValueError, AttributeError) as wrong:
+                raise HubError(HubReason.INVALID, "the server's answer to a token is no JSON") from wrong
+            if error:
+                raise HubError(HubReason.INVALID, f"the server refuses an account's token: {error}")
+
+
+async def _list_robot(hub: Hub, user: User) -> None:
+    """Puts a robot into the bucket that consoles read."""
+    entry = {"robot": user.name, "revoked": user.revoked is not None, "revoked_unix_s": user.revoked}
+    await hub.put(names.ROBOTS, user.name, json.dumps(entry).encode())
+
+
+@asynccontextmanager
+async def _connected(directory: HubDirectory, *, system: bool = False) -> AsyncGenerator[Hub, None]:
+    """Yields a connection of the administration that stands."""
+    async with connect(directory.address("system" if system else "admin")) as hub:
+        await hub.connected(_CONNECT_S)
+        yield hub
+
+
+def _receipt_keys() -> tuple[bytes, bytes]:
+    key = Ed25519PrivateKey.generate()
+    return (
+        key.private_bytes(
+            serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+        ),
+        key.public_key().public_bytes(
+            serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo
+        ),
+    )
+
+
+def _public_keys(pem: bytes) -> list[bytes]:
+    key = serialization.load_pem_public_key(pem)
+    return [key.public_bytes(serialization.Encoding.Raw, serialization.PublicFormat.Raw)]
+
+
+def _no_name(name: str) -> UserError:
+    return UserError(
+        f"'{name[:80]}' is no name for a robot, person or fleet",
+        "Write lower-case letters, digits and hyphens, at most 63, as in DNS names",
+        exit_code=ExitCode.USAGE,
+    )

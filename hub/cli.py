@@ -1,0 +1,184 @@
+"""`robot-bridge hub`: makes a hub, enrolls and revokes robots, issues credentials."""
+
+import asyncio
+import json
+from collections.abc import Coroutine
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Final, TypeAlias, TypeVar
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from common.errors import ExitCode, UserError
+from fleet.errors import HubError, HubReason
+from hub import administration
+from hub.directory import HubDirectory, Kind
+from hub.server_config import Node, Places
+from hub.streams import StreamLimits
+
+app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
+
+_DEFAULT_DIR: Final = Path("hub")
+_MIB: Final = 1024 * 1024
+ResultT = TypeVar("ResultT")
+Dir: TypeAlias = Annotated[
+    Path, typer.Option("--dir", envvar="ROBOT_HUB_DIR", help="The directory that init has made.")
+]
+Days: TypeAlias = Annotated[
+    float | None,
+    typer.Option(min=0.0001, max=36500, help="Validity in days. Without: until it is revoked."),
+]
+Again: TypeAlias = Annotated[bool, typer.Option("--again", help="New credentials; the old ones end at once.")]
+
+
+@app.command()
+def init(
+    out: Annotated[Path, typer.Option("--out", help="A directory that does not exist yet.")] = _DEFAULT_DIR,
+    *,
+    nodes: Annotated[int, typer.Option(min=1, max=3, help="Servers: 1, or 3 for a cluster.")] = 1,
+    fleet: Annotated[str, typer.Option(help="The fleet's name.")] = "fleet",
+    host: Annotated[
+        list[str] | None,
+        typer.Option(help="Name or address of a server, as robots reach it; once for each server."),
+    ] = None,
+    store: Annotated[str, typer.Option(help="Disk space for streams on each server.")] = "32GB",
+    old_server: Annotated[
+        bool, typer.Option("--server-2.9", help="For nats-server 2.9, which can't sync each message.")
+    ] = False,
+) -> None:
+    """Create keys, certificates and the servers' configuration. Needs no server."""
+    hosts = host or (["localhost"] if nodes == 1 else [])
+    if nodes == 2 or len(hosts) != nodes:  # two servers have no majority when one is lost
+        raise UserError(
+            f"{nodes} servers need as many times --host, and a cluster has three",
+            "Type: robot-bridge hub init --nodes 3 --host hub1 --host hub2 --host hub3",
+            exit_code=ExitCode.USAGE,
+        )
+    plan = administration.HubPlan(
+        fleet=fleet,
+        nodes=tuple(Node(f"n{position}", name) for position, name in enumerate(hosts, 1)),
+        places=Places(),
+        max_store=store,
+        sync_always=not old_server,
+    )
+    administration.create(HubDirectory(out), plan)
+    typer.echo(f"{out}: created the keys of the fleet '{fleet}'. Keep it secret, and keep a backup.")
+    for node in plan.nodes:
+        typer.echo(f"Copy {out}/nodes/{node.name} to {node.host} as /etc/nats, and start nats-server there.")
+    typer.echo(f"Then:  robot-bridge hub apply --dir {out}")
+
+
+@app.command()
+def apply(
+    directory: Dir = _DEFAULT_DIR,
+    events_mib: Annotated[int, typer.Option(min=1, help="Space for events, in MiB.")] = 8192,
+    events_days: Annotated[int, typer.Option(min=1, max=3650, help="How long events are kept.")] = 30,
+) -> None:
+    """Create the streams and buckets that are missing. Ends 1 when existing ones differ."""
+    limits = StreamLimits(events_mib * _MIB, events_days)
+    differences = _run(administration.apply(HubDirectory(directory), limits))
+    for difference in differences:
+        typer.echo(difference)
+    if differences:
+        typer.echo("These were left as they are. Change them with the tool nats, or choose the same limits.")
+        raise typer.Exit(int(ExitCode.FAILED))
+    typer.echo("The hub is ready. Next:  robot-bridge hub enroll ROBOT --out DIR")
+
+
+@app.command()
+def enroll(
+    name: Annotated[str, typer.Argument(help="Of the robot: letters, digits and hyphens.")],
+    out: Annotated[Path, typer.Option("--out", help="Where the robot's files go.")],
+    directory: Dir = _DEFAULT_DIR,
+    days: Days = None,
+    again: Again = False,
+) -> None:
+    """Enroll a robot: its keys, its commands, its place in the list."""
+    _run(administration.enroll(HubDirectory(directory), name, out, days=days, again=again))
+    typer.echo(
+        f"{name} is enrolled. Copy {out} to the robot, and point bridge.yaml at it; then delete it here."
+    )
+
+
+@app.command()
+def revoke(
+    name: Annotated[str, typer.Argument(help="Of the robot, person or receiver.")],
+    directory: Dir = _DEFAULT_DIR,
+    operator: Annotated[bool, typer.Option("--operator", help="A person, not a robot.")] = False,
+    receiver: Annotated[bool, typer.Option("--receiver", help="A receiver, not a robot.")] = False,
+) -> None:
+    """Make all credentials invalid; connections end at once."""
+    kind: Kind = "operator" if operator else "receiver" if receiver else "robot"
+    _run(administration.revoke(HubDirectory(directory), kind, name))
+    typer.echo(f"{name} is revoked.")
+
+
+@app.command()
+def robots(
+    directory: Dir = _DEFAULT_DIR,
+    everyone: Annotated[bool, typer.Option("--all", help="People and receivers as well.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs (docs/fleet.md).")] = False,
+) -> None:
+    """List who is enrolled. Needs no server."""
+    users = [each for each in HubDirectory(directory).read().users if everyone or each.kind == "robot"]
+    users.sort(key=lambda each: (each.kind, each.name))
+    if as_json:
+        found = [
+            {"name": each.name, "kind": each.kind, "key": each.keys[-1], "revoked_unix_s": each.revoked}
+            for each in users
+        ]
+        typer.echo(json.dumps(found, indent=2))
+        return
+    table = Table("NAME", "KIND", "REVOKED", "KEY", box=None)
+    for each in users:
+        revoked = (
+            datetime.fromtimestamp(each.revoked, UTC).strftime("%Y-%m-%d %H:%M") if each.revoked else "-"
+        )
+        table.add_row(each.name, each.kind, revoked, each.keys[-1][:12])
+    Console(highlight=False, markup=False, emoji=False).print(table)
+
+
+@app.command()
+def operator(
+    name: Annotated[str, typer.Argument(help="Of the person.")],
+    directory: Dir = _DEFAULT_DIR,
+    commands: Annotated[bool, typer.Option("--commands", help="May send robots commands, too.")] = False,
+    days: Days = None,
+    again: Again = False,
+) -> None:
+    """Print a login for a person: robotctl fleet login FILE."""
+    hub = HubDirectory(directory)
+    typer.echo(administration.operator_login(hub, name, commands=commands, days=days, again=again), nl=False)
+
+
+@app.command("receiver-credentials")
+def receiver_credentials(
+    out: Annotated[Path, typer.Option("--out", help="Where the files go.")],
+    name: Annotated[str, typer.Option(help="Of the receiver.")] = "receiver",
+    directory: Dir = _DEFAULT_DIR,
+    days: Days = None,
+    again: Again = False,
+) -> None:
+    """Write the files of a receiver of recordings."""
+    administration.receiver_files(HubDirectory(directory), name, out, days=days, again=again)
+    typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:
+    """Runs some work with the hub.
+
+    Raises:
+        UserError: the hub did not do it.
+    """
+    try:
+        return asyncio.run(work)
+    except HubError as error:
+        remedies = {
+            HubReason.UNREACHABLE: "Check that the servers run, and that their names are reachable from here",
+            HubReason.REFUSED: "Name the directory of this hub with --dir",
+            HubReason.NO_QUORUM: "Start the other servers of the cluster, and try again",
+        }
+        code = ExitCode.UNREACHABLE if error.reason is HubReason.UNREACHABLE else ExitCode.FAILED
+        raise UserError(str(error), remedies.get(error.reason, "Try again"), exit_code=code) from error

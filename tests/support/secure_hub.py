@@ -1,0 +1,92 @@
+"""A hub as its administrator makes it: TLS, identities and permissions, with real servers on this machine."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from fleet.connection import FleetAddress
+from fleet.names import inbox_prefix
+from hub import administration
+from hub.administration import HubPlan
+from hub.directory import HubDirectory
+from hub.server_config import Node, Places
+from tests.support.nats_servers import SERVER, NatsServers
+
+_LOOPBACK = "127.0.0.1"
+
+
+class SecureHub:
+    """The hub, and who is enrolled.
+
+    Args:
+        directory: for everything.
+        nodes: 1 or 3.
+        binary: which server.
+    """
+
+    def __init__(self, directory: Path, nodes: int = 1, binary: Path | str = SERVER) -> None:
+        self.path = directory
+        self.directory = HubDirectory(directory / "hub")
+        self.servers = NatsServers(directory, nodes, binary=binary, whole=self._text, scheme="tls")
+        places = Places(listen=_LOOPBACK)
+        self.plan = HubPlan("lab", self._nodes(), places, "64GB", sync_always=binary == SERVER)
+        administration.create(self.directory, self.plan)
+
+    def start(self) -> None:
+        """Starts the servers, and makes the streams."""
+        self.servers.start_all()
+        assert asyncio.run(administration.apply(self.directory)) == []
+
+    def enroll(self, robot: str) -> FleetAddress:
+        """Enrolls a robot; returns how it connects."""
+        asyncio.run(administration.enroll(self.directory, robot, self.path / robot))
+        return self.address(self.path / robot / "bridge.creds", inbox_prefix(robot))
+
+    def operator(self, name: str, *, commands: bool = False) -> FleetAddress:
+        """Issues credentials for a person; returns how they connect."""
+        login = administration.operator_login(self.directory, name, commands=commands, days=None, again=False)
+        creds = self.path / f"{name}.creds"
+        creds.write_text(login.partition("credentials:\n")[2].partition("authority:")[0], encoding="ascii")
+        return self.address(creds)
+
+    def receiver(self) -> FleetAddress:
+        """Issues credentials for a receiver; returns how it connects."""
+        out = self.path / "receiver"
+        administration.receiver_files(self.directory, "receiver", out, days=None, again=False)
+        return self.address(out / "receiver.creds")
+
+    def administrator(self) -> FleetAddress:
+        """How the administration connects."""
+        return self.directory.address("admin")
+
+    def address(self, credentials: Path, inbox: str = "_INBOX") -> FleetAddress:
+        """How to connect with these credentials."""
+        return FleetAddress(self.servers.urls, credentials, self.directory.ca_file, inbox)
+
+    def _nodes(self) -> tuple[Node, ...]:
+        ports = zip(self.servers.ports, self.servers.routes, self.servers.monitors, strict=True)
+        return tuple(
+            Node(f"n{number}", _LOOPBACK, port, route, f"{_LOOPBACK}:{monitor}")
+            for number, (port, route, monitor) in enumerate(ports)
+        )
+
+    def _text(self, servers: NatsServers, node: int) -> str:
+        """The configuration that was made, with this machine's directories."""
+        made = self.directory.path / "nodes" / f"n{node}"
+        places = Places(str(made), str(servers.directory / f"n{node}"), _LOOPBACK)
+        text = (made / "nats.conf").read_text(encoding="utf-8")
+        default = replace(places, config=self.plan.places.config, data=self.plan.places.data)
+        return text.replace(default.config, places.config).replace(default.data, places.data)
+
+
+@contextmanager
+def secure_hub(directory: Path, nodes: int = 1, binary: Path | str = SERVER) -> Iterator[SecureHub]:
+    """Up and set up when the block begins, gone when it ends."""
+    hub = SecureHub(directory, nodes, binary)
+    try:
+        hub.start()
+        yield hub
+    finally:
+        hub.servers.close()
