@@ -1,4 +1,4 @@
-"""Serves the metrics over plain HTTP on a program's event loop.
+"""Serves the metrics of a program over plain HTTP on its event loop.
 
 The server of prometheus_client gives every connection a thread and unlimited time; this one bounds both.
 """

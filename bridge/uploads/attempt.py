@@ -36,7 +36,7 @@ from console.client.errors import (
     Overloaded,
     Unreachable,
 )
-from fleet.receipts import ReceiptError, ReceiptKeys
+from fleet.receipt_keys import ReceiptError, confirmed
 from omniseer.fleet.v1 import upload_pb2 as pb
 
 _ENDED: Final = frozenset(
@@ -70,7 +70,7 @@ class Parties:
         source: Where the recordings are.
         receivers: Who confirms them.
         sender: Where they go.
-        keys: Of the receivers.
+        keys: Public ones of the receivers.
     """
 
     fleet: str
@@ -78,7 +78,7 @@ class Parties:
     source: RecordingSource
     receivers: Receivers
     sender: PartSender
-    keys: ReceiptKeys
+    keys: tuple[bytes, ...]
 
 
 class Attempt:
@@ -228,7 +228,7 @@ class Attempt:
             sha256=file.sha256 if file else sha256,
         )
         try:
-            self._parties.keys.verified(receipt, expected)
+            confirmed(receipt, self._parties.keys, expected)
         except ReceiptError as error:
             raise RecordingError(str(error)) from error
 

@@ -4,7 +4,7 @@ from enum import Enum
 from typing import Any
 
 from console.client import results
-from fleet.receipts import digest_of
+from fleet.receipt_keys import digest_of
 from omniseer.gateway.v1 import recording_pb2 as wire
 
 

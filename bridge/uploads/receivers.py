@@ -1,8 +1,8 @@
 """Requests to the fleet's receivers, and what is accepted as an answer.
 
 Any receiver may answer any request, and a hostile hub may answer anything: what does not match the request,
-or breaks a bound, is an error. What an answer says decides nothing but where to go on; see fleet/receipts.py
-for what makes a copy verified.
+or breaks a bound, is an error. What an answer says decides nothing but where to go on; see
+fleet/receipt_keys.py for what makes a copy verified.
 """
 
 import asyncio

@@ -46,7 +46,6 @@ from common.errors import NotFoundError, PreconditionError, TooMuchError
 from common.reasons import Reason
 from console.client import results
 from console.client.errors import Refused
-from fleet.receipts import ReceiptKeys
 
 _log = logging.getLogger(__name__)
 
@@ -62,12 +61,12 @@ class Fleet:
 
     Attributes:
         fleet, robot: The names under which the robot is enrolled.
-        keys: Of the fleet's receivers.
+        keys: Public ones of the fleet's receivers (fleet/receipt_keys.py).
     """
 
     fleet: str
     robot: str
-    keys: ReceiptKeys
+    keys: tuple[bytes, ...]
 
 
 class Uploads:

@@ -1,1 +1,1 @@
-"""Receives recordings: signs URLs for robots, reads what they have sent again, and confirms it by receipts."""
+"""Receives recordings: signs URLs for robots, reads again what they have sent, and signs receipts for it."""

@@ -36,11 +36,11 @@ class EventServer:
         """After everything that has happened."""
         return EventPosition(self._log.run_id, self._log.sequence)
 
-    def happen(self, count: int) -> None:
-        """So many things happen at once."""
+    def happen(self, count: int, severity: Severity = Severity.INFO, length: int = 0) -> None:
+        """So many things happen at once; their messages are at least so long."""
         for _ in range(count):
             words = f"event {self._log.sequence + 1}"
-            self.note(Event(Severity.INFO, "mission", words, ModeChanged(words)))
+            self.note(Event(severity, "mission", words.ljust(length, "."), ModeChanged(words)))
 
     def note(self, event: Event) -> None:
         """This event happens."""
@@ -64,7 +64,7 @@ class EventServer:
 
     async def _start(self) -> None:
         self._runs += 1
-        self._log = EventLog(f"run {self._runs}", self._kept)
+        self._log = EventLog(f"run-{self._runs}", self._kept)
         self._appended = Broadcast()
         stream = EventStream(self._log, self._appended)
 

@@ -121,7 +121,7 @@ async def test_the_overlays_short_list_comes_from_the_same_log(operator: Operato
 @pytest.mark.parametrize(
     ("after", "reason", "missed"),
     [
-        (EventPosition("run 1", 3), EVENT_GAP_REASON_NO_LONGER_KEPT, 12),
+        (EventPosition("run-1", 3), EVENT_GAP_REASON_NO_LONGER_KEPT, 12),
         (EventPosition("an earlier run", 99), EVENT_GAP_REASON_NEW_RUN, 15),
     ],
 )
@@ -134,7 +134,7 @@ async def test_a_gap_is_sent_before_what_follows_it(after: EventPosition, reason
             call = Operator(channel, server.port).stub.SubscribeEvents(request)
             gap = (await call.read()).gap
             assert (gap.reason, gap.missed_count) == (reason, missed)
-            assert (gap.position.run_id, gap.position.sequence) == ("run 1", 15)
+            assert (gap.position.run_id, gap.position.sequence) == ("run-1", 15)
             assert [(await call.read()).event.sequence for _ in range(5)] == [16, 17, 18, 19, 20]
             assert (await call.read()).caught_up.sequence == 20
             call.cancel()

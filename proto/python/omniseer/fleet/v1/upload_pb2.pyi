@@ -708,7 +708,7 @@ class StoredRecording(_message.Message):
 
     @_builtins.property
     def files(self) -> _containers.RepeatedCompositeFieldContainer[_recording_pb2.RecordingFile]:
-        """Its files."""
+        """Its files. Left out where the message would be longer than 768 KiB."""
 
     def __init__(
         self,

@@ -1,0 +1,98 @@
+"""Assembles the bridge, starts its parts in order and stops them in reverse."""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from bridge.commands.desk import Desk
+from bridge.commands.taker import CommandTaker
+from bridge.config import BridgeSettings
+from bridge.outbox.outbox import outbox
+from bridge.robot.events import EventReader
+from bridge.robot.status import StatusReader
+from bridge.rpc.servicer import SERVICE, BridgeServicer
+from bridge.sender import Sender
+from bridge.state_sender import StateSender
+from bridge.status import Status
+from bridge.uploading import NoUploads
+from common import bind, rpc
+from common.health import Health
+from fleet.connection import FleetAddress, connect
+from fleet.names import inbox_prefix
+
+_log = logging.getLogger(__name__)
+
+_RUN_ID_BYTES = 8
+
+
+async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
+    """Connects the robot with its fleet, and serves the gateway, until `stop`.
+
+    Raises:
+        UserError: the socket can't be used.
+    """
+    robot, run_id = settings.hub.robot, secrets.token_hex(_RUN_ID_BYTES)
+    async with (
+        outbox(settings.root, settings.outbox.max_bytes) as kept,
+        connect(_address(settings)) as hub,
+    ):
+        uploads = NoUploads()
+        sender = Sender(robot, kept, hub)
+        status = Status(robot, settings.hub.fleet, outbox=kept, hub=hub, sender=sender, uploads=uploads)
+        desk = Desk(robot, kept, status.changes.notify_all)
+        robot_status = StatusReader(settings.gateway)
+        states = StateSender(
+            robot,
+            settings.advertised_target,
+            run_id,
+            status=robot_status,
+            outbox=kept,
+            uploads=uploads,
+            hub=hub,
+        )
+        parts: list[Callable[[], Coroutine[Any, Any, None]]] = [
+            EventReader(settings.gateway, kept).run,
+            robot_status.run,
+            sender.run,
+            states.run,
+        ]
+        if settings.commands.allowed:
+            parts.append(CommandTaker(settings, hub, desk).run)
+        server = rpc.new_server()
+        BridgeServicer(run_id, status, uploads, desk).register(server)
+        Health(SERVICE).register(server)
+        bind.bind_unix(server, settings.socket)
+        await server.start()
+        _log.info("serving on %s; robot %s of fleet %s", settings.socket, robot, settings.hub.fleet)
+        try:
+            await _run(parts, stop)
+        finally:
+            await server.stop(rpc.STOP_GRACE_S)
+            settings.socket.unlink(missing_ok=True)
+
+
+def _address(settings: BridgeSettings) -> FleetAddress:
+    hub = settings.hub
+    return FleetAddress(
+        hub.servers,
+        credentials=hub.credentials,
+        ca=hub.ca,
+        inbox=inbox_prefix(hub.robot),
+        name=f"robot-bridge {hub.robot}",
+    )
+
+
+async def _run(parts: list[Callable[[], Coroutine[Any, Any, None]]], stop: asyncio.Event) -> None:
+    """Runs the parts until `stop`; a defect in one of them ends the program, which is then restarted."""
+    tasks = [asyncio.create_task(part()) for part in parts]
+    stopping = asyncio.create_task(stop.wait())
+    try:
+        done, _ = await asyncio.wait([*tasks, stopping], return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in (*tasks, stopping):
+            task.cancel()
+        await asyncio.gather(*tasks, stopping, return_exceptions=True)

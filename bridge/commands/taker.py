@@ -1,0 +1,140 @@
+"""Takes commands from the hub, one at a time, and acknowledges each when its result is on the disk."""
+
+import asyncio
+import logging
+import time
+from typing import Final
+
+from bridge.clock import synchronised_unix_s
+from bridge.commands.ages import HubTime, age_s, hub_time
+from bridge.commands.desk import Desk, Pending
+from bridge.commands.judgement import Denial, Request, Stray, judge
+from bridge.config import BridgeSettings
+from bridge.pauses import Pauses
+from bridge.values import OutboxError
+from common.token_bucket import TokenBucket
+from fleet.connection import Delivery, Hub
+from fleet.errors import HubError
+from fleet.names import COMMANDS
+
+_log = logging.getLogger(__name__)
+
+_BURST: Final = 4.0
+_PER_S: Final = 0.1
+"""A robot has no use for more."""
+_LOOK_S: Final = 0.5
+_TIME_GOOD_S: Final = 3600.0
+"""Quartz clocks differ by less than 0.4 s in that time."""
+
+
+class CommandTaker:
+    """Takes commands until cancelled.
+
+    Args:
+        settings: of the bridge; `commands.allowed` is not empty.
+        hub: brings them.
+        desk: where requests wait for the gateway.
+
+    Attributes:
+        strays: messages that were no command to this robot.
+        denied: commands that were refused or had expired.
+    """
+
+    def __init__(self, settings: BridgeSettings, hub: Hub, desk: Desk) -> None:
+        self._robot = settings.hub.robot
+        self._allowed = frozenset(settings.commands.allowed)
+        self._hub, self._desk = hub, desk
+        self._bucket = TokenBucket(_BURST, time.monotonic())
+        self._time: HubTime | None = None
+        self._time_of = 0
+        self._waiting: set[asyncio.Task[None]] = set()
+        self.strays = 0
+        self.denied = 0
+
+    async def run(self) -> None:
+        """Takes commands; a failure of hub or disk is tried again for as long as it takes."""
+        pauses = Pauses()
+        try:
+            while True:
+                try:
+                    await self._desk.end_those_of_an_earlier_run()
+                    async for delivery in self._hub.pull(COMMANDS, self._robot, batch=1):
+                        await self._have_room()
+                        await self._take(delivery)
+                        pauses.reset()
+                except (HubError, OutboxError) as error:
+                    # What is not acknowledged comes again.
+                    _log.warning("commands of the hub wait: %s", error)
+                await pauses.wait()
+        finally:
+            for task in self._waiting:
+                task.cancel()
+
+    async def _have_room(self) -> None:
+        """Waits while as many requests are pending as may be, and for the rate limit."""
+        while self._desk.is_full or not self._bucket.take(
+            time.monotonic(), capacity=_BURST, refill_per_s=_PER_S
+        ):
+            await self._desk.expire()
+            await asyncio.sleep(_LOOK_S)
+
+    async def _take(self, delivery: Delivery) -> None:
+        age = age_s(delivery.unix_s, time.monotonic(), await self._hub_time(), synchronised_unix_s())
+        judgement = judge(
+            delivery.subject, delivery.payload, robot=self._robot, allowed=self._allowed, age_s=age
+        )
+        match judgement:
+            case Stray(why):
+                self.strays += 1
+                _log.warning("a message of the hub is no command to this robot: %s", why)
+                await delivery.ack()
+            case Denial():
+                self.denied += 1
+                await self._deny(judgement, delivery)
+            case Request():
+                await self._hand_over(judgement, delivery)
+
+    async def _deny(self, denial: Denial, delivery: Delivery) -> None:
+        # A command that waits for the gateway comes again after a while, and may have expired meanwhile.
+        if not self._desk.has(denial.command_id):
+            _log.warning("command %s of the hub: %s", denial.command_id, denial.message)
+            await self._desk.deny(denial)
+            await delivery.ack()
+
+    async def _hand_over(self, request: Request, delivery: Delivery) -> None:
+        if self._desk.has(request.command_id):
+            return
+        pending = await self._desk.add(request)
+        if pending is None:
+            await delivery.ack()
+            return
+        _log.info("command %s of %s is handed to the gateway", request.command_id, request.issued_by)
+        task = asyncio.create_task(self._acknowledge(pending, delivery), name=f"command {request.command_id}")
+        self._waiting.add(task)
+        task.add_done_callback(self._waiting.discard)
+
+    async def _acknowledge(self, pending: Pending, delivery: Delivery) -> None:
+        while not pending.ended.is_set():
+            await self._desk.expire()
+            try:
+                async with asyncio.timeout(_LOOK_S):
+                    await pending.ended.wait()
+            except TimeoutError:
+                continue
+        try:
+            await delivery.ack()
+        except HubError as error:
+            _log.info("command %s will come again, and be ignored: %s", pending.request.command_id, error)
+
+    async def _hub_time(self) -> HubTime | None:
+        """Returns the hub's time, asked for once in a connection and then every hour."""
+        connections, now_s = self._hub.link.connections, time.monotonic()
+        fresh = self._time is not None and now_s - self._time.asked_s < _TIME_GOOD_S
+        if not fresh or connections != self._time_of:
+            try:
+                info = await self._hub.api(f"CONSUMER.INFO.{COMMANDS}.{self._robot}")
+            except HubError as error:
+                _log.warning("the hub does not say what time it is: %s", error)
+                info = None
+            self._time, self._time_of = hub_time(info, now_s), connections
+        return self._time

@@ -1,0 +1,93 @@
+"""Settings of the bridge: one YAML file, overridden by `BRIDGE__...` environment variables."""
+
+from pathlib import Path
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+from pydantic_settings import SettingsConfigDict
+
+from common.config import Section, Settings
+from common.errors import UserError
+from console.target import DEFAULT_TARGET, parse_target
+from fleet.names import ROBOT_NAME
+
+MIB: Final = 1024 * 1024
+Name = Annotated[str, Field(pattern=f"^{ROBOT_NAME.pattern}$")]
+"""Of a robot or a fleet."""
+Server = Annotated[str, Field(pattern=r"^(tls|nats)://[^\s/@]+$", max_length=255)]
+
+
+class GatewaySettings(Section):
+    """The robot's gateway, and a viewer's credential for it, in files as `robotctl login` makes them."""
+
+    target: str = DEFAULT_TARGET
+    """HOST or HOST:PORT."""
+    ca_certificate_file: Path | None = None
+    """Of the authority that signed the gateway's certificate; with it the connection is encrypted."""
+    client_certificate_file: Path | None = None
+    client_key_file: Path | None = None
+    token_file: Path | None = None
+
+    @field_validator("target")
+    @classmethod
+    def _is_an_address(cls, target: str) -> str:
+        try:
+            return parse_target(target)
+        except UserError as error:
+            raise ValueError(error.what) from error
+
+
+class HubSettings(Section):
+    """The fleet's hub, as `robot-bridge hub enroll` writes it for the robot."""
+
+    servers: tuple[Server, ...] = Field(default=("nats://127.0.0.1:4222",), min_length=1, max_length=16)
+    """Nodes of the hub, in any order."""
+    credentials: Path | None = None
+    """The robot's bridge.creds. None: the hub asks for none, which it does in tests alone."""
+    ca: Path | None = None
+    """Certificate authority of the servers. None: without TLS, which servers called nats:// are for."""
+    receipts: Path | None = None
+    """Public keys of the receivers of recordings."""
+    robot: Name = "robot"
+    """The name under which the robot is enrolled."""
+    fleet: Name = "fleet"
+
+
+class OutboxSettings(Section):
+    """What waits for the hub."""
+
+    max_bytes: int = Field(default=64 * MIB, ge=8 * MIB, le=4096 * MIB)
+    """Of the outbox on the disk, all its files together."""
+
+
+class CommandSettings(Section):
+    """What the hub may request of this robot. The gateway's configuration has to allow it as well."""
+
+    allowed: tuple[Literal["upload", "snapshot"], ...] = ()
+
+
+class BridgeSettings(Settings):
+    """All settings of the bridge."""
+
+    model_config = SettingsConfigDict(env_prefix="BRIDGE__")
+
+    socket: Path = Path("/run/robot-gateway/bridge.sock")
+    """Unix socket on which the gateway connects."""
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: Literal["human", "json"] = "human"
+    """Text for people, or one JSON object per line for programs."""
+    root: Path = Path("/var/lib/robot-bridge")
+    """The folder of the outbox."""
+    gateway: GatewaySettings = GatewaySettings()
+    hub: HubSettings = HubSettings()
+    outbox: OutboxSettings = OutboxSettings()
+    commands: CommandSettings = CommandSettings()
+    advertised_target: str = Field(default="", max_length=255)
+    """Where operators near the robot reach its gateway, as HOST:PORT, for the fleet's table."""
+
+    @model_validator(mode="after")
+    def _tls_has_an_authority(self) -> Self:
+        # Without one, any server could pass for the hub.
+        if self.hub.ca is None and any(each.startswith("tls://") for each in self.hub.servers):
+            raise ValueError("hub.ca is missing: the file ca.pem of the robot's enrolment")
+        return self

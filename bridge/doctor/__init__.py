@@ -1,0 +1,1 @@
+"""Finds out what keeps this robot from its fleet."""

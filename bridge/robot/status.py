@@ -1,0 +1,57 @@
+"""Watches the gateway's status: the newest one, and whether the gateway is reached."""
+
+import logging
+from typing import Any, Final
+
+from bridge.config import GatewaySettings
+from bridge.pauses import Pauses
+from bridge.robot.gateway import STATUS_SILENT_S, statuses
+from common.broadcast import Broadcast
+from common.errors import UserError
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+
+_log = logging.getLogger(__name__)
+
+_LONGEST_PAUSE_S: Final = 10.0
+
+
+class StatusReader:
+    """Reads the status until cancelled.
+
+    Args:
+        settings: of the gateway.
+
+    Attributes:
+        newest: the last one that was received; None before the first.
+        reachable: whether it still comes.
+        error: why not, for people.
+        changes: notified after each status, and of `reachable`.
+    """
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self._settings = settings
+        self.newest: SystemStatus | None = None
+        self.reachable = False
+        self.error = "the gateway has not answered yet"
+        self.changes = Broadcast()
+
+    async def run(self) -> None:
+        """Reads; tries again for as long as it takes."""
+        pauses = Pauses(_LONGEST_PAUSE_S)
+        while True:
+            try:
+                async with statuses(self._settings) as responses:
+                    while True:
+                        self._take(await responses.read(STATUS_SILENT_S))
+                        pauses.reset()
+            except UserError as error:
+                if self.reachable or not pauses.failures:
+                    _log.warning("no status from the gateway: %s", error)
+                self.reachable, self.error = False, str(error)
+                self.changes.notify_all()
+            await pauses.wait()
+
+    def _take(self, response: Any) -> None:
+        self.newest = response.status
+        self.reachable, self.error = True, ""
+        self.changes.notify_all()

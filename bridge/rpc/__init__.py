@@ -1,0 +1,1 @@
+"""The bridge as the gateway sees it: omniseer.bridge.v1."""

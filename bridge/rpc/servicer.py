@@ -1,0 +1,115 @@
+"""BridgeService: receives, maps, calls, maps, replies."""
+
+import time
+from collections.abc import AsyncIterator
+from typing import Any, Final
+
+import grpc
+
+from bridge.commands.desk import Desk, Pending
+from bridge.commands.judgement import Upload
+from bridge.status import Status
+from bridge.uploading import Uploading
+from bridge.values import OutboxError
+from common.errors import InvalidRequestError, TooMuchError
+from common.reasons import Reason
+from omniseer.bridge.v1 import bridge_service_pb2 as pb
+from omniseer.bridge.v1 import bridge_service_pb2_grpc as pb_grpc
+from omniseer.fleet.v1 import command_pb2
+
+SERVICE: Final = pb.DESCRIPTOR.services_by_name["BridgeService"].full_name
+
+_HEARTBEAT_S: Final = 1.0
+_MS_PER_S: Final = 1000
+OUTCOMES: Final = {
+    pb.REQUEST_OUTCOME_DONE: command_pb2.COMMAND_OUTCOME_DONE,
+    pb.REQUEST_OUTCOME_REFUSED: command_pb2.COMMAND_OUTCOME_REFUSED,
+    pb.REQUEST_OUTCOME_FAILED: command_pb2.COMMAND_OUTCOME_FAILED,
+}
+
+
+class BridgeServicer(pb_grpc.BridgeServiceServicer):
+    """BridgeService.
+
+    Args:
+        run_id: of this run of the bridge.
+        status: of the connection.
+        uploads: the queue.
+        desk: requests of the hub.
+    """
+
+    def __init__(self, run_id: str, status: Status, uploads: Uploading, desk: Desk) -> None:
+        self._run_id = run_id
+        self._status = status
+        self._uploads = uploads
+        self._desk = desk
+
+    def register(self, server: grpc.aio.Server) -> None:
+        """Adds the methods to a server."""
+        pb_grpc.add_BridgeServiceServicer_to_server(self, server)
+
+    async def WatchState(  # noqa: N802  # the schema names it
+        self, _request: pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> AsyncIterator[pb.WatchStateResponse]:
+        """Streams the state, now, on every change and every second; a slow reader skips outdated ones."""
+        changed = True
+
+        def has_changed() -> bool:
+            nonlocal changed
+            before, changed = changed, True
+            return before
+
+        while True:
+            changed = False
+            yield self._state()
+            await self._status.changes.wait_until(has_changed, _HEARTBEAT_S)
+
+    async def UploadRecording(  # noqa: N802  # the schema names it
+        self, request: pb.UploadRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.UploadRecordingResponse:
+        """Queues a recording."""
+        return pb.UploadRecordingResponse(copy=await self._uploads.enqueue(request.recording_id))
+
+    async def CancelUpload(  # noqa: N802  # the schema names it
+        self, request: pb.CancelUploadRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.CancelUploadResponse:
+        """Takes a recording from the queue."""
+        return pb.CancelUploadResponse(copy=await self._uploads.cancel(request.recording_id))
+
+    async def AnswerRequest(  # noqa: N802  # the schema names it
+        self, request: pb.AnswerRequestRequest, _context: grpc.aio.ServicerContext[Any, Any]
+    ) -> pb.AnswerRequestResponse:
+        """Ends a request of the hub; the answer is on the disk when this returns."""
+        outcome = OUTCOMES.get(request.outcome)
+        if outcome is None:
+            raise InvalidRequestError("outcome has to be DONE, REFUSED or FAILED")
+        try:
+            await self._desk.answer(request.request_id, outcome, request.message, request.recording_id)
+        except OutboxError as error:
+            raise TooMuchError(f"the answer can't be kept: {error}", Reason.DISK_FULL) from error
+        return pb.AnswerRequestResponse()
+
+    def _state(self) -> pb.WatchStateResponse:
+        return pb.WatchStateResponse(
+            instance_id=self._run_id,
+            status=self._status.message(),
+            copies=self._uploads.copies(),
+            requests=[_request(each) for each in self._desk.pending],
+        )
+
+
+def _request(pending: Pending) -> pb.HubRequest:
+    remaining_s = max(pending.until_s - time.monotonic(), 0.0)
+    message = pb.HubRequest(
+        request_id=pending.request.command_id,
+        issued_by=pending.request.issued_by,
+        remaining_ms=int(remaining_s * _MS_PER_S),
+    )
+    action = pending.request.action
+    if isinstance(action, Upload):
+        message.upload.recording_id = action.recording_id
+    else:
+        message.snapshot.CopyFrom(
+            pb.SnapshotAction(pre_s=action.pre_s, post_s=action.post_s, label=action.label)
+        )
+    return message

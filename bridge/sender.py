@@ -1,0 +1,92 @@
+"""Sends what the outbox holds: batches of events one at a time and in order, and results of commands.
+
+| what the hub says | what follows |
+|---|---|
+| delivered, or refused because it has the batch | the outbox deletes it |
+| anything else, or nothing | the same batch again, after 1 s to 60 s with jitter |
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+
+from bridge.encoding import batch_message
+from bridge.outbox.outbox import Outbox
+from bridge.pauses import Pauses
+from bridge.values import OutboxError
+from fleet.connection import Hub, Published
+from fleet.errors import HubError
+from fleet.names import event_subject, result_subject
+
+_log = logging.getLogger(__name__)
+
+
+class Sender:
+    """Sends until cancelled.
+
+    Args:
+        robot: its name in the fleet.
+        outbox: what is to be sent.
+        hub: takes it.
+    """
+
+    def __init__(self, robot: str, outbox: Outbox, hub: Hub) -> None:
+        self._robot = robot
+        self._outbox = outbox
+        self._hub = hub
+        self.last_sent_s: float | None = None
+        """When the hub acknowledged a batch last; monotonic seconds."""
+        self.repeats = 0
+        """Batches that the hub had already."""
+        self.failures = 0
+        """Attempts that failed."""
+        self.error = ""
+        """Why the newest attempt to send events failed, for people; empty after one that succeeded."""
+
+    async def run(self) -> None:
+        """Sends events and results."""
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._keep_sending(self._send_batch), name="send-events")
+            group.create_task(self._keep_sending(self._send_result), name="send-results")
+
+    async def _keep_sending(self, send: Callable[[], Awaitable[bool]]) -> None:
+        pauses = Pauses()
+        while True:
+            before = self._outbox.facts, self._outbox.results
+            try:
+                await self._hub.connected()
+                if not await send():
+                    await self._outbox.changes.wait_until(
+                        lambda: before != (self._outbox.facts, self._outbox.results)  # noqa: B023  # awaited here
+                    )
+                pauses.reset()
+            except (HubError, OutboxError) as error:
+                self.failures += 1
+                self.error = str(error)
+                _log.info("it is sent again later: %s", error)
+                await pauses.wait()
+
+    async def _send_batch(self) -> bool:
+        """Sends a batch. Returns False if there is none."""
+        batch = await self._outbox.next_batch()
+        if batch is None:
+            self.error = ""
+            return False
+        subject = event_subject(self._robot, batch.run_id, batch.first)
+        published = await self._hub.publish_once(subject, batch_message(self._robot, batch))
+        self.last_sent_s = time.monotonic()
+        self.repeats += published is Published.REPEATED
+        self.error = ""
+        await self._outbox.delivered(batch, repeated=published is Published.REPEATED)
+        return True
+
+    async def _send_result(self) -> bool:
+        """Sends the result of a command. Returns False if there is none."""
+        result = await self._outbox.next_result()
+        if result is None:
+            return False
+        command_id, payload = result
+        await self._hub.publish_once(result_subject(self._robot, command_id), payload)
+        await self._outbox.result_sent(command_id)
+        return True

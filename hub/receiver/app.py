@@ -1,0 +1,158 @@
+"""Assembles a receiver, starts its parts in order and stops them in reverse."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager, nullcontext
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from common import bind, rpc
+from common.health import Health
+from common.metrics_endpoint import serving_metrics
+from fleet.connection import FleetAddress, Handler, Hub, Request, connect
+from fleet.errors import HubError
+from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
+from fleet.receipt_keys import ReceiptSigner, read_keys
+from hub.receiver.config import ReceiverSettings
+from hub.receiver.metrics import ReceiverMetrics
+from hub.receiver.service import THREADS, Party, ReceiverService, busy
+from hub.receiver.store import Store, StoreError
+from omniseer.fleet.v1.upload_pb2 import UploadResponse
+
+_log = logging.getLogger(__name__)
+
+SERVICE: Final = "receiver"
+"""Of the health service: whether the receiver is connected to the hub."""
+AT_ONCE: Final = 8
+"""Requests in hand; further ones get BUSY."""
+_SWEEP_EVERY_S: Final = 3600.0
+_MOST_SWEPT: Final = 1000
+_NAMES: Final = frozenset(field.name for field in UploadResponse.DESCRIPTOR.fields) - {"error"}
+
+
+async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
+    """Answers robots until `stop`.
+
+    Raises:
+        UserError: A key can't be read, or a socket can't be used.
+    """
+    signer = ReceiptSigner(read_keys(settings.signing_key)[0])
+    others = read_keys(settings.receipt_keys) if settings.receipt_keys else ()
+    party = Party(settings.fleet, signer, (signer.public_key, *others))
+    address = FleetAddress(
+        settings.hub.servers, settings.hub.credentials, settings.hub.ca, name=f"receiver of {settings.fleet}"
+    )
+    async with _opened(settings) as (store, threads), connect(address) as hub:
+        service = ReceiverService(party, store, hub, threads)
+        metrics = ReceiverMetrics(lambda: service.bytes_read, lambda: hub.link.connected)
+        health = Health()
+        server = rpc.new_server()
+        health.register(server)
+        bind.bind_unix(server, settings.socket)
+        await server.start()
+        tasks: tuple[asyncio.Task[None], ...] = ()
+        port = settings.metrics.port
+        page = nullcontext() if port is None else serving_metrics(metrics.text, settings.metrics.host, port)
+        try:
+            async with page:
+                await hub.serve(
+                    UPLOAD_SUBJECTS, RECEIVERS, _handler(service, metrics), at_once=AT_ONCE, busy=busy()
+                )
+                _log.info("receiving recordings of the fleet %s", settings.fleet)
+                tasks = (
+                    asyncio.create_task(_report_health(hub, health), name="health"),
+                    asyncio.create_task(_sweep_for_ever(settings, store, threads, metrics), name="sweep"),
+                )
+                await _first_of(stop, tasks)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await server.stop(rpc.STOP_GRACE_S)
+            settings.socket.unlink(missing_ok=True)
+
+
+async def _first_of(stop: asyncio.Event, tasks: "tuple[asyncio.Task[None], ...]") -> None:
+    """Waits for `stop`; a task that ends before raises what it has ended with."""
+    waiter = asyncio.ensure_future(stop.wait())
+    try:
+        done, _ = await asyncio.wait({waiter, *tasks}, return_when=asyncio.FIRST_COMPLETED)
+        for each in done:
+            each.result()
+    finally:
+        waiter.cancel()
+
+
+@asynccontextmanager
+async def _opened(settings: ReceiverSettings) -> AsyncIterator[tuple[Store, ThreadPoolExecutor]]:
+    store = Store(settings.store)
+    threads = ThreadPoolExecutor(THREADS, thread_name_prefix="store")
+    try:
+        yield store, threads
+    finally:
+        # What is being read ends by the deadlines of the store.
+        await asyncio.to_thread(threads.shutdown, wait=True, cancel_futures=True)
+        store.close()
+
+
+def _handler(service: ReceiverService, metrics: ReceiverMetrics) -> Handler:
+    async def handle(request: Request) -> None:
+        async def send(response: UploadResponse) -> None:
+            await request.respond(response.SerializeToString())
+
+        name = request.name if request.name in _NAMES else "other"
+        with metrics.in_hand.track_inprogress():
+            try:
+                outcome = await service.answer(request.robot, request.name, request.payload, send)
+            except HubError as error:
+                # Without an answer the robot asks again.
+                _log.warning("%s of %s got no answer: %s", name, request.robot, error)
+                outcome = "no answer"
+        metrics.count(name, outcome)
+
+    return handle
+
+
+async def _report_health(hub: Hub, health: Health) -> None:
+    reported = None
+
+    def changed() -> bool:
+        return hub.link is not reported
+
+    while True:
+        await hub.changed.wait_until(changed)
+        reported = hub.link
+        health.set_serving(SERVICE, serving=reported.connected)
+
+
+async def _sweep_for_ever(
+    settings: ReceiverSettings, store: Store, threads: ThreadPoolExecutor, metrics: ReceiverMetrics
+) -> None:
+    loop = asyncio.get_running_loop()
+    while True:
+        oldest = datetime.now(UTC) - timedelta(days=settings.keep_parts_days)
+        try:
+            count = await loop.run_in_executor(threads, sweep, store, f"{settings.fleet}/", oldest)
+            metrics.swept.inc(count)
+        except StoreError as error:
+            _log.warning("abandoned uploads could not be looked for: %s", error)
+        await asyncio.sleep(_SWEEP_EVERY_S)
+
+
+def sweep(store: Store, prefix: str, before: datetime) -> int:
+    """Deletes uploads that were begun before an instant and not completed, 1000 at the most.
+
+    Several receivers may do so at once. An upload that a robot then goes on with is begun again.
+
+    Returns:
+        How many were deleted.
+
+    Raises:
+        StoreError: The store does not answer.
+    """
+    old = [each for each in store.open_uploads(prefix, _MOST_SWEPT) if each.begun < before]
+    for upload in old:
+        store.abort(upload)
+    return len(old)

@@ -1,0 +1,260 @@
+"""Events on their way to a real hub: received = issued - announced gaps, none twice, in order.
+
+BRIDGE_KILLS=200 in the environment kills many times.
+"""
+
+import asyncio
+import errno
+import os
+import random
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from fleet.connection import Hub
+from gateway.status.fault import Severity
+from omniseer.fleet.v1.event_pb2 import (
+    DROP_REASON_DISK,
+    DROP_REASON_OUTBOX_FULL,
+    DROP_REASON_OUTBOX_LOST,
+)
+from omniseer.gateway.v1 import cloud_pb2
+from tests.support.calendar_clock import CalendarClock
+from tests.support.event_server import EventServer
+from tests.support.eventually import eventually
+from tests.support.nats_servers import NatsServers
+from tests.support.relay import Relay
+from tests.support.running_bridge import BridgeProgram, Received, bridge_program, received
+
+_KILLS = int(os.environ.get("BRIDGE_KILLS", "15"))
+
+
+async def all_there(hub: Hub, gateway: EventServer, within_s: float = 30.0) -> Received:
+    """Waits until everything is there or announced."""
+
+    def adds_up(found: Received) -> bool:
+        return all(found.add_up_to(run, issued) for run, issued in gateway.happened.items())
+
+    return await eventually(lambda: received(hub), adds_up, "all is there or announced", within_s)
+
+
+async def begin(bridge: BridgeProgram, hub: Hub) -> None:
+    """Starts a bridge; what happens from now on is after what its new outbox does not know."""
+    await asyncio.to_thread(bridge.start)
+    await eventually(lambda: received(hub), lambda found: found.batches, "it has begun")
+
+
+async def status_of(bridge: BridgeProgram) -> cloud_pb2.CloudStatus:
+    return await asyncio.to_thread(lambda: bridge.status)
+
+
+@contextmanager
+def small_disk(directory: Path, mib: int) -> Iterator[Path]:
+    """A file system of its own."""
+    directory.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={mib}m", "tmpfs", str(directory)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small disk needs root")
+    try:
+        yield directory
+    finally:
+        subprocess.run(["umount", "-l", str(directory)], check=True)
+
+
+def fill(path: Path) -> None:
+    """Takes all that is left of a disk."""
+    with path.open("wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(4096))
+        except OSError as error:
+            if error.errno != errno.ENOSPC:
+                raise
+
+
+@pytest.mark.timeout(60 + 4 * _KILLS)
+async def test_killed_at_random_instants_it_loses_and_repeats_nothing(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    with bridge_program(tmp_path / "bridge", gateway.port, servers.urls) as bridge:
+        for _ in range(_KILLS):
+            end_s = asyncio.get_running_loop().time() + random.uniform(0.2, 3.0)
+            bridge.start(wait=False)
+            while asyncio.get_running_loop().time() < end_s:
+                gateway.happen(random.randint(1, 5))
+                await asyncio.sleep(0.01)
+            bridge.kill()
+        await asyncio.to_thread(bridge.start)
+        found = await all_there(hub, gateway)
+    (issued,) = gateway.happened.values()
+    assert len(found.events) + len(found.missing) == issued
+    assert len(found.events) > 0
+
+
+async def test_restarted_gateways_are_runs_of_their_own(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    with bridge_program(tmp_path / "bridge", gateway.port, servers.urls) as bridge:
+        await begin(bridge, hub)
+        for _ in range(3):
+            gateway.happen(100)
+            await all_there(hub, gateway)
+            await gateway.restart()
+            gateway.happen(5)
+        found = await all_there(hub, gateway)
+    assert len(gateway.happened) == 4
+    firsts = {batch.run_id: batch.items[0].dropped for batch in reversed(found.batches)}
+    assert all(first.earlier_run_incomplete for first in firsts.values()), (
+        "what the run before had is not known"
+    )
+    assert len(found.events) == 315
+
+
+async def test_a_hub_that_is_gone_for_longer_than_the_outbox_holds(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    async with Relay(servers.ports[0]) as relay:
+        urls = (f"nats://127.0.0.1:{relay.port}",)
+        settings = {"outbox": {"max_bytes": 8 * 1024 * 1024}}
+        with bridge_program(tmp_path / "bridge", gateway.port, urls, **settings) as bridge:
+            await begin(bridge, hub)
+            relay.open = False
+            relay.cut()
+            size = 0
+            for number in range(120):
+                severity = Severity.WARNING if number % 10 == 0 else Severity.INFO
+                gateway.happen(100, severity, 1000)
+                await eventually(
+                    lambda: status_of(bridge),
+                    lambda status, most=(number + 1) * 100 - 500: (
+                        status.outbox_events + status.events_dropped > most
+                    ),
+                    "the bridge keeps up",
+                )
+                size = max(size, sum(path.stat().st_size for path in bridge.root.iterdir()))
+            status = await status_of(bridge)
+            assert status.state == cloud_pb2.CLOUD_STATE_OFFLINE
+            assert status.last_error
+            assert size <= 8 * 1024 * 1024
+            relay.open = True
+            found = await all_there(hub, gateway, 100)
+            status = await status_of(bridge)
+    assert found.reasons == {DROP_REASON_OUTBOX_LOST, DROP_REASON_OUTBOX_FULL}
+    assert status.events_dropped == len(found.missing) > 1000
+    assert len(found.events) + len(found.missing) == 12_000
+    warnings = [item for batch in found.batches for item in batch.items if item.event.severity == 2]
+    assert len(warnings) == 1200, "what matters more was kept"
+
+
+async def test_a_half_open_connection_is_given_up(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    async with Relay(servers.ports[0]) as relay:
+        urls = (f"nats://127.0.0.1:{relay.port}",)
+        with bridge_program(tmp_path / "bridge", gateway.port, urls) as bridge:
+            await begin(bridge, hub)
+            relay.frozen = True
+            gateway.happen(50)
+            await eventually(
+                lambda: status_of(bridge),
+                lambda status: status.state == cloud_pb2.CLOUD_STATE_OFFLINE,
+                "the bridge notices",
+                25.0,
+            )
+            relay.frozen = False
+            found = await all_there(hub, gateway, 60)
+    assert len(found.events) == 50
+
+
+async def test_an_uplink_that_works_for_a_hundredth_of_the_time(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    """Up for 60 ms of every 6 s, or so: long enough for a connection, not for all that waits."""
+    async with Relay(servers.ports[0]) as relay:
+        urls = (f"nats://127.0.0.1:{relay.port}",)
+        with bridge_program(tmp_path / "bridge", gateway.port, urls) as bridge:
+            await begin(bridge, hub)
+            for _ in range(5):
+                relay.frozen = True
+                gateway.happen(30)
+                await asyncio.sleep(2)
+                relay.frozen = False
+                await asyncio.sleep(random.uniform(0.01, 0.06))
+                relay.cut()
+            found = await all_there(hub, gateway, 60)
+    assert len(found.events) == 150
+
+
+async def test_an_outbox_that_was_cut_costs_what_it_says(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    async with Relay(servers.ports[0]) as relay:
+        urls = (f"nats://127.0.0.1:{relay.port}",)
+        with bridge_program(tmp_path / "bridge", gateway.port, urls) as bridge:
+            await begin(bridge, hub)
+            for length in (0, 4096, 20_000):
+                gateway.happen(200)
+                await all_there(hub, gateway)
+                relay.open = False
+                relay.cut()
+                gateway.happen(100)
+                await eventually(
+                    lambda: status_of(bridge),
+                    lambda status: status.outbox_events >= 100,
+                    "the outbox has them",
+                )
+                bridge.kill()
+                os.truncate(bridge.root / "outbox.db", length)
+                (bridge.root / "outbox.db-wal").unlink()
+                relay.open = True
+                await asyncio.to_thread(bridge.start)
+                found = await all_there(hub, gateway)
+    # The gateway still kept what the outbox lost.
+    assert len(found.events) == 900
+
+
+async def test_a_disk_that_is_full_is_a_fault_and_then_a_gap(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers
+) -> None:
+    with (
+        small_disk(tmp_path / "disk", 4) as disk,
+        bridge_program(tmp_path / "bridge", gateway.port, servers.urls, root=str(disk / "outbox")) as bridge,
+    ):
+        await asyncio.to_thread(bridge.start)
+        gateway.happen(10)
+        await all_there(hub, gateway)
+        filled = disk / "others"
+        fill(filled)
+        gateway.happen(2000, length=1000)
+        await eventually(
+            lambda: status_of(bridge),
+            lambda status: status.state == cloud_pb2.CLOUD_STATE_FAULTED and "full" in status.last_error,
+            "it says what is wrong",
+        )
+        gateway.happen(1100)
+        filled.unlink()
+        found = await all_there(hub, gateway, 60)
+        status = await status_of(bridge)
+    assert status.state == cloud_pb2.CLOUD_STATE_CONNECTED
+    assert DROP_REASON_DISK in found.reasons
+    (issued,) = gateway.happened.values()
+    assert len(found.events) + len(found.missing) == issued
+
+
+@pytest.mark.parametrize("step_s", [-3600, 3600])
+async def test_steps_of_the_calendar_clock_change_nothing(
+    tmp_path: Path, hub: Hub, gateway: EventServer, servers: NatsServers, step_s: int
+) -> None:
+    clock = CalendarClock(tmp_path)
+    with bridge_program(tmp_path / "bridge", gateway.port, servers.urls) as bridge:
+        bridge.environment = clock.environment
+        await asyncio.to_thread(bridge.start)
+        gateway.happen(10)
+        await all_there(hub, gateway)
+        clock.step(step_s)
+        gateway.happen(10)
+        found = await all_there(hub, gateway)
+    assert len(found.events) + len(found.missing) == 20

@@ -1,0 +1,186 @@
+"""The real bridge as a process of its own, beside a hub and a gateway, and what the hub has of it."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import grpc
+
+from bridge.rpc.client import newest_state
+from fleet import names
+from fleet.connection import FleetAddress, Hub, Start, connect
+from hub.streams import add_command_consumer, set_up
+from omniseer.bridge.v1 import bridge_service_pb2 as pb
+from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_LOST, EventBatch
+from omniseer.gateway.v1 import cloud_pb2
+from tests.support.waiting import wait_until
+
+_ROOT: Final = Path(__file__).parents[2]
+_UP_WITHIN_S: Final = 30.0
+ROBOT: Final = "lab2"
+
+
+@dataclass
+class Received:
+    """What a hub has of a robot's events, and whether it adds up."""
+
+    batches: list[EventBatch] = field(default_factory=list)
+
+    @property
+    def events(self) -> list[tuple[str, int]]:
+        """Run and sequence of each, in the hub's order."""
+        items = (item for batch in self.batches for item in batch.items)
+        return [(item.event.run_id, item.event.sequence) for item in items if item.HasField("event")]
+
+    @property
+    def missing(self) -> set[tuple[str, int]]:
+        """All that the gaps announce."""
+        return {
+            (batch.run_id, sequence)
+            for batch in self.batches
+            for item in batch.items
+            if item.HasField("dropped")
+            for sequence in range(item.dropped.first_sequence, item.dropped.last_sequence + 1)
+        }
+
+    @property
+    def reasons(self) -> set[int]:
+        """Of the gaps."""
+        items = (item for batch in self.batches for item in batch.items)
+        return {item.dropped.reason for item in items if item.HasField("dropped")}
+
+    def add_up_to(self, run_id: str, issued: int) -> bool:
+        """Whether all of a run is there or announced; fails where something is there twice or out of order."""
+        sequences = [sequence for run, sequence in self.events if run == run_id]
+        assert sequences == sorted(set(sequences)), "in order, and each once"
+        missing = {sequence for run, sequence in self.missing if run == run_id}
+        there = set(sequences) | missing
+        assert there <= set(range(1, issued + 1)), "none that was not issued"
+        twice = missing.intersection(sequences)
+        assert not twice or DROP_REASON_OUTBOX_LOST in self.reasons, (
+            "only a lost outbox announces what has come"
+        )
+        return len(there) == issued
+
+
+async def received(hub: Hub, robot: str = ROBOT) -> Received:
+    """Returns all that the hub has now."""
+    info = await hub.api(f"STREAM.INFO.{names.EVENTS}")
+    result = Received()
+    if info["state"]["messages"] == 0:
+        return result
+    last = info["state"]["last_seq"]
+    async for delivery in hub.follow(names.EVENTS, f"fleet.{robot}.ev.>", Start.all()):
+        batch = EventBatch.FromString(delivery.payload)
+        assert delivery.subject == names.event_subject(robot, batch.run_id, batch.first_sequence)
+        result.batches.append(batch)
+        if delivery.sequence >= last or delivery.pending == 0:
+            return result
+    return result
+
+
+async def prepare(servers: tuple[str, ...]) -> None:
+    """Makes streams and buckets."""
+    async with connect(FleetAddress(servers, name="test")) as hub:
+        await hub.connected(10)
+        await set_up(hub, len(servers))
+        await add_command_consumer(hub, ROBOT)
+
+
+@dataclass
+class BridgeProgram:
+    """A bridge, which may be killed and started again.
+
+    Attributes:
+        settings: keys of its configuration besides those of every test.
+    """
+
+    directory: Path
+    gateway_port: int
+    servers: tuple[str, ...]
+    settings: dict[str, Any] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
+    process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def root(self) -> Path:
+        return Path(self.settings.get("root", self.directory / "outbox"))
+
+    @property
+    def socket(self) -> Path:
+        return self.directory / "bridge.sock"
+
+    @property
+    def log(self) -> Path:
+        return self.directory / "bridge.log"
+
+    @property
+    def state(self) -> pb.WatchStateResponse:
+        return newest_state(self.socket)
+
+    @property
+    def status(self) -> cloud_pb2.CloudStatus:
+        return self.state.status
+
+    def start(self, *, wait: bool = True) -> None:
+        """Starts it; it serves when this returns, unless not waited for."""
+        config = self.directory / "bridge.yaml"
+        values = {
+            "socket": str(self.socket),
+            "root": str(self.root),
+            "gateway": {"target": f"127.0.0.1:{self.gateway_port}"},
+            "hub": {"servers": list(self.servers), "robot": ROBOT},
+            **self.settings,
+        }
+        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+        command = [sys.executable, "-m", "bridge.cli", "serve", "--config", str(config)]
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(command, cwd=_ROOT, env=os.environ | self.environment, stderr=log)
+        if wait:
+            wait_until(self._serves, "the bridge serves", _UP_WITHIN_S)
+
+    def kill(self) -> None:
+        """Ends it with SIGKILL."""
+        assert self.process
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self) -> int:
+        """Ends it as an operator would; returns its exit code."""
+        assert self.process
+        self.process.terminate()
+        try:
+            return self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+
+    def _serves(self) -> bool:
+        assert self.process
+        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+        try:
+            return bool(self.state.instance_id)
+        except grpc.RpcError:
+            return False
+
+
+@contextmanager
+def bridge_program(
+    directory: Path, gateway_port: int, servers: tuple[str, ...], **settings: Any
+) -> Iterator[BridgeProgram]:
+    """Not started yet when the block begins, gone when it ends."""
+    directory.mkdir(exist_ok=True)
+    program = BridgeProgram(directory, gateway_port, servers, settings)
+    try:
+        yield program
+    finally:
+        if program.process:
+            with suppress(ProcessLookupError):
+                program.process.kill()
+            program.process.wait()

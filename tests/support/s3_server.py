@@ -1,0 +1,169 @@
+"""A real S3 over HTTP, moto's server in a process of its own, and a proxy before it that fails at will.
+
+What moto does not do, the proxy does in its place: moto accepts any signature, URLs for ever, a wrong
+checksum and any amount of data. So an expired URL, a full store and damaged bytes are the proxy's.
+"""
+
+import socket
+import subprocess
+import sys
+from collections import Counter, deque
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import aiohttp
+import boto3
+from aiohttp import web
+
+from hub.receiver.config import StoreSettings
+from tests.support.free import free_tcp_port
+from tests.support.waiting import wait_until
+
+_UP_WITHIN_S: Final = 60.0
+_READ: Final = 64 * 1024
+
+
+@dataclass
+class S3Server:
+    """A store that runs; each test has a bucket of its own."""
+
+    port: int
+    directory: Path
+    buckets: int = 0
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def client(self) -> Any:
+        """The library's own client, with all rights."""
+        return boto3.client(
+            "s3",
+            endpoint_url=self.url,
+            region_name="us-east-1",
+            aws_access_key_id="test",
+            aws_secret_access_key="test",
+        )
+
+    def settings(self, **more: Any) -> StoreSettings:
+        """How a receiver reaches a new bucket."""
+        self.buckets += 1
+        bucket = f"bucket-{self.buckets}"
+        self.client.create_bucket(Bucket=bucket)
+        secret = self.directory / "secret"
+        secret.write_text("test\n", encoding="ascii")
+        return StoreSettings(
+            endpoint=self.url, bucket=bucket, access_key="test", secret_key_file=secret, **more
+        )
+
+
+@contextmanager
+def s3_server(directory: Path) -> Iterator[S3Server]:
+    """Serves when the block begins, gone when it ends."""
+    server = S3Server(free_tcp_port(), directory)
+    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(server.port)]
+    with (directory / "s3.log").open("wb") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log)
+
+    def serves() -> bool:
+        assert process.poll() is None, (directory / "s3.log").read_text(encoding="utf-8")[-2000:]
+        try:
+            with socket.create_connection(("127.0.0.1", server.port), timeout=5):
+                return True
+        except OSError:
+            return False
+
+    try:
+        wait_until(serves, "the store serves", _UP_WITHIN_S)
+        yield server
+    finally:
+        process.kill()
+        process.wait()
+
+
+@dataclass
+class FaultyStore:
+    """The way to a store, as robots see it: passes requests on, unless it is to fail.
+
+    Attributes:
+        port: where it listens.
+        received: bytes of parts that have arrived here, by part number, those of cut requests included.
+        passed: parts that the store has taken, in order.
+        cut_at: closes the connection once so many bytes of parts have arrived in all, once.
+        answers: status and code of the next requests, in place of the store's; None passes one on.
+        early: whether these come before the body is read.
+        damage: the number of the part that is changed on its way, once.
+    """
+
+    port: int
+    received: Counter[int] = field(default_factory=Counter)
+    passed: list[int] = field(default_factory=list)
+    cut_at: int | None = None
+    answers: deque[tuple[int, str] | None] = field(default_factory=deque)
+    early: bool = False
+    damage: int = 0
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def host(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    @property
+    def total(self) -> int:
+        """Bytes of parts that have arrived in all."""
+        return sum(self.received.values())
+
+
+@asynccontextmanager
+async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
+    """Listens until the block ends."""
+    state = FaultyStore(free_tcp_port())
+    async with aiohttp.ClientSession(auto_decompress=False) as session:
+
+        async def handle(request: web.Request) -> web.StreamResponse:
+            number = int(request.query.get("partNumber", "0"))
+            answer = state.answers.popleft() if state.answers else None
+            if answer and state.early:
+                return _error(*answer)
+            body = bytearray()
+            while data := await request.content.read(_READ):
+                body += data
+                state.received[number] += len(data)
+                if state.cut_at is not None and state.total >= state.cut_at:
+                    state.cut_at = None
+                    assert request.transport
+                    request.transport.abort()
+                    raise ConnectionResetError
+            if answer:
+                return _error(*answer)
+            if number and state.damage == number:
+                state.damage = 0
+                body[0] ^= 1
+            async with session.request(
+                request.method, f"{server.url}{request.raw_path}", data=bytes(body)
+            ) as passed:
+                if passed.status == 200:
+                    state.passed.append(number)
+                etag = {"ETag": passed.headers["ETag"]} if "ETag" in passed.headers else {}
+                return web.Response(status=passed.status, body=await passed.read(), headers=etag)
+
+        application = web.Application(client_max_size=0)
+        application.router.add_route("*", "/{path:.*}", handle)
+        runner = web.AppRunner(application, handle_signals=False, shutdown_timeout=0.1)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, "127.0.0.1", state.port).start()
+            yield state
+        finally:
+            await runner.cleanup()
+
+
+def _error(status: int, code: str) -> web.Response:
+    return web.Response(status=status, text=f"<Error><Code>{code}</Code></Error>")

@@ -1,0 +1,298 @@
+"""The outbox's database on a real disk: order, bounds, and what is left of it after every kind of damage."""
+
+import random
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bridge.outbox.cursor import NAME as CURSOR
+from bridge.outbox.database import DAMAGED_NAME, NAME, RESERVE_BYTES, Database
+from bridge.values import Batch, DropReason, Event, Gap, Item, OutboxError, Position
+
+RUN = "run-1"
+MIB = 1024 * 1024
+
+
+def event(sequence: int, severity: int = 1, size: int = 20, run_id: str = RUN) -> Event:
+    return Event(run_id, sequence, severity, sequence.to_bytes(4) * (size // 4))
+
+
+def add(database: Database, *items: Item) -> None:
+    database.append(items, Position(items[-1].run_id, items[-1].last))
+
+
+def taken(database: Database) -> list[Item]:
+    """Everything in it, as a hub would get it."""
+    items: list[Item] = []
+    while batch := database.next_batch():
+        items += batch.items
+        database.delivered(batch, repeated=False)
+    return items
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    made = Database(tmp_path, 64 * MIB)
+    yield made
+    made.close()
+
+
+def opened(directory: Path, max_bytes: int = 64 * MIB) -> Database:
+    return Database(directory, max_bytes)
+
+
+def sent(database: Database) -> Batch:
+    batch = database.next_batch()
+    assert batch
+    return batch
+
+
+def test_events_leave_in_their_order_and_once(database: Database) -> None:
+    add(database, *(event(number) for number in range(1, 151)))
+    batches = []
+    while batch := database.next_batch():
+        batches.append((batch.first, batch.last))
+        database.delivered(batch, repeated=False)
+    assert batches == [(1, 64), (65, 128), (129, 150)]
+    assert (database.facts.events, database.facts.sent, database.facts.dropped) == (0, 150, 0)
+
+
+def test_a_batch_has_one_run_and_a_bounded_size(database: Database) -> None:
+    add(database, event(1), event(2))
+    add(database, Gap("run-2", 1, 0, DropReason.NO_LONGER_KEPT, earlier=True), event(1, run_id="run-2"))
+    add(database, *(event(number, size=60_000, run_id="run-2") for number in range(2, 8)))
+    found = []
+    while batch := database.next_batch():
+        found.append((batch.run_id, batch.first, batch.last))
+        database.delivered(batch, repeated=False)
+    assert found == [("run-1", 1, 2), ("run-2", 0, 5), ("run-2", 6, 7)]
+
+
+def test_after_a_crash_the_same_batch_is_sent_again(tmp_path: Path) -> None:
+    first = opened(tmp_path)
+    add(first, event(1), event(2))
+    batch = sent(first)
+    add(first, event(3))
+    first.close()
+    again = opened(tmp_path)
+    assert sent(again) == batch
+    again.delivered(batch, repeated=True)
+    assert sent(again).items == (event(3),)
+    assert again.facts.position == Position(RUN, 3)
+    again.close()
+
+
+def test_what_is_in_flight_is_never_dropped(database: Database) -> None:
+    add(database, event(1), event(2))
+    batch = sent(database)
+    add(database, event(3), event(4, severity=2), event(5))
+    assert all(database.drop_oldest() for _ in range(3))
+    assert sent(database) == batch
+    database.delivered(batch, repeated=False)
+    assert taken(database) == [Gap(RUN, 3, 5, DropReason.OUTBOX_FULL, worst=2)]
+    assert database.facts.dropped == 3
+
+
+def test_the_oldest_info_goes_first_then_the_oldest(database: Database) -> None:
+    add(database, event(1, 3), event(2, 1), event(3, 2), event(4, 1), event(5, 2))
+    orders = []
+    for _ in range(3):
+        assert database.drop_oldest()
+        orders.append(database.facts.events)
+    assert orders == [4, 3, 2]
+    full = DropReason.OUTBOX_FULL
+    assert taken(database) == [
+        Gap(RUN, 1, 2, full, worst=3),
+        event(3, 2),
+        Gap(RUN, 4, 4, full, worst=1),
+        event(5, 2),
+    ]
+
+
+def test_gaps_alone_are_joined_in_the_end(database: Database) -> None:
+    add(database, Gap(RUN, 1, 4, DropReason.NO_LONGER_KEPT, earlier=True), event(5, 2))
+    add(database, Gap("run-2", 1, 0, DropReason.NO_LONGER_KEPT, earlier=True), event(1, run_id="run-2"))
+    while database.drop_oldest():
+        pass
+    assert taken(database) == [Gap("run-2", 1, 1, DropReason.OUTBOX_FULL, earlier=True)]
+
+
+@pytest.mark.parametrize("size", [200, 3000])
+def test_a_full_outbox_stays_within_its_bytes(tmp_path: Path, size: int) -> None:
+    limit = RESERVE_BYTES + MIB
+    database = opened(tmp_path, limit)
+    largest = 0
+    for start in range(1, 3_000_000 // size, 64):
+        add(database, *(event(number, 1 + number % 3, size) for number in range(start, start + 64)))
+        largest = max(largest, sum(path.stat().st_size for path in tmp_path.iterdir()))
+    assert largest <= limit
+    facts = database.facts
+    assert facts.size <= MIB + 4096
+    assert facts.position
+    assert facts.events + facts.dropped == facts.position.sequence
+    assert facts.events * size > MIB / 4, "the room is used"
+    sequence = 0
+    for item in taken(database):
+        assert item.first == sequence + 1
+        sequence = item.last
+    assert sequence == facts.position.sequence
+    database.close()
+
+
+def test_gone_databases_go_on_after_what_was_sent(tmp_path: Path) -> None:
+    database = opened(tmp_path)
+    add(database, event(1), event(2))
+    database.delivered(sent(database), repeated=False)
+    add(database, event(3), event(4))
+    batch = sent(database)
+    add(database, event(5))
+    database.close()
+    for path in tmp_path.glob("outbox.db*"):
+        path.unlink()
+    again = opened(tmp_path)
+    announced = sent(again)
+    assert announced.items == (Gap(RUN, 3, 4, DropReason.OUTBOX_LOST),)
+    assert (announced.run_id, announced.first) == (batch.run_id, batch.first), (
+        "refused if the batch was there"
+    )
+    assert again.is_new()
+    assert again.facts.position == Position(RUN, 4), "the gateway is asked for the fifth once more"
+    again.close()
+
+
+def test_without_a_cursor_nothing_is_known(tmp_path: Path) -> None:
+    database = opened(tmp_path)
+    add(database, event(1))
+    sent(database)
+    database.close()
+    (tmp_path / CURSOR).write_bytes(b"{")
+    again = opened(tmp_path)
+    assert again.next_batch() is None
+    assert again.facts.position is None
+    assert again.is_new()
+    assert (tmp_path / DAMAGED_NAME).exists()
+    again.close()
+
+
+def test_a_gap_of_the_unknown_finds_a_free_place(database: Database) -> None:
+    add(database, Gap(RUN, 1, 3, DropReason.OUTBOX_LOST, earlier=True, probes=10))
+    places = []
+    while batch := database.next_batch():
+        places.append((batch.first, batch.last))
+        database.delivered(batch, repeated=True)
+    assert places == [(0, 3), (1, 3), (2, 3), (3, 3)], "all of them are there: none is missing"
+
+
+def test_cut_at_any_length_it_begins_again_and_announces_what_is_missing(tmp_path: Path) -> None:
+    """Of 300 events 128 are delivered, and the next 64 may have been."""
+    made = tmp_path / "made"
+    database = opened(made)
+    add(database, *(event(number, size=400) for number in range(1, 301)))
+    for _ in range(2):
+        database.delivered(sent(database), repeated=False)
+    sent(database)
+    database.close()
+    whole = (made / NAME).read_bytes()
+    lengths = [0, 1, 99, 100, 4095, 4096, *random.sample(range(len(whole)), 20)]
+    for length in lengths:
+        cut = tmp_path / "cut"
+        shutil.copytree(made, cut)
+        (cut / NAME).write_bytes(whole[:length])
+        again = opened(cut)
+        (first, *_) = items = taken(again)
+        assert first.first == 129
+        position = again.facts.position
+        assert position
+        assert items[-1].last == position.sequence
+        assert position.sequence in (192, 300)
+        again.close()
+        shutil.rmtree(cut)
+
+
+def test_a_wal_that_was_cut_is_no_loss(tmp_path: Path) -> None:
+    made = tmp_path / "made"
+    database = opened(made)
+    for number in range(1, 101):
+        add(database, event(number))
+        if number % 10 == 0:
+            database.delivered(sent(database), repeated=False)
+    last = sent(database) if database.next_batch() else None
+    assert last is None
+    shutil.copytree(made, tmp_path / "copy")  # Closed, it would have no WAL.
+    database.close()
+    wal = (tmp_path / "copy" / f"{NAME}-wal").read_bytes()
+    for length in [0, 31, 32, *random.sample(range(len(wal)), 20)]:
+        cut = tmp_path / "cut"
+        shutil.copytree(tmp_path / "copy", cut)
+        (cut / f"{NAME}-wal").write_bytes(wal[:length])
+        again = opened(cut)
+        items = taken(again)
+        assert [each for each in items if isinstance(each, Event)] == []
+        assert all(each.first == 91 and each.last == 100 for each in items), "a batch that may be refused"
+        assert again.facts.position == Position(RUN, 100)
+        again.close()
+        shutil.rmtree(cut)
+
+
+def test_bytes_of_others_are_moved_aside(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(b"something else" * 1000)
+    database = opened(tmp_path)
+    assert database.next_batch() is None
+    assert (tmp_path / DAMAGED_NAME).read_bytes().startswith(b"something else")
+    database.close()
+
+
+def test_a_newer_version_is_not_touched(tmp_path: Path) -> None:
+    database = opened(tmp_path)
+    add(database, event(1))
+    assert database._connection
+    database._connection.execute("PRAGMA user_version = 99")
+    database.close()
+    again = opened(tmp_path)
+    with pytest.raises(OutboxError, match="newer robot-bridge"):
+        again.open()
+    assert not (tmp_path / DAMAGED_NAME).exists()
+
+
+def test_a_second_bridge_is_refused(tmp_path: Path, database: Database) -> None:
+    add(database, event(1))
+    with pytest.raises(OutboxError, match="another robot-bridge"):
+        opened(tmp_path).open()
+    add(database, event(2))
+    assert len(taken(database)) == 2
+
+
+def test_a_folder_that_cannot_be_made_is_an_error_with_words(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OutboxError, match="file"):
+        opened(tmp_path / "file" / "outbox").open()
+
+
+def test_a_command_is_begun_once_and_has_one_result(database: Database) -> None:
+    assert database.begin_command("a1")
+    assert not database.begin_command("a1")
+    assert database.unanswered_commands() == ["a1"]
+    database.end_command("a1", b"done")
+    database.end_command("a1", b"done differently")
+    database.end_command("b2", b"refused")
+    assert database.unanswered_commands() == []
+    assert database.next_result() == ("a1", b"done")
+    database.result_sent("a1")
+    assert database.next_result() == ("b2", b"refused")
+    database.result_sent("b2")
+    assert database.next_result() is None
+    assert not database.begin_command("a1")
+
+
+def test_rows_of_uploads_are_kept(tmp_path: Path) -> None:
+    database = opened(tmp_path)
+    database.put_upload("r1", "one")
+    database.put_upload("r2", "two")
+    database.put_upload("r1", "three")
+    database.delete_upload("r2")
+    database.close()
+    again = opened(tmp_path)
+    assert again.uploads() == ["three"]
+    again.close()
