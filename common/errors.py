@@ -165,6 +165,12 @@ class RecorderUnreachableError(DomainError):
     reason = Reason.RECORDER_UNREACHABLE
 
 
+class BridgeUnreachableError(DomainError):
+    """The bridge to the robot's fleet does not answer."""
+
+    reason = Reason.BRIDGE_UNREACHABLE
+
+
 class NotAuthenticatedError(DomainError):
     """The caller is not authenticated: no credential, or one that is not valid.
 

@@ -11,6 +11,7 @@ from google.rpc.status_pb2 import Status
 from grpc_status.rpc_status import to_status
 
 from common.errors import (
+    BridgeUnreachableError,
     ConflictError,
     DamagedError,
     DefectError,
@@ -40,6 +41,7 @@ STATUS_CODES: Final[Mapping[type[DomainError], grpc.StatusCode]] = {
     ConflictError: grpc.StatusCode.ABORTED,
     DriveUnreachableError: grpc.StatusCode.UNAVAILABLE,
     RecorderUnreachableError: grpc.StatusCode.UNAVAILABLE,
+    BridgeUnreachableError: grpc.StatusCode.UNAVAILABLE,
     TooMuchError: grpc.StatusCode.RESOURCE_EXHAUSTED,
     UnknownServiceError: grpc.StatusCode.NOT_FOUND,
     NotFoundError: grpc.StatusCode.NOT_FOUND,

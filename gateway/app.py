@@ -29,6 +29,8 @@ DRIVE_HEALTH: Final = "drive"
 """The drive program's name there, where the robot is set up for driving."""
 RECORDER_HEALTH: Final = "recorder"
 """The recorder's name there, where the robot is set up for recording."""
+BRIDGE_HEALTH: Final = "bridge"
+"""The bridge's name there, where the robot is set up for a fleet."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often faults and events are looked for; a change of the preview causes a look at once."""
 
@@ -93,6 +95,13 @@ async def running(gateway: Gateway, extra: Sequence[grpc.GenericRpcHandler] = ()
                     tasks.create_task(recording.link.run(), name="recorder-link"),
                     tasks.create_task(recording.incidents.run(), name="incidents"),
                 ]
+            if cloud := gateway.cloud:
+                background += [
+                    tasks.create_task(cloud.link.run(), name="bridge-link"),
+                    tasks.create_task(cloud.hub_requests.run(), name="hub-requests"),
+                ]
+                if cloud.copies:
+                    background.append(tasks.create_task(cloud.copies.run(), name="copies"))
             try:
                 yield port
             finally:
@@ -135,6 +144,10 @@ async def _observe(gateway: Gateway) -> None:
         if gateway.recording and seen.recorder:
             health.set_serving(RECORDER_HEALTH, serving=seen.recorder.reachable)
             gateway.recording.incidents.take(seen.faults)
+        if gateway.cloud and seen.cloud:
+            health.set_serving(BRIDGE_HEALTH, serving=seen.cloud.reachable)
+            if gateway.cloud.copies:
+                gateway.cloud.copies.take(seen.cloud, seen.recorder)
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()
         if seen.preview.listener and seen.preview.listener != listener:

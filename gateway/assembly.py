@@ -18,6 +18,12 @@ from common.health import Health
 from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
+from gateway.links.bridge.calls import BridgeCalls
+from gateway.links.bridge.copies import Copies
+from gateway.links.bridge.link import BridgeLink
+from gateway.links.bridge.requests import HubRequestRules
+from gateway.links.bridge.uploads import Uploads
+from gateway.links.bridge.wire import BridgeConnector
 from gateway.links.drive.commands import DriveCommands
 from gateway.links.drive.model import DriveModel
 from gateway.links.drive.wire import DriveConnector
@@ -31,7 +37,7 @@ from gateway.links.recorder.calls import RecorderCalls
 from gateway.links.recorder.incidents import Incidents
 from gateway.links.recorder.link import RecorderLink
 from gateway.links.recorder.wire import RecorderConnector
-from gateway.metrics.collector import GatewayCollector, RecorderMetrics
+from gateway.metrics.collector import BridgeMetrics, GatewayCollector, RecorderMetrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.platform.sampler import PlatformSampler
 from gateway.rpc.calls.methods import SERVICES
@@ -39,6 +45,7 @@ from gateway.rpc.calls.recipient import Recipients
 from gateway.rpc.connections.admission import MAX_PENDING, Admission
 from gateway.rpc.connections.guard import ConnectionGuard
 from gateway.rpc.connections.refusal_delay import RefusalDelay
+from gateway.rpc.hub_requests import HubRequests
 from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
@@ -91,6 +98,20 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
+class Cloud:
+    """What watches the bridge, passes calls on, and carries out what the hub may request.
+
+    Attributes:
+        copies: None where the robot is not set up for recording.
+    """
+
+    link: BridgeLink
+    uploads: Uploads
+    copies: Copies | None
+    hub_requests: HubRequests
+
+
+@dataclass(frozen=True, slots=True)
 class Gateway:
     """All parts that run; app.py starts and stops them."""
 
@@ -101,6 +122,7 @@ class Gateway:
     preview_link: PreviewLink
     teleop: Teleop | None
     recording: Recording | None
+    cloud: Cloud | None
     access: AccessControl
     status_stream: StatusStream
     services: Services
@@ -135,6 +157,8 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     teleop = state.teleop = _teleop(settings, link, access.audit, first_revision)
     recording = _recording(settings)
     state.recorder = recording.link if recording else None
+    cloud = _cloud(settings, recording, access.audit)
+    state.cloud = cloud.link if cloud else None
     exports = ExportStream()
     status_stream = StatusStream(state, time.monotonic)
     event_stream = EventStream(state.events, state.event_added)
@@ -144,7 +168,9 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         events=EventsService(event_stream),
         info=InfoService(state, stats, shown_settings(settings)),
         teleop=TeleopService(teleop, state, legacy_clients=settings.teleop.legacy_clients),
-        recording=RecordingService(recording.calls if recording else None, exports),
+        recording=RecordingService(
+            recording.calls if recording else None, exports, cloud.uploads if cloud else None
+        ),
     )
     interceptors = Interceptors(
         stats=stats,
@@ -163,6 +189,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         preview_link=link,
         teleop=teleop,
         recording=recording,
+        cloud=cloud,
         access=access,
         status_stream=status_stream,
         services=services,
@@ -180,6 +207,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
             preview_link=link,
             drive_link=teleop.link if teleop else None,
             recorder=RecorderMetrics(recording.link, recording.incidents, exports) if recording else None,
+            bridge=BridgeMetrics(cloud.link, cloud.copies, cloud.hub_requests) if cloud else None,
         ),
     )
 
@@ -217,6 +245,26 @@ def _recording(settings: GatewaySettings) -> Recording | None:
         return None
     calls = RecorderCalls(RecorderConnector(socket))
     return Recording(RecorderLink(f"recorder at {socket}", calls), calls, Incidents(calls))
+
+
+def _cloud(settings: GatewaySettings, recording: Recording | None, audit: Audit) -> Cloud | None:
+    """Returns what speaks to the bridge; None where the robot is not set up for a fleet."""
+    bridge = settings.bridge
+    if bridge.socket is None:
+        return None
+    calls = BridgeCalls(BridgeConnector(bridge.socket))
+    link = BridgeLink(f"bridge at {bridge.socket}", calls)
+    copies = Copies(recording.calls) if recording else None
+    uploads = Uploads(calls, copies)
+    hub_requests = HubRequests(
+        link=link,
+        calls=calls,
+        uploads=uploads,
+        recorder=recording.calls if recording else None,
+        rules=HubRequestRules(bridge.allowed_requests, time.monotonic()),
+        audit=audit,
+    )
+    return Cloud(link, uploads, copies, hub_requests)
 
 
 @dataclass(frozen=True, slots=True)

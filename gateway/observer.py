@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from gateway.status.cloud_events import CloudEvents
 from gateway.status.event import (
     EncoderFallback,
     Event,
@@ -42,6 +43,7 @@ class Observer:
         self._encoder: Encoder | None = None
         self._mode = ""
         self._recordings = RecordingEvents()
+        self._cloud = CloudEvents()
 
     def observe(self, snapshot: Snapshot) -> list[Event]:
         """Returns the events that this snapshot brings, in order."""
@@ -55,6 +57,7 @@ class Observer:
             *self._preview_events(snapshot.preview),
             *self._mode_events(snapshot),
             *(self._recordings.take(snapshot.recorder) if snapshot.recorder else ()),
+            *self._cloud_events(snapshot),
         ]
         return faults if first else [*faults, *others]
 
@@ -71,6 +74,10 @@ class Observer:
         if settled != self._preview:
             self._preview = settled
             yield _preview_changed(preview)
+
+    def _cloud_events(self, snapshot: Snapshot) -> Iterator[Event]:
+        if snapshot.cloud:
+            yield from self._cloud.take(snapshot.cloud, snapshot.recorder, snapshot.at_s)
 
     def _mode_events(self, snapshot: Snapshot) -> Iterator[Event]:
         value = snapshot[MODE].value

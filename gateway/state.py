@@ -14,6 +14,7 @@ from gateway.observer import Observer
 from gateway.rpc.interceptors.stats import Stats
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
+from gateway.status.cloud import CloudView
 from gateway.status.event import Event
 from gateway.status.event_log import EventLog
 from gateway.status.faults.rules import FaultRules
@@ -44,6 +45,14 @@ class RecorderSource(Protocol):
         """The recorder at this instant, from memory."""
 
 
+class CloudSource(Protocol):
+    """What has the view of the bridge."""
+
+    @property
+    def view(self) -> CloudView:
+        """The bridge at this instant, from memory."""
+
+
 class State:
     """The board, the events and the faults. Used on the event loop; other threads write to the board only.
 
@@ -57,6 +66,7 @@ class State:
         access: of the newest look at it.
         teleop: has the view of driving; None where the robot is not set up for it.
         recorder: the same of recording.
+        cloud: the same of the connection to the fleet.
     """
 
     def __init__(self, settings: GatewaySettings, preview_link: PreviewLink, stats: Stats) -> None:
@@ -72,7 +82,12 @@ class State:
         self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
         self._observer = Observer(
             self._tracker,
-            FaultRules(faults.platform_limits(), faults.startup_grace_ms / 1000, faults.expiry_days),
+            FaultRules(
+                faults.platform_limits(),
+                faults.startup_grace_ms / 1000,
+                faults.expiry_days,
+                faults.hub_offline_s,
+            ),
         )
         self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
         self.event_added = Broadcast()
@@ -80,6 +95,7 @@ class State:
         self.access: AccessView = UNGUARDED
         self.teleop: TeleopSource | None = None
         self.recorder: RecorderSource | None = None
+        self.cloud: CloudSource | None = None
 
     @property
     def preview(self) -> PreviewView:
@@ -102,6 +118,7 @@ class State:
             access=self.access,
             teleop=self.teleop.view() if self.teleop else None,
             recorder=self.recorder.view if self.recorder else None,
+            cloud=self.cloud.view if self.cloud else None,
         )
 
     def observe(self, access: AccessView) -> Snapshot:

@@ -11,13 +11,16 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from console.cli.export_progress import ExportBar
+from common.errors import UserError
 from console.cli.session import Session, print_json, with_session
 from console.cli.tables import grid
-from console.client import ExportOptions, Recording
+from console.cli.transfer_bar import TransferBar
+from console.client import ExportOptions, GatewayClient, Recording, RecordingCopyState
 from console.client.export_path import path_below
 from console.client.exporting import ExportedRecording
-from console.presentation.formatting import age, plural, size, wall_clock
+from console.client.results import RecordingCopy
+from console.presentation.cloud import copy_text
+from console.presentation.formatting import age, joined, plural, size, wall_clock
 from console.presentation.json_form import json_form
 from console.presentation.recording import is_written, recording_state, recording_summary, remarks
 
@@ -205,16 +208,69 @@ def export(
         raise
 
 
+@record_app.command("upload")
+@with_session
+def upload(
+    session: Session,
+    *,
+    recording_id: IdArgument,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Until it is verified there, with a progress bar.")
+    ] = False,
+) -> None:
+    """Have the robot copy a recording to its fleet's store. It goes on when this computer leaves.
+
+    With --wait exit code 1 when the copy is cancelled.
+    """
+    with session.connect() as gateway:
+        answer = gateway.upload_recording(recording_id)
+        if not wait:
+            session.show_answer(answer)
+            return
+        try:
+            copy = _followed(session, gateway, recording_id, answer.copy)
+        except KeyboardInterrupt:
+            print("The robot goes on copying it. How far it is: robotctl record list", file=sys.stderr)
+            raise
+    if copy.state is not RecordingCopyState.VERIFIED:
+        remedy = f"Type: robotctl record upload {recording_id}"
+        raise UserError(f"the copy of {recording_id} was cancelled", remedy)
+    message = f"{recording_id} is in the fleet's store, verified"
+    session.show({"ok": True, "message": message, "copy": json_form(copy)}, message)
+
+
+def _followed(
+    session: Session, gateway: GatewayClient, recording_id: str, copy: RecordingCopy
+) -> RecordingCopy:
+    """Shows the progress of a copy; returns it when it is verified or cancelled."""
+    if copy.state is RecordingCopyState.VERIFIED:
+        return copy
+    with TransferBar(session.out, shown=not session.as_json) as bar:
+        for progress in gateway.upload_progress(recording_id):
+            bar.show_upload(progress)
+            copy = progress.copy
+    return copy
+
+
+@record_app.command("cancel-upload")
+@with_session
+def cancel_upload(session: Session, *, recording_id: IdArgument) -> None:
+    """End copying a recording to the fleet's store. A copy that is verified stays."""
+    with session.connect() as gateway:
+        answer = gateway.cancel_upload(recording_id)
+    session.show_answer(answer)
+
+
 async def _export(session: Session, recording_id: str, to: Path, *, resume: bool, limit_mbit: float) -> None:
     async with session.connect_async() as client:
         found = await client.recording(recording_id)
         folder = path_below(to, found.id)
-        with ExportBar(session.out, shown=not session.as_json) as bar:
+        with TransferBar(session.out, shown=not session.as_json) as bar:
             done = await client.export_recording(
                 recording_id,
                 folder,
                 ExportOptions(
-                    resume=resume, max_bytes_per_s=round(limit_mbit * 1e6 / 8), progress=bar.update
+                    resume=resume, max_bytes_per_s=round(limit_mbit * 1e6 / 8), progress=bar.show_export
                 ),
             )
     if session.as_json:
@@ -250,8 +306,8 @@ def _pin(session: Session, recording_id: str, *, pinned: bool) -> None:
 
 
 def _list_table(recordings: tuple[Recording, ...]) -> Table:
-    table = grid("nowrap", "nowrap", "nowrap", "right", "right", "fold", "fold")
-    table.add_row("id", "began", "state", "length", "size", "label", "", style="dim")
+    table = grid("nowrap", "nowrap", "nowrap", "right", "right", "nowrap", "fold", "fold")
+    table.add_row("id", "began", "state", "length", "size", "copy", "label", "", style="dim")
     for each in recordings:
         table.add_row(
             Text(each.id),
@@ -259,6 +315,7 @@ def _list_table(recordings: tuple[Recording, ...]) -> Table:
             Text(recording_state(each)),
             age(each.duration_ms),
             size(each.size),
+            Text(copy_text(each.copy, each.size)),
             Text(each.label or each.preset),
             Text(remarks(each), style="dim"),
         )
@@ -280,7 +337,7 @@ def _view(recording: Recording) -> RenderableType:
         ("messages", f"{recording.messages_written}, {_lost(recording.messages_lost)}"),
         ("video", plural(recording.video_frames, "frame") if recording.video_frames else "none"),
         ("", remarks(recording)),
-        ("copy", recording.copy.reason),
+        ("copy", joined(copy_text(recording.copy, recording.size), recording.copy.reason)),
     ):
         if text:
             facts.add_row(Text(label, style="dim"), Text(text))

@@ -32,6 +32,8 @@ from console.client.mapping.methods import DesiredPreview
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
     CaughtUp,
+    CloudState,
+    CloudStatus,
     DriveInhibit,
     DrivePhase,
     DriveState,
@@ -49,6 +51,7 @@ from console.client.results import (
     PreviewState,
     PreviewStatus,
     Recording,
+    RecordingCopyState,
     RecordingStatus,
     RobotStopped,
     StopLatch,
@@ -57,5 +60,6 @@ from console.client.results import (
     WatchedStatus,
 )
 from console.client.streams import Outage
+from console.client.uploading import UploadProgress
 from console.credentials import Credentials
 from console.target import DEFAULT_TARGET, parse_target

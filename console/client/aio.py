@@ -20,6 +20,7 @@ from console.client.mapping.driving import (
     velocity_request,
 )
 from console.client.mapping.methods import (
+    CANCEL_UPLOAD,
     DELETE_RECORDING,
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
@@ -37,6 +38,7 @@ from console.client.mapping.methods import (
     STOP_RECORDING,
     STOP_ROBOT,
     TRIGGER_SNAPSHOT,
+    UPLOAD_RECORDING,
     DesiredPreview,
     Method,
     key_frame_request,
@@ -46,6 +48,7 @@ from console.client.options import ClientOptions
 from console.client.streams import Outage, Streams
 from console.client.transport import GrpcTransport
 from console.client.unary import UnaryCalls
+from console.client.uploading import UploadProgress, upload_progress
 from console.credentials import Credentials
 from console.target import DEFAULT_TARGET, parse_target
 
@@ -362,6 +365,30 @@ class AsyncGatewayClient:
             _request_id(), recording_id, expected_sha256=expected_sha256, force=force
         )
         return await self._call_recording(DELETE_RECORDING, request)
+
+    async def upload_recording(self, recording_id: str) -> results.UploadAnswer:
+        """Has the robot copy a recording to its fleet's store; returns when it is in the queue.
+
+        Raises:
+            Refused: The robot is not set up for a fleet, or the recording has not ended, for example.
+        """
+        request = recording.upload_request(_request_id(), recording_id)
+        return await self._call_recording(UPLOAD_RECORDING, request)
+
+    async def cancel_upload(self, recording_id: str) -> results.UploadCancelled:
+        """Takes a recording from the queue of those to be copied; a copy that is verified stays."""
+        request = recording.cancel_upload_request(_request_id(), recording_id)
+        return await self._call_recording(CANCEL_UPLOAD, request)
+
+    def upload_progress(self, recording_id: str) -> AsyncGenerator[UploadProgress]:
+        """Yields every second or so how far the copy of a recording is, until it is verified or cancelled.
+
+        A broken connection is made again; the robot goes on copying without one.
+
+        Args:
+            recording_id: Of a recording that waits to be copied.
+        """
+        return upload_progress(self, recording_id)
 
     async def export_recording(
         self, recording_id: str, folder: Path, options: ExportOptions | None = None

@@ -58,6 +58,10 @@ REASONS: Final[Mapping[str, type[errors.GatewayError]]] = {
     Reason.RECORDING_READ_ONLY: errors.Refused,
     Reason.RECORDING_PINNED: errors.Refused,
     Reason.RECORDING_NOT_COPIED: errors.Refused,
+    Reason.FLEET_NOT_CONFIGURED: errors.Refused,
+    Reason.BRIDGE_UNREACHABLE: errors.Refused,
+    Reason.UPLOAD_NOT_QUEUED: errors.Refused,
+    Reason.TOO_MANY_UPLOADS: errors.Overloaded,
     Reason.MESSAGE_TOO_LARGE: errors.InvalidRequest,
     Reason.UNKNOWN_SERVICE: errors.Refused,
     Reason.TOO_MANY_CONNECTIONS: errors.Overloaded,
@@ -107,6 +111,10 @@ _ADVICE: Final[Mapping[str, str]] = {
     Reason.RECORDING_NOT_COPIED: (
         "Wait until it is copied, or as an administrator type: robotctl record delete ID --force"
     ),
+    Reason.FLEET_NOT_CONFIGURED: "Ask this robot's administrator to set it up; see docs/fleet.md",
+    Reason.BRIDGE_UNREACHABLE: "Start or restart robot-bridge on the robot; recordings stay there",
+    Reason.UPLOAD_NOT_QUEUED: "Type: robotctl record list",
+    Reason.TOO_MANY_UPLOADS: "Wait until some are copied, or type: robotctl record cancel-upload ID",
     Reason.CREDENTIALS_UNREADABLE: (
         "Ask this robot's administrator to repair its list of credentials; no new login is needed"
     ),

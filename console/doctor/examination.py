@@ -86,6 +86,7 @@ def _about_the_robot(status: SystemStatus) -> Iterator[Finding]:
     yield from robot.source_findings(status)
     yield from robot.encoder_findings(status)
     yield from robot.driving_findings(status)
+    yield from robot.cloud_findings(status)
     endpoint = status.preview.endpoint
     if status.preview.state is PreviewState.RUNNING and endpoint:
         yield network.stream_finding(endpoint.host, endpoint.port)

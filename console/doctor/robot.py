@@ -6,11 +6,20 @@ from typing import Final
 from common.findings import Finding, good, note, wrong
 from console.client import GatewayInfo, PreviewState, SystemStatus
 from console.client.driving import SENTENCES, stopped_by
-from console.client.results import DriveInhibit, FaultSeverity, HealthState, SourceState, TeleopState
+from console.client.results import (
+    CloudState,
+    DriveInhibit,
+    FaultSeverity,
+    HealthState,
+    SourceState,
+    TeleopState,
+)
 
 LARGEST_SKEW_S: Final = 1.0
 _FALLBACK: Final = "preview.fallback"
 """Another encoder than the first choice works as well, and on a machine without hardware it always is one."""
+_OF_THE_FLEET: Final = "cloud."
+"""What the ids of the fleet's faults begin with."""
 
 
 def version_finding(gateway_version: str, own_version: str) -> Finding:
@@ -170,6 +179,26 @@ def _base_timeout(timeout_ms: int | None) -> Finding:
         "Only the base's own timeout does, and no one has said that it has one",
         "Measure it on the robot: robot-drive doctor --pulse; then set base_timeout_ms of robot-drive",
     )
+
+
+def cloud_findings(status: SystemStatus) -> Iterator[Finding]:
+    """Yields what keeps the robot from its fleet, as far as no fault covers it; nothing without a fleet."""
+    cloud = status.cloud
+    if cloud is None:
+        return
+    named = f"{cloud.robot} in the fleet {cloud.fleet}"
+    if cloud.state is CloudState.CONNECTED:
+        yield good("fleet", f"connected to its hub as {named}")
+    elif not any(fault.active and fault.id.startswith(_OF_THE_FLEET) for fault in status.faults):
+        yield note(
+            "fleet",
+            f"not connected to its hub: {cloud.last_error or cloud.state.value}",
+            f"Events wait on the robot ({cloud.outbox_events}), and recordings are not copied",
+            "Check the robot's network; type on the robot: robot-bridge doctor",
+        )
+    if cloud.uploads_waiting and cloud.uploads_paused:
+        what = f"{cloud.uploads_waiting} recordings wait to be copied: {cloud.uploads_paused}"
+        yield note("fleet.uploads", what, "They are on the robot alone")
 
 
 def access_finding(status: SystemStatus) -> Finding | None:

@@ -2,7 +2,6 @@
 
 from console.client.results import (
     Recording,
-    RecordingCopyState,
     RecordingKind,
     RecordingState,
     RecordingStatus,
@@ -56,11 +55,10 @@ def is_written(recording: Recording) -> bool:
 
 
 def remarks(recording: Recording) -> str:
-    """Returns what is remarkable about a recording: pinned, copied, incomplete, an incident."""
+    """Returns what is remarkable about a recording: pinned, incomplete, an incident."""
     return joined(
         "" if recording.kind is RecordingKind.MANUAL else recording.kind.value,
         "pinned" if recording.pinned else "",
-        "" if recording.copy.state is RecordingCopyState.UNKNOWN else f"copy {recording.copy.state.value}",
         plural(recording.gap_count, "gap") if recording.gap_count else "",
         plural(recording.messages_lost, "message") + " lost" if recording.messages_lost else "",
         recording.trigger,

@@ -5,6 +5,7 @@ from enum import Enum
 from typing import Final
 
 from console.client.results import (
+    CloudState,
     DrivePhase,
     FaultSeverity,
     Freshness,
@@ -66,4 +67,12 @@ RECORDER_STYLES: Final[Mapping[RecorderState, SeverityStyle]] = {
     RecorderState.UNREACHABLE: SeverityStyle.WARNING,
     RecorderState.IDLE: SeverityStyle.QUIET,
     RecorderState.UNKNOWN: SeverityStyle.QUIET,
+}
+CLOUD_STYLES: Final[Mapping[CloudState, SeverityStyle]] = {
+    CloudState.CONNECTED: SeverityStyle.GOOD,
+    CloudState.OFFLINE: SeverityStyle.WARNING,
+    CloudState.REFUSED: SeverityStyle.BAD,
+    CloudState.FAULTED: SeverityStyle.BAD,
+    CloudState.UNREACHABLE: SeverityStyle.WARNING,
+    CloudState.UNKNOWN: SeverityStyle.QUIET,
 }

@@ -17,6 +17,7 @@ from console.client.results import (
     SourceState,
     TeleopState,
 )
+from console.presentation.cloud import cloud_summary
 from console.presentation.driving import driving_mark, driving_text
 from console.presentation.formatting import (
     UNKNOWN,
@@ -30,6 +31,7 @@ from console.presentation.formatting import (
 )
 from console.presentation.recording import recording_summary
 from console.presentation.severity_style import (
+    CLOUD_STYLES,
     FAULT_STYLES,
     FRESHNESS_STYLES,
     HEALTH_STYLES,
@@ -269,6 +271,14 @@ def _recording(view: View) -> Iterator[Row]:
         yield view.state(view.label("recording"), recording.state.value, style, text)
 
 
+def _cloud(view: View) -> Iterator[Row]:
+    cloud = view.status.cloud
+    if cloud is not None:
+        text = cloud_summary(cloud, compact=view.compact)
+        row = view.state(view.label("fleet"), cloud.state.value, CLOUD_STYLES[cloud.state], text)
+        yield row if view.compact else replace(row, age=view.age(cloud.state_age_ms))
+
+
 def _motion(odometry: results.Odometry, compact: bool) -> str:
     return joined(
         quantity(odometry.linear_speed_mps, "m/s", 2),
@@ -424,6 +434,7 @@ TABLE: Final[tuple[Rows, ...]] = (
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
     _recording,
+    _cloud,
     _access,
     _gateway,
     _sources,

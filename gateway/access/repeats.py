@@ -64,15 +64,16 @@ class Repeats:
         self._clock = clock
         self._callers: dict[str, _Caller] = {}
 
-    def take(self, action: ControlAction, address_prefix: str) -> None:
+    def take(self, action: ControlAction, address_prefix: str, *, authenticated: bool = True) -> None:
         """Records an action of this instant, or counts it.
 
         Args:
             action: not yet folded.
             address_prefix: where it came from, without what the sender can choose.
+            authenticated: whether its `who` is; one that the sender can choose is no caller of its own.
         """
         now_s = self._clock()
-        caller = self._caller(action, address_prefix, now_s)
+        caller = self._caller(action.who if authenticated else "", address_prefix, now_s)
         kind: Hashable = replace(action, address=address_prefix, request_id="")
         if kind not in caller.folds and len(caller.folds) >= MAX_KINDS:
             kind = action.result
@@ -105,9 +106,9 @@ class Repeats:
             for fold in caller.folds.values():
                 self._record(fold, now_s)
 
-    def _caller(self, action: ControlAction, address_prefix: str, now_s: float) -> _Caller:
-        key = action.who or address_prefix
-        if not action.who and key not in self._callers and len(self._callers) >= MAX_CALLERS:
+    def _caller(self, who: str, address_prefix: str, now_s: float) -> _Caller:
+        key = who or address_prefix
+        if not who and key not in self._callers and len(self._callers) >= MAX_CALLERS:
             key = _OVERFLOW
         return self._callers.setdefault(key, _Caller(TokenBucket(BURST, now_s)))
 

@@ -50,7 +50,7 @@ class FaultSettings(Section):
     """How long a condition must be absent before its fault is cleared."""
     keep_cleared_ms: int = Field(default=60_000, ge=0, le=86_400_000)
     """How long a cleared fault stays in the status."""
-    ignored_by_health: tuple[Annotated[str, Field(pattern=_FAULT_ID)], ...] = ("preview",)
+    ignored_by_health: tuple[Annotated[str, Field(pattern=_FAULT_ID)], ...] = ("preview", "cloud")
     """Errors that don't degrade the robot's health: fault ids, or their beginnings up to a dot."""
     temperature_c: UpperLimit = UpperLimit(raise_at=85, clear_at=80)
     memory_percent: UpperLimit = UpperLimit(raise_at=92, clear_at=88)
@@ -60,6 +60,8 @@ class FaultSettings(Section):
     wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
     expiry_days: float = Field(default=14, ge=0, le=3650)
     """How long before its end of validity a certificate is a fault."""
+    hub_offline_s: float = Field(default=600, ge=0, le=31_536_000)
+    """How long the fleet's hub may be away without a fault: some places of a robot have no network."""
 
     def platform_limits(self) -> PlatformLimits:
         """Returns the limits in the form that the fault rules take."""

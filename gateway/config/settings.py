@@ -8,6 +8,7 @@ from pydantic import Field
 from pydantic_settings import SettingsConfigDict
 
 from common.config import Section, Settings, SettingsConflictError, load
+from gateway.config.bridge import BridgeSettings
 from gateway.config.faults import FaultSettings
 from gateway.config.recording import RecordingSettings
 from gateway.config.security import SecuritySettings
@@ -66,6 +67,7 @@ class GatewaySettings(Settings):
     preview: PreviewSettings = PreviewSettings()
     teleop: TeleopSettings = TeleopSettings()
     recording: RecordingSettings = RecordingSettings()
+    bridge: BridgeSettings = BridgeSettings()
     platform: PlatformSettings = PlatformSettings()
     faults: FaultSettings = FaultSettings()
     metrics: MetricsSettings = MetricsSettings()

@@ -58,6 +58,14 @@ RECORDER: Final = Service(
     command="robot-recorder serve",
     without_it="Without it recordings can't be started, stopped or copied",
 )
+BRIDGE: Final = Service(
+    check="bridge",
+    name="the bridge",
+    kind=socket.SOCK_STREAM,
+    key="bridge.socket",
+    command="robot-bridge serve",
+    without_it="Without it nothing is sent to the fleet; the robot works",
+)
 
 
 def operator_endpoint(host: str, port: int) -> Finding:

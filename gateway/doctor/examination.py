@@ -11,9 +11,9 @@ from gateway.access.command import credentials_command
 from gateway.access.credential import Validity
 from gateway.access.directory import CredentialDirectory
 from gateway.access.reloader import TlsFiles, load_access
-from gateway.config import SourceSettings, load_settings
+from gateway.config import GatewaySettings, SourceSettings, load_settings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import DRIVE, PREVIEW, RECORDER, operator_endpoint, service_endpoint
+from gateway.doctor.endpoints import BRIDGE, DRIVE, PREVIEW, RECORDER, operator_endpoint, service_endpoint
 from gateway.doctor.video import video_finding
 
 
@@ -42,8 +42,33 @@ def examine(config: Path | None) -> Iterator[Finding]:
         yield service_endpoint(DRIVE, settings.teleop.socket)
     if settings.recording.socket:
         yield service_endpoint(RECORDER, settings.recording.socket)
+    if settings.bridge.socket:
+        yield service_endpoint(BRIDGE, settings.bridge.socket)
+    yield from _hub(settings)
     yield from device_findings()
     yield from _ros(settings.sources)
+
+
+def _hub(settings: GatewaySettings) -> Iterator[Finding]:
+    """Yields what is wrong with the requests that the fleet's hub is allowed; says which there are."""
+    allowed = [each.value for each in settings.bridge.allowed_requests]
+    lacking = [
+        key
+        for key, socket in (
+            ("bridge.socket", settings.bridge.socket),
+            ("recording.socket", settings.recording.socket),
+        )
+        if socket is None
+    ]
+    if allowed and lacking:
+        yield wrong(
+            "bridge.requests",
+            f"bridge.allowed_requests allows {', '.join(allowed)}, but {' and '.join(lacking)} is not set",
+            "The hub's requests can't be carried out",
+            f"Set {' and '.join(lacking)}, or leave bridge.allowed_requests out",
+        )
+    elif settings.bridge.socket:
+        yield good("bridge.requests", f"the fleet's hub may request: {', '.join(allowed) or 'nothing'}")
 
 
 def _access(directory: CredentialDirectory, tls: TlsFiles | None) -> Finding:

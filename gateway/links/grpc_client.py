@@ -5,6 +5,7 @@ from typing import Final
 
 import grpc
 
+from common import request_id
 from gateway.links.link import RefusedError
 from gateway.links.watch import ABSENT, LinkLostError
 
@@ -19,6 +20,8 @@ GONE: Final = frozenset(
     {grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED}
 )
 """The codes of a service that does not answer."""
+_CALLER: Final = "x-caller"
+"""Metadata: who calls, for people."""
 
 
 def unix_channel(socket: Path, max_message_bytes: int = _MAX_MESSAGE_BYTES) -> grpc.aio.Channel:
@@ -41,3 +44,8 @@ def lost(error: grpc.aio.AioRpcError) -> LinkLostError:
 def failed(error: grpc.aio.AioRpcError) -> LinkLostError | RefusedError:
     """Returns the error of a request that failed: a refusal, unless the service is gone."""
     return lost(error) if error.code() in GONE else RefusedError(error.details() or error.code().name)
+
+
+def call_metadata(caller: str) -> tuple[tuple[str, str], ...]:
+    """Returns the metadata of an operator's call that is passed on: its request ID, and who calls."""
+    return (request_id.HEADER, request_id.current()), (_CALLER, caller)

@@ -12,6 +12,8 @@ from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
+from gateway.links.bridge.copies import Copies
+from gateway.links.bridge.link import BridgeLink
 from gateway.links.drive.state import DriveLink
 from gateway.links.preview.control import PreviewLink
 from gateway.links.recorder.incidents import Incidents
@@ -19,10 +21,12 @@ from gateway.links.recorder.link import RecorderLink
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.ports import SnapshotSource
 from gateway.rpc.connections.guard import ConnectionGuard
+from gateway.rpc.hub_requests import HubRequests
 from gateway.rpc.interceptors.stats import Stats
 from gateway.rpc.responses.event_stream import EventStream
 from gateway.rpc.responses.export_stream import ExportStream
 from gateway.rpc.responses.status_stream import StatusStream
+from gateway.status.cloud import CloudState, CloudView
 from gateway.status.fault import Severity
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.recording import RecorderState, RecorderView
@@ -41,6 +45,19 @@ class RecorderMetrics:
     exports: ExportStream
 
 
+@dataclass(frozen=True, slots=True)
+class BridgeMetrics:
+    """What counts the connection to the fleet.
+
+    Attributes:
+        copies: None where the robot is not set up for recording.
+    """
+
+    link: BridgeLink
+    copies: Copies | None
+    requests: HubRequests
+
+
 @dataclass(eq=False)
 class GatewayCollector(Collector):
     """Collects all metrics at one instant.
@@ -55,6 +72,7 @@ class GatewayCollector(Collector):
         preview_link: counts failures to connect.
         drive_link: the same; None where the robot is not set up for driving.
         recorder: counts recording; None where the robot is not set up for it.
+        bridge: counts what concerns the fleet; None where the robot is not set up for one.
     """
 
     state: SnapshotSource
@@ -66,6 +84,7 @@ class GatewayCollector(Collector):
     preview_link: PreviewLink
     drive_link: DriveLink | None = None
     recorder: RecorderMetrics | None = None
+    bridge: BridgeMetrics | None = None
 
     def text(self) -> bytes:
         """Returns them in Prometheus' text format."""
@@ -95,6 +114,8 @@ class GatewayCollector(Collector):
             yield from _driving(now.teleop, self.drive_link.failures)
         if now.recorder and self.recorder:
             yield from _recording(now.recorder, self.recorder)
+        if now.cloud and self.bridge:
+            yield from _cloud(now.cloud, now.at_s, self.bridge)
 
     def _calls(self) -> Iterator[Metric]:
         methods = sorted(self.stats.methods.items())
@@ -274,3 +295,38 @@ def _recording(view: RecorderView, recorder: RecorderMetrics) -> Iterator[Metric
     yield _counter("recording_messages_dropped", dropped, report.messages_dropped)
     yield _gauge("recording_disk_free_bytes", "Free on its file system.", report.disk_free_bytes)
     yield _gauge("recording_disk_size_bytes", "Size of its file system.", report.disk_size_bytes)
+
+
+def _cloud(view: CloudView, now_s: float, bridge: BridgeMetrics) -> Iterator[Metric]:
+    status = view.status(now_s)
+    states = {each.value: float(status.state is each) for each in CloudState}
+    yield _gauges("cloud_state", "1 for the state of the connection to the fleet's hub.", "state", states)
+    failures = bridge.link.failures
+    yield _gauge("bridge_link_failures", "Failures in a row to connect to the bridge.", failures)
+    answered = CounterFamily(
+        f"{_PREFIX}_hub_requests", "Requests of the fleet's hub, by their outcome.", labels=("outcome",)
+    )
+    for outcome, count in bridge.requests.answered.items():
+        answered.add_metric((outcome.value,), count)
+    yield answered
+    if bridge.copies:
+        waiting = "States of copies that the recorder does not have yet."
+        yield _gauge("copy_states_waiting", waiting, bridge.copies.waiting)
+        dropped = "States of copies that were dropped because too many waited for the recorder."
+        yield _counter("copy_states_dropped", dropped, bridge.copies.dropped)
+        failed = "Attempts at which the recorder did not take the state of a copy."
+        yield _counter("copy_state_failures", failed, bridge.copies.failures)
+    if view.newest is None:
+        return
+    yield _gauge("outbox_events", "Events that wait to be sent to the hub.", status.outbox_events)
+    yield _gauge("outbox_bytes", "Size of the outbox.", status.outbox_bytes)
+    yield _gauge("outbox_max_bytes", "Its limit.", status.outbox_max_bytes)
+    yield _counter("cloud_events_sent", "Events that the hub has acknowledged.", status.events_sent)
+    dropped = "Events dropped because the outbox was full or its disk refused."
+    yield _counter("cloud_events_dropped", dropped, status.events_dropped)
+    if status.last_sent_age_ms is not None:
+        age_s = status.last_sent_age_ms / 1000
+        yield _gauge("cloud_last_sent_age_seconds", "Age of the newest acknowledgement.", age_s)
+    waiting = "Recordings that wait to be copied or are being copied."
+    yield _gauge("uploads_waiting", waiting, status.uploads_waiting)
+    yield _gauge("upload_bytes_per_second", "Sent of a recording at present.", status.upload_bytes_per_s)

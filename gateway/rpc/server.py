@@ -74,6 +74,8 @@ class Services:
             "GetRecordingThumbnail": self.recording.get_recording_thumbnail,
             "PinRecording": self.recording.pin_recording,
             "DeleteRecording": self.recording.delete_recording,
+            "UploadRecording": self.recording.upload_recording,
+            "CancelUpload": self.recording.cancel_upload,
         }
 
 

@@ -9,6 +9,7 @@ from dataclasses import fields
 from operator import attrgetter
 from typing import Any, Final
 
+from gateway.status.cloud import CloudView
 from gateway.status.fault import Fault
 from gateway.status.freshness import Sample
 from gateway.status.preview import PreviewView
@@ -75,6 +76,26 @@ def _recorder(view: RecorderView | None) -> object:
     )
 
 
+def _cloud(view: CloudView | None) -> object:
+    """Without what grows while it works: ages, sizes, counts of events and bytes."""
+    if view is None:
+        return None
+    report = view.newest
+    if report is None:
+        return view.error
+    status = report.status
+    return (
+        status.state,
+        status.robot,
+        status.fleet,
+        status.uploads_waiting,
+        status.uploading_id,
+        status.uploading.state if status.uploading else None,
+        status.uploads_paused,
+        status.last_error,
+    )
+
+
 def _faults(faults: tuple[Fault, ...]) -> object:
     return [(each.condition, each.onset_s, each.cleared_s) for each in faults]
 
@@ -92,5 +113,6 @@ PROJECTIONS: Final[Mapping[str, Callable[[Any], object]]] = {
     "sources": _sources,
     "teleop": _teleop,
     "recorder": _recorder,
+    "cloud": _cloud,
     "faults": _faults,
 }

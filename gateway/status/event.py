@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TypeAlias
 
+from gateway.status.cloud import CloudState, RecordingCopy
 from gateway.status.fault import Fault, Severity
 from gateway.status.preview import PreviewState, Profile
 from gateway.status.recording import (
@@ -129,6 +130,23 @@ class RecordingChanged:
     messages_lost: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class CloudChanged:
+    """The connection to the fleet's hub settled in another state."""
+
+    state: CloudState
+    last_error: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingCopyChanged:
+    """A recording has been copied to the fleet's store, or that has failed; `label` is empty if unknown."""
+
+    recording_id: str
+    label: str
+    copy: RecordingCopy
+
+
 Detail: TypeAlias = (
     FaultRaised
     | FaultCleared
@@ -139,6 +157,8 @@ Detail: TypeAlias = (
     | ControlAction
     | ModeChanged
     | RecordingChanged
+    | CloudChanged
+    | RecordingCopyChanged
 )
 
 

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from gateway.status.access import UNGUARDED, AccessView
 from gateway.status.board import Board
+from gateway.status.cloud import CloudView
 from gateway.status.command import Command, effective_command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Fault
@@ -96,6 +97,7 @@ class Snapshot:
         pictures: what viewers report of the pictures that they show.
         teleop: driving; None where the robot is not set up for it.
         recorder: recording; None where the robot is not set up for it.
+        cloud: the connection to the fleet; None where the robot is not set up for one.
         ros_stalled: whether the ROS sampler makes no progress, so that the sources' ages accuse no publisher.
     """
 
@@ -115,6 +117,7 @@ class Snapshot:
     ros_stalled: bool
     teleop: TeleopView | None = None
     recorder: RecorderView | None = None
+    cloud: CloudView | None = None
 
     def __getitem__(self, spec: SourceSpec[ValueT]) -> Sample[ValueT]:
         """Returns the sample of a source; an absent one if the source is not configured."""
@@ -138,6 +141,7 @@ def take(
     pictures: Pictures = NO_PICTURES,
     teleop: TeleopView | None = None,
     recorder: RecorderView | None = None,
+    cloud: CloudView | None = None,
 ) -> Snapshot:
     """Returns the snapshot of `now_s`. Reads memory only, so that a call never waits for ROS or the disk."""
     configured = rules.sources
@@ -183,6 +187,7 @@ def take(
         ros_stalled=ros_stalled,
         teleop=teleop,
         recorder=recorder,
+        cloud=cloud,
     )
 
 

@@ -21,6 +21,7 @@ TRIPLES = [
 _ITSELF = "the gateway's own, true at the moment of the answer"
 _SERVICE = "told by the preview service on every change; service_reachable says whether it still speaks"
 _RECORDER = "reported by the recorder on every change; its state says whether it still answers"
+_BRIDGE = "reported by the bridge on every change; its state says whether it still answers"
 _EVENT = "of something that happened at an instant which is told with it; it never grows old"
 NEEDS_NO_AGE = {
     "SystemStatus.gateway_name": _ITSELF,
@@ -67,6 +68,11 @@ NEEDS_NO_AGE = {
     "RecordingCopy": _RECORDER,
     "RecordingGap": _RECORDER,
     "RecordingFile": _RECORDER,
+    "CloudStatus": _BRIDGE,
+    "CloudStateChanged": _EVENT,
+    "RecordingCopyChanged": _EVENT,
+    "UploadRecordingResponse.message": _ITSELF,
+    "CancelUploadResponse": _ITSELF,
     "StartRecordingResponse.message": _ITSELF,
     "StopRecordingResponse.message": _ITSELF,
     "TriggerSnapshotResponse.message": _ITSELF,

@@ -18,6 +18,7 @@ from console.client.exporting import ExportedRecording
 from console.client.mapping.driving import drive_item
 from console.client.mapping.events import event
 from console.client.mapping.methods import (
+    CANCEL_UPLOAD,
     DELETE_RECORDING,
     GET_GATEWAY_INFO,
     GET_OVERLAY_SNAPSHOT,
@@ -28,6 +29,7 @@ from console.client.mapping.methods import (
     START_RECORDING,
     STOP_ROBOT,
     SUBSCRIBE_EVENTS,
+    UPLOAD_RECORDING,
 )
 from console.fleet.model import ReportedState, fleet_rows
 from console.fleet.values import Enrolment, ReceiptCheck, StoredRecording, Unreadable
@@ -40,10 +42,12 @@ from omniseer.fleet.v1.upload_pb2 import StoredRecording as StoredRecordingMessa
 from omniseer.gateway.v1.event_pb2 import Event, EventGap
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
 from omniseer.gateway.v1.recording_pb2 import (
+    CancelUploadResponse,
     DeleteRecordingResponse,
     GetRecordingResponse,
     ListRecordingsResponse,
     StartRecordingResponse,
+    UploadRecordingResponse,
 )
 from omniseer.gateway.v1.robot_gateway_pb2 import GetGatewayInfoResponse, SubscribeEventsResponse
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus
@@ -175,6 +179,16 @@ def fleet_command() -> dict[str, Any]:
             "record delete --json",
             {"ok": True, **json_form(DELETE_RECORDING.decode(filled(DeleteRecordingResponse())))},
             id="record delete",
+        ),
+        pytest.param(
+            "record upload --json",
+            {"ok": True, **json_form(UPLOAD_RECORDING.decode(filled(UploadRecordingResponse())))},
+            id="record upload",
+        ),
+        pytest.param(
+            "record cancel-upload --json",
+            {"ok": True, **json_form(CANCEL_UPLOAD.decode(filled(CancelUploadResponse())))},
+            id="record cancel-upload",
         ),
         pytest.param("record export --json", {"ok": True, **exported_json(EXPORTED)}, id="record export"),
         pytest.param("fleet list --json", fleet_list(), id="fleet list"),

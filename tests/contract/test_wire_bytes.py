@@ -13,6 +13,7 @@ from google.protobuf.descriptor import Descriptor
 from google.protobuf.message import Message
 
 from omniseer.gateway.v1 import (
+    cloud_pb2,
     event_pb2,
     fault_pb2,
     gateway_info_pb2,
@@ -969,6 +970,32 @@ RECORDING_CHANGED = numbered(
     (6, "stop_reason", recording_pb2.RECORDING_STOP_REASON_DISK),
     (7, "messages_lost", 0),
 )
+CLOUD_STATUS = numbered(
+    cloud_pb2.CloudStatus,
+    (1, "state", cloud_pb2.CLOUD_STATE_UNREACHABLE),
+    (2, "robot", "lab-1"),
+    (3, "fleet", "lab"),
+    (4, "state_age_ms", 1 << 34),
+    (5, "outbox_events", 1 << 35),
+    (6, "outbox_bytes", 1 << 36),
+    (7, "outbox_max_bytes", 1 << 37),
+    (8, "events_dropped", 1 << 38),
+    (9, "events_sent", 1 << 39),
+    (10, "last_sent_age_ms", 0),
+    (11, "uploads_waiting", 3),
+    (12, "uploading_id", "a"),
+    (13, "uploading", RECORDING_COPY),
+    (14, "uploading_size", 1 << 40),
+    (15, "upload_bytes_per_s", 1 << 41),
+    (16, "uploads_paused", "at night"),
+    (17, "last_error", "gone"),
+)
+CLOUD_CHANGED = numbered(
+    event_pb2.CloudStateChanged, (1, "state", cloud_pb2.CLOUD_STATE_REFUSED), (2, "last_error", "revoked")
+)
+COPY_CHANGED = numbered(
+    event_pb2.RecordingCopyChanged, (1, "recording_id", "a"), (2, "label", "lap"), (3, "copy", RECORDING_COPY)
+)
 _ANSWER = ((1, "message", "done"), (2, "recording", RECORDING))
 _REQUESTED = (1, "request_id", "id")
 RECORDINGS = [
@@ -1041,6 +1068,16 @@ RECORDINGS = [
         (4, "force", True),
     ),
     numbered(recording_pb2.DeleteRecordingResponse, (1, "message", "done")),
+    CLOUD_STATUS,
+    CLOUD_CHANGED,
+    COPY_CHANGED,
+    numbered(event_pb2.Event, (17, "cloud_state_changed", CLOUD_CHANGED)),
+    numbered(event_pb2.Event, (18, "recording_copy_changed", COPY_CHANGED)),
+    numbered(system_status_pb2.SystemStatus, (22, "cloud", CLOUD_STATUS)),
+    numbered(recording_pb2.UploadRecordingRequest, _REQUESTED, (2, "recording_id", "a")),
+    numbered(recording_pb2.UploadRecordingResponse, (1, "message", "done"), (2, "copy", RECORDING_COPY)),
+    numbered(recording_pb2.CancelUploadRequest, _REQUESTED, (2, "recording_id", "a")),
+    numbered(recording_pb2.CancelUploadResponse, (1, "message", "done")),
 ]
 
 

@@ -67,6 +67,7 @@ class RecorderDouble(RecorderServiceServicer):
         exports: file and offset of each export.
         sent_bytes: of all chunks.
         copy_wanted: recordings that still have to be copied.
+        set_copies: every state of a copy that it was given.
         snapshots_run: how many snapshots are being made.
     """
 
@@ -85,6 +86,7 @@ class RecorderDouble(RecorderServiceServicer):
         self.exports: list[tuple[str, int]] = []
         self.sent_bytes = 0
         self.copy_wanted: set[str] = set()
+        self.set_copies: list[recorder_service_pb2.SetCopyRequest] = []
         self.has_ring = self.has_video = self.has_room = True
         self._answers: dict[str, Any] = {}
         self._changed = asyncio.Event()
@@ -294,7 +296,10 @@ class RecorderDouble(RecorderServiceServicer):
         self.faults.append(request)
         return recorder_service_pb2.ReportFaultResponse()
 
-    async def SetCopy(self, _request: Any, _context: Any) -> Any:  # noqa: N802
+    async def SetCopy(self, request: Any, _context: Any) -> Any:  # noqa: N802
+        await self.thawed.wait()
+        self.set_copies.append(request)
+        self._found(request.recording_id).copy.CopyFrom(request.copy)
         return recorder_service_pb2.SetCopyResponse()
 
     # Behind them

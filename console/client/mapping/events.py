@@ -44,6 +44,8 @@ _KINDS: Final[Mapping[str, tuple[EventKind, _Parts]]] = {
     "client_left": (EventKind.CLIENT_LEFT, lambda it: _client(it.client_left)),
     "control_action": (EventKind.CONTROL, lambda _: {}),
     "recording_state_changed": (EventKind.RECORDING, lambda _: {}),
+    "cloud_state_changed": (EventKind.CLOUD, lambda _: {}),
+    "recording_copy_changed": (EventKind.RECORDING_COPY, lambda _: {}),
     "robot_mode_changed": (EventKind.MODE, lambda it: {"mode": printable(it.robot_mode_changed.mode)}),
 }
 """Payload -> its kind, and the fields of the event that the reader does not find by their names.

@@ -149,6 +149,8 @@ GET_THUMBNAIL: Final = Method(
 DELETE_RECORDING: Final = Method(
     "DeleteRecording", partial(read, results.RecordingDeleted), service=_RECORDING
 )
+UPLOAD_RECORDING: Final = Method("UploadRecording", partial(read, results.UploadAnswer), service=_RECORDING)
+CANCEL_UPLOAD: Final = Method("CancelUpload", partial(read, results.UploadCancelled), service=_RECORDING)
 EXPORT_RECORDING: Final = Method("ExportRecording", export_item, service=_RECORDING)
 METHODS: Final = (
     GET_SYSTEM_STATUS,
@@ -170,6 +172,8 @@ METHODS: Final = (
     GET_THUMBNAIL,
     PIN_RECORDING,
     DELETE_RECORDING,
+    UPLOAD_RECORDING,
+    CANCEL_UPLOAD,
 )
 """The unary methods."""
 STREAMS: Final = (WATCH_SYSTEM_STATUS, SUBSCRIBE_EVENTS, EXPORT_RECORDING)

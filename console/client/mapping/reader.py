@@ -62,6 +62,8 @@ _RENAMED: Final[Mapping[type, Mapping[str, str]]] = {
         "preview": "preview_state_changed",
         "control": "control_action",
         "recording": "recording_state_changed",
+        "cloud": "cloud_state_changed",
+        "recording_copy": "recording_copy_changed",
     },
 }
 """Field of a result -> field of the message."""

@@ -83,6 +83,16 @@ def delete_request(request_id: str, recording_id: str, *, expected_sha256: bytes
     ).SerializeToString()
 
 
+def upload_request(request_id: str, recording_id: str) -> bytes:
+    """Returns the request of UploadRecording."""
+    return wire.UploadRecordingRequest(request_id=request_id, recording_id=recording_id).SerializeToString()
+
+
+def cancel_upload_request(request_id: str, recording_id: str) -> bytes:
+    """Returns the request of CancelUpload."""
+    return wire.CancelUploadRequest(request_id=request_id, recording_id=recording_id).SerializeToString()
+
+
 def export_item(message: wire.ExportRecordingResponse) -> results.ExportHeader | results.ExportChunk | None:
     """Returns the next part of an export; None for a kind that only a newer client knows."""
     match message.WhichOneof("part"):

@@ -4,6 +4,14 @@ None means "unknown". Enumerations have a member `UNKNOWN`: the gateway did not 
 than this client and set a value that this client does not know.
 """
 
+from console.client.results.cloud import (
+    CloudEvent,
+    CloudState,
+    CloudStatus,
+    RecordingCopyEvent,
+    UploadAnswer,
+    UploadCancelled,
+)
 from console.client.results.driving import (
     DriveInhibit,
     DriveLimits,

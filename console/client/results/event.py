@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from console.client.results.cloud import CloudEvent, RecordingCopyEvent
 from console.client.results.fault import Fault, FaultSeverity
 from console.client.results.preview import PreviewProfile, PreviewState
 from console.client.results.recording import (
@@ -27,6 +28,8 @@ class EventKind(Enum):
     CONTROL = "control"
     MODE = "mode"
     RECORDING = "recording"
+    CLOUD = "cloud"
+    RECORDING_COPY = "recording-copy"
 
 
 class ControlResult(Enum):
@@ -121,6 +124,8 @@ class Event:
     mode: str | None = None
     """The robot's mode, as the robot names it."""
     recording: RecordingEvent | None = None
+    cloud: CloudEvent | None = None
+    recording_copy: RecordingCopyEvent | None = None
 
     @property
     def is_presence(self) -> bool:

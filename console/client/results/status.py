@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from console.client.results.cloud import CloudStatus
 from console.client.results.driving import DriveInhibit, DrivePhase, StopLatch
 from console.client.results.fault import Fault
 from console.client.results.platform import Platform
@@ -162,6 +163,8 @@ class SystemStatus:
     gateway: GatewayFacts
     recording: RecordingStatus | None
     """None where the robot is not set up for recording."""
+    cloud: CloudStatus | None
+    """None where the robot is not set up for a fleet."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

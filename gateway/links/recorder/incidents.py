@@ -11,10 +11,12 @@ from common.broadcast import Broadcast
 from common.errors import DomainError, RecorderUnreachableError
 from gateway.links.recorder.calls import RecorderCalls
 from gateway.status.fault import Condition, Fault, Severity
-from gateway.status.faults.recording import OWN
+from gateway.status.faults import cloud, recording
 
 _log = logging.getLogger(__name__)
 
+_WITHOUT: Final = frozenset({recording.OWN, cloud.OWN})
+"""Components whose faults make no incident."""
 EXPIRED_S: Final = 30.0
 """After that the ring may not have the instant any more."""
 _FIRST_PAUSE_S: Final = 0.2
@@ -48,7 +50,9 @@ class Incidents:
         errors = {
             each.condition.fault_id: each.condition
             for each in faults
-            if each.active and each.condition.severity is Severity.ERROR and each.condition.component != OWN
+            if each.active
+            and each.condition.severity is Severity.ERROR
+            and each.condition.component not in _WITHOUT
         }
         now_s = self._clock()
         for fault_id in errors.keys() - self._known:

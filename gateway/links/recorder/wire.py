@@ -4,18 +4,18 @@ Its messages are mostly those of the operators' contract. They are passed on as 
 no knowledge of them, and an export costs the gateway no parsing.
 """
 
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final
 
 import grpc
 
 from gateway.links.grpc_client import lost, unix_channel
 from gateway.links.watch import LinkLostError
-from gateway.links.wire_values import same_fields
+from gateway.links.wire_values import by_number, same_fields
+from gateway.status.cloud import CopyReport, RecordingCopyState
 from gateway.status.fault import Severity
 from gateway.status.recording import (
     ENDED,
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     # Exists in the generated stubs alone: the name that a type checker knows the asyncio form by.
     from omniseer.recorder.v1.recorder_service_pb2_grpc import RecorderServiceAsyncStub
 
-MemberT = TypeVar("MemberT", bound=Enum)
 Metadata = Sequence[tuple[str, str]]
 
 _SERVICE: Final = f"/{pb.DESCRIPTOR.services_by_name['RecorderService'].full_name}"
@@ -46,19 +45,13 @@ _STATUS: Final = _REPORT["status"].message_type
 _RECORDING: Final = _REPORT["ended"].message_type
 
 
-def _by_number(domain: type[MemberT], message: Any, field: str, prefix: str) -> Mapping[int, MemberT]:
-    """Returns the members of an enum by the numbers that a field of a message has for them."""
-    values = message.fields_by_name[field].enum_type.values_by_name
-    return {
-        values[f"{prefix}_{each.name}"].number: each for each in domain if f"{prefix}_{each.name}" in values
-    }
-
-
-STATES: Final = _by_number(RecorderState, _STATUS, "state", "RECORDER_STATE")
-KINDS: Final = _by_number(RecordingKind, _RECORDING, "kind", "RECORDING_KIND")
-RECORDING_STATES: Final = _by_number(RecordingState, _RECORDING, "state", "RECORDING_STATE")
-STOP_REASONS: Final = _by_number(RecordingStopReason, _RECORDING, "stop_reason", "RECORDING_STOP_REASON")
-_SEVERITIES: Final = _by_number(Severity, pb.ReportFaultRequest.DESCRIPTOR, "severity", "FAULT_SEVERITY")
+STATES: Final = by_number(RecorderState, _STATUS, "state", "RECORDER_STATE")
+KINDS: Final = by_number(RecordingKind, _RECORDING, "kind", "RECORDING_KIND")
+RECORDING_STATES: Final = by_number(RecordingState, _RECORDING, "state", "RECORDING_STATE")
+STOP_REASONS: Final = by_number(RecordingStopReason, _RECORDING, "stop_reason", "RECORDING_STOP_REASON")
+_SEVERITIES: Final = by_number(Severity, pb.ReportFaultRequest.DESCRIPTOR, "severity", "FAULT_SEVERITY")
+_COPY: Final = pb.SetCopyRequest.DESCRIPTOR.fields_by_name["copy"].message_type
+_COPY_STATES: Final = by_number(RecordingCopyState, _COPY, "state", "RECORDING_COPY_STATE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +104,18 @@ class RecorderClient:
         number: Any = next(number for number, each in _SEVERITIES.items() if each is severity)
         request = pb.ReportFaultRequest(fault_id=fault_id, severity=number, message=message)
         return (await self._stub.ReportFault(request, timeout=timeout_s)).recording_id
+
+    async def set_copy(self, report: CopyReport, timeout_s: float) -> None:
+        """Has the state of a copy kept."""
+        copy = report.copy
+        request = pb.SetCopyRequest(recording_id=report.recording_id)
+        number: Any = next(number for number, each in _COPY_STATES.items() if each is copy.state)
+        request.copy.state, request.copy.reason, request.copy.bytes_done = (
+            number,
+            copy.reason,
+            copy.bytes_done,
+        )
+        await self._stub.SetCopy(request, timeout=timeout_s)
 
 
 def report_from(message: pb.WatchStateResponse) -> RecorderReport:

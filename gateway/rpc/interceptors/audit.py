@@ -26,6 +26,8 @@ from gateway.status.preview import Profile
 _COMPONENT: Final = "gateway"
 _MAX_TEXT: Final = 200
 """Characters of a request or an answer: a request may be as long as its sender likes."""
+HUB: Final = "hub"
+"""The address of what the fleet's hub requests."""
 _NOW_S: Final = 1.0
 """Age of an action whose event has its time, near enough."""
 
@@ -89,6 +91,37 @@ class Audit(Interceptor[CallContext]):
         """Records what a caller did in a stream, a time of motion for example. It is never folded."""
         self._write(self._done_sink, action)
 
+    def record_request_of_hub(
+        self,
+        who: str,
+        method: str,
+        request: Message | None,
+        *,
+        result: ControlResult,
+        answer: str,
+        own_id: str,
+    ) -> None:
+        """Records what the fleet's hub has requested. Its requests are one caller's, whoever issues them.
+
+        Args:
+            who: by the hub's word.
+            method: of the contract that does the same.
+            request: of that method; None for one that this gateway does not know.
+            result: how it ended.
+            answer: for people.
+            own_id: its request ID.
+        """
+        action = ControlAction(
+            who=who,
+            address=HUB,
+            method=method,
+            request=_shortened(_as_text(request)) if request else "",
+            result=result,
+            answer=_shortened(answer),
+            request_id=own_id,
+        )
+        self._repeats(result).take(action, HUB, authenticated=False)
+
     def record_due(self) -> None:
         """Records repeated actions whose time has come; to be called a few times a second."""
         self._done.record_due()
@@ -112,8 +145,10 @@ class Audit(Interceptor[CallContext]):
             credential=principal.credential_ids[0] if principal else "",
             request_id=request_id.current(),
         )
-        repeats = self._refused if result is ControlResult.REFUSED else self._done
-        repeats.take(action, call.peer.address_prefix)
+        self._repeats(result).take(action, call.peer.address_prefix)
+
+    def _repeats(self, result: ControlResult) -> Repeats:
+        return self._refused if result is ControlResult.REFUSED else self._done
 
     def _write(self, sink: AuditSink, action: ControlAction) -> None:
         sink.record(action)

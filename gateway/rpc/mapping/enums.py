@@ -5,6 +5,7 @@ from enum import Enum
 from typing import Any, Final, TypeVar
 
 from common.errors import InvalidRequestError
+from gateway.status.cloud import CloudState, RecordingCopyState
 from gateway.status.event import ControlResult
 from gateway.status.event_log import GapReason
 from gateway.status.fault import Severity
@@ -21,6 +22,7 @@ from gateway.status.recording import (
 from gateway.status.source_view import SourceState
 from gateway.status.teleop import DriveInhibit, DrivePhase
 from omniseer.gateway.v1 import (
+    cloud_pb2,
     event_pb2,
     fault_pb2,
     preview_pb2,
@@ -61,6 +63,8 @@ RECORDING_STATES: Final = _or_none(RecordingState, recording_pb2.RecordingState,
 RECORDING_STOP_REASONS: Final = _or_none(
     RecordingStopReason, recording_pb2.RecordingStopReason, "RECORDING_STOP_REASON"
 )
+CLOUD_STATES: Final = _by_name(CloudState, cloud_pb2.CloudState, "CLOUD_STATE")
+COPY_STATES: Final = _by_name(RecordingCopyState, recording_pb2.RecordingCopyState, "RECORDING_COPY_STATE")
 GAP_REASONS: Final = _by_name(GapReason, event_pb2.EventGapReason, "EVENT_GAP_REASON")
 _PROFILE_OF: Final[Mapping[int, Profile | None]] = {number: profile for profile, number in PROFILES.items()}
 _DELIVERY_OF: Final[Mapping[int, Delivery | None]] = {

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, Final
 
+from gateway.rpc.mapping.cloud import cloud_changed, recording_copy_changed
 from gateway.rpc.mapping.enums import CONTROL_RESULTS, GAP_REASONS, PREVIEW_STATES, PROFILES, SEVERITIES
 from gateway.rpc.mapping.faults import fill_fault
 from gateway.rpc.mapping.recording import recording_changed
 from gateway.status.event import (
     ClientJoined,
     ClientLeft,
+    CloudChanged,
     ControlAction,
     EncoderFallback,
     FaultCleared,
@@ -18,6 +20,7 @@ from gateway.status.event import (
     ModeChanged,
     PreviewChanged,
     RecordingChanged,
+    RecordingCopyChanged,
 )
 from gateway.status.event_log import Gap, Position
 from omniseer.gateway.v1 import event_pb2 as pb
@@ -98,5 +101,7 @@ _PAYLOADS: Final[dict[type, tuple[str, Callable[[Any, float], Any]]]] = {
     ControlAction: ("control_action", _control),
     ModeChanged: ("robot_mode_changed", lambda it, _: pb.RobotModeChanged(**asdict(it))),
     RecordingChanged: ("recording_state_changed", lambda it, _: recording_changed(it)),
+    CloudChanged: ("cloud_state_changed", lambda it, _: cloud_changed(it)),
+    RecordingCopyChanged: ("recording_copy_changed", lambda it, _: recording_copy_changed(it)),
 }
 """Total: a test checks every kind of event, and every payload of the schema."""

@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from gateway.rpc.calls.recipient import Recipient
+from gateway.rpc.mapping.cloud import cloud_status
 from gateway.rpc.mapping.enums import HEALTH_STATES, SOURCE_STATES
 from gateway.rpc.mapping.faults import fill_fault
 from gateway.rpc.mapping.freshness import freshness_fields
@@ -39,7 +40,8 @@ _UNATTRIBUTED: Final = "unknown"
 def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2.SystemStatus:
     """Returns everything but detections and events.
 
-    `teleop` and `recording` stay unset where the robot is not set up for them, which means "not available".
+    `teleop`, `recording` and `cloud` stay unset where the robot is not set up for them, which means "not
+    available".
     """
     status = system_status_pb2.SystemStatus(
         gateway_name=snapshot.identity.name,
@@ -54,6 +56,7 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
         gateway=gateway_facts(snapshot.gateway),
         teleop=teleop_status(snapshot.teleop, snapshot.at_s) if snapshot.teleop else None,
         recording=recording_status(snapshot.recorder) if snapshot.recorder else None,
+        cloud=cloud_status(snapshot.cloud, snapshot.at_s) if snapshot.cloud else None,
     )
     # In place: a message that is passed to a constructor is copied, which doubles the cost of a short one.
     for fault in snapshot.faults:

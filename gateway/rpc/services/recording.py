@@ -1,16 +1,22 @@
-"""Recordings: passed on to the recorder, which owns them and answers."""
+"""Recordings: passed on to the recorder, which owns them and answers; their copies, to the bridge."""
 
 from collections.abc import AsyncIterator
+from typing import Final
 
 from google.protobuf.message import Message
 
 from common.errors import NotAllowedError, PreconditionError
 from common.reasons import Reason
 from gateway.access.role import Role
+from gateway.links.bridge.uploads import Uploads
 from gateway.links.recorder.calls import RecorderCalls
 from gateway.rpc.calls.call import CallContext
+from gateway.rpc.mapping.cloud import recording_copy
 from gateway.rpc.responses.export_stream import ExportStream
+from gateway.status.cloud import RecordingCopy, RecordingCopyState
 from omniseer.gateway.v1.recording_pb2 import (
+    CancelUploadRequest,
+    CancelUploadResponse,
     DeleteRecordingRequest,
     ExportRecordingRequest,
     GetRecordingRequest,
@@ -20,6 +26,8 @@ from omniseer.gateway.v1.recording_pb2 import (
     StartRecordingRequest,
     StopRecordingRequest,
     TriggerSnapshotRequest,
+    UploadRecordingRequest,
+    UploadRecordingResponse,
 )
 
 
@@ -29,11 +37,13 @@ class RecordingService:
     Args:
         calls: to the recorder; None where the robot is not set up for recording.
         exports: passes the bytes of files on.
+        uploads: to the bridge; None where the robot is not set up for a fleet.
     """
 
-    def __init__(self, calls: RecorderCalls | None, exports: ExportStream) -> None:
+    def __init__(self, calls: RecorderCalls | None, exports: ExportStream, uploads: Uploads | None) -> None:
         self._calls = calls
         self._exports = exports
+        self._uploads = uploads
 
     async def start_recording(self, request: StartRecordingRequest, call: CallContext) -> bytes:
         """Returns when the first file is open."""
@@ -83,6 +93,25 @@ class RecordingService:
         """Yields a header, then the chunks."""
         return self._exports.responses(self._configured(), request.SerializeToString(), _caller(call))
 
+    async def upload_recording(
+        self, request: UploadRecordingRequest, call: CallContext
+    ) -> UploadRecordingResponse:
+        """Returns when the recording is in the bridge's queue."""
+        copy = await self._fleet().queue(
+            request.request_id, request.recording_id, _caller(call), call.remaining_s()
+        )
+        message = f"{request.recording_id} {_where(copy)}"
+        return UploadRecordingResponse(message=message, copy=recording_copy(copy))
+
+    async def cancel_upload(self, request: CancelUploadRequest, call: CallContext) -> CancelUploadResponse:
+        """Returns when the recording is no longer in the bridge's queue."""
+        copy = await self._fleet().cancel(
+            request.request_id, request.recording_id, _caller(call), call.remaining_s()
+        )
+        kept = copy.state is RecordingCopyState.VERIFIED
+        what = _where(copy) if kept else "is not copied to the fleet's store any more"
+        return CancelUploadResponse(message=f"{request.recording_id} {what}")
+
     async def _pass_on(self, request: Message, call: CallContext) -> bytes:
         return await self._configured().call(
             call.method.name, request.SerializeToString(), _caller(call), call.remaining_s()
@@ -96,6 +125,28 @@ class RecordingService:
                 Reason.RECORDING_NOT_CONFIGURED,
             )
         return self._calls
+
+    def _fleet(self) -> Uploads:
+        self._configured()
+        if self._uploads is None:
+            raise PreconditionError(
+                "this robot is not set up for a fleet: run robot-bridge there, and name its socket as "
+                "bridge.socket in the gateway's configuration",
+                Reason.FLEET_NOT_CONFIGURED,
+            )
+        return self._uploads
+
+
+_WHERE: Final = {
+    RecordingCopyState.UPLOADING: "is being copied to the fleet's store",
+    RecordingCopyState.VERIFYING: "is being verified in the fleet's store",
+    RecordingCopyState.VERIFIED: "is in the fleet's store already, verified",
+}
+
+
+def _where(copy: RecordingCopy) -> str:
+    """Returns where a copy stands, as the end of a sentence."""
+    return _WHERE.get(copy.state, "waits to be copied to the fleet's store")
 
 
 def _caller(call: CallContext) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from gateway.status.fault import Condition
 from gateway.status.faults.access import access_faults
+from gateway.status.faults.cloud import cloud_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.driving import driving_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
@@ -24,11 +25,13 @@ class FaultRules:
         startup_grace_s: how long after the gateway's start a source or service may be missing without a
             fault: the robot's programs take their time to start.
         expiry_days: how long before its end of validity a certificate is a fault.
+        hub_offline_s: how long the fleet's hub may be away without a fault.
     """
 
     platform: PlatformLimits
     startup_grace_s: float
     expiry_days: float = 14.0
+    hub_offline_s: float = 600.0
 
 
 def conditions(
@@ -53,5 +56,8 @@ def conditions(
     yield from preview_faults(snapshot.preview, active, settled=settled)
     yield from driving_faults(snapshot.teleop, settled=settled)
     yield from recording_faults(snapshot.recorder, snapshot.at_s, settled=settled)
+    yield from cloud_faults(
+        snapshot.cloud, snapshot.at_s, offline_after_s=rules.hub_offline_s, settled=settled
+    )
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

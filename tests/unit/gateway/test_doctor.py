@@ -13,7 +13,15 @@ from gateway.access.directory import CredentialDirectory
 from gateway.access.role import Role
 from gateway.config import GatewaySettings
 from gateway.doctor.devices import device_findings
-from gateway.doctor.endpoints import DRIVE, PREVIEW, RECORDER, Service, operator_endpoint, service_endpoint
+from gateway.doctor.endpoints import (
+    BRIDGE,
+    DRIVE,
+    PREVIEW,
+    RECORDER,
+    Service,
+    operator_endpoint,
+    service_endpoint,
+)
 from gateway.doctor.examination import examine
 from gateway.links.preview.exposure import video_exposure
 from gateway.status.preview import Listener
@@ -34,6 +42,30 @@ def test_a_gateway_without_sources_needs_no_ros(tmp_path: Path) -> None:
     findings: dict[str, Finding] = {finding.check: finding for finding in examine(config)}
     assert findings["configuration"].verdict is Verdict.GOOD
     assert findings["ros"].what == "no sources are configured; ROS is not used"
+
+
+def test_what_the_hub_may_request_is_named_and_must_be_possible(tmp_path: Path) -> None:
+    config = tmp_path / "gateway.yaml"
+
+    def finding(text: str) -> Finding | None:
+        config.write_text(f"sources: []\n{text}\n", encoding="utf-8")
+        return next((each for each in examine(config) if each.check == "bridge.requests"), None)
+
+    assert finding("") is None
+    none = finding("bridge: {socket: /run/b.sock}")
+    assert none
+    assert (none.verdict, none.what) == (Verdict.GOOD, "the fleet's hub may request: nothing")
+    both = "bridge: {socket: /run/b.sock, allowed_requests: [upload, snapshot]}"
+    named = finding(f"{both}\nrecording: {{socket: /run/r.sock}}")
+    assert named
+    assert named.what.endswith("upload, snapshot")
+    for text, missing in (
+        (both, "recording.socket"),
+        ("bridge: {allowed_requests: [upload]}", "bridge.socket"),
+    ):
+        wrong = finding(text)
+        assert wrong
+        assert (wrong.verdict, missing in wrong.what) == (Verdict.WRONG, True)
 
 
 def test_a_machine_without_devices_is_worth_a_note(tmp_path: Path) -> None:
@@ -72,7 +104,7 @@ def test_the_operators_endpoint() -> None:
     assert operator_endpoint("127.0.0.1", 0).verdict is Verdict.NOTE
 
 
-@pytest.mark.parametrize("service", [PREVIEW, DRIVE, RECORDER], ids=lambda service: service.check)
+@pytest.mark.parametrize("service", [PREVIEW, DRIVE, RECORDER, BRIDGE], ids=lambda service: service.check)
 def test_the_endpoint_of_a_service(tmp_path: Path, service: Service) -> None:
     path = tmp_path / "service.sock"
     assert service.command in service_endpoint(service, path).remedy

@@ -51,6 +51,7 @@ from console.client.results import (
     PreviewProfile,
 )
 from omniseer.gateway.v1 import (
+    cloud_pb2,
     event_pb2,
     fault_pb2,
     gateway_info_pb2,
@@ -68,6 +69,7 @@ from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import alternatives, changes, fields_of, fill_distinctly, is_alternative
 
 FILES: Final = (
+    cloud_pb2,
     event_pb2,
     source_pb2,
     fault_pb2,
@@ -119,6 +121,7 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.RecordingCopyState, recording_pb2.RecordingCopyState),
         (results.RecordingGapCause, recording_pb2.RecordingGapCause),
         (results.RecordingChange, event_pb2.RecordingChange),
+        (results.CloudState, cloud_pb2.CloudState),
     )
 }
 
@@ -168,6 +171,8 @@ RENAMED: Final[Mapping[str, str]] = {
     "Event.preview_state_changed": "preview",
     "Event.control_action": "control",
     "Event.recording_state_changed": "recording",
+    "Event.cloud_state_changed": "cloud",
+    "Event.recording_copy_changed": "recording_copy",
     "ClientJoined.address": "client_address",
     "ClientLeft.address": "client_address",
     "ClientJoined.who": "client_name",
@@ -281,6 +286,9 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "TeleopStatus.stop": ("stop",),
     "TeleopStatus.base_timeout_ms": ("base_timeout_ms",),
     "SystemStatus.recording": ("recording",),
+    "SystemStatus.cloud": ("cloud",),
+    "CloudStatus.last_sent_age_ms": ("last_sent_age_ms",),
+    "CloudStatus.uploading": ("uploading",),
     "RecordingStatus.messages_lost": ("messages_lost",),
     "RecordingStatus.room_s": ("room_s",),
     "Recording.messages_lost": ("messages_lost",),
@@ -329,6 +337,8 @@ EVENT_KINDS: Final[Mapping[str, EventKind]] = {
     "control_action": EventKind.CONTROL,
     "robot_mode_changed": EventKind.MODE,
     "recording_state_changed": EventKind.RECORDING,
+    "cloud_state_changed": EventKind.CLOUD,
+    "recording_copy_changed": EventKind.RECORDING_COPY,
 }
 """Payload of an event -> `Event.kind`, which no field feeds."""
 
@@ -341,6 +351,8 @@ EVENT_PARTS: Final = (
     "control",
     "mode",
     "recording",
+    "cloud",
+    "recording_copy",
 )
 """The parts of an `Event` that its payload feeds; those of other payloads are None."""
 
@@ -680,6 +692,8 @@ def test_every_field_of_the_requests_of_recordings_is_set() -> None:
             "recording", "file", offset=7, expected_sha256=b"sum", max_bytes_per_s=9
         ),
         recording_pb2.PinRecordingRequest: recording.pin_request("id", "recording", pinned=True),
+        recording_pb2.UploadRecordingRequest: recording.upload_request("id", "recording"),
+        recording_pb2.CancelUploadRequest: recording.cancel_upload_request("id", "recording"),
         recording_pb2.DeleteRecordingRequest: recording.delete_request(
             "id", "recording", expected_sha256=b"sum", force=True
         ),

@@ -16,8 +16,8 @@ from common.version import project_version
 from console.doctor import network, robot
 from console.doctor.examination import examine, reached
 from console.doctor.srt_probe import answers_as_srt, induction, is_answer
+from omniseer.gateway.v1 import cloud_pb2, teleop_pb2
 from omniseer.gateway.v1 import states_pb2 as states
-from omniseer.gateway.v1 import teleop_pb2
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.source_pb2 import SOURCE_STATE_QOS_MISMATCH, SOURCE_STATE_SILENT
 from tests.support.gateway_double import GatewayDouble, serving
@@ -243,3 +243,21 @@ def test_what_keeps_a_robot_from_being_driven_is_found(double: GatewayDouble) ->
     assert "robot-drive" in examined(double)["driving"].remedy
     teleop.inhibits[:] = [teleop_pb2.DRIVE_INHIBIT_OUTRANKED]
     assert "what else drives" in examined(double)["driving"].remedy
+
+
+def test_a_robot_of_a_fleet_says_whether_it_is_connected(double: GatewayDouble) -> None:
+    assert "fleet" not in examined(double)
+    cloud = double.status.cloud
+    cloud.state, cloud.robot, cloud.fleet = cloud_pb2.CLOUD_STATE_CONNECTED, "lab-1", "lab"
+    connected = examined(double)["fleet"]
+    assert (connected.verdict, connected.what) == (
+        Verdict.GOOD,
+        "connected to its hub as lab-1 in the fleet lab",
+    )
+    cloud.state, cloud.last_error, cloud.outbox_events = cloud_pb2.CLOUD_STATE_OFFLINE, "no route", 7
+    cloud.uploads_waiting, cloud.uploads_paused = 2, "not charging"
+    away = examined(double)
+    assert (away["fleet"].verdict, "(7)" in away["fleet"].why) == (Verdict.NOTE, True)
+    assert "not charging" in away["fleet.uploads"].what
+    double.status.faults.add(id="cloud.offline", severity=FAULT_SEVERITY_WARNING, active=True)
+    assert "fleet" not in examined(double), "the fault says it"

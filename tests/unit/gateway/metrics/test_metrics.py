@@ -14,7 +14,8 @@ from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 from common.histogram import Histogram
-from gateway.metrics.collector import GatewayCollector, RecorderMetrics
+from gateway.links.bridge.requests import Outcome
+from gateway.metrics.collector import BridgeMetrics, GatewayCollector, RecorderMetrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.interceptors.stats import MethodStats, Stats
@@ -36,6 +37,7 @@ from gateway.status.preview import (
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
 from gateway.status.sources import ODOMETRY, VISION
 from gateway.status.values import Received, Velocity
+from tests.support.cloud_views import uploading_view
 from tests.support.drive_views import stopped_view
 from tests.support.eventually import eventually
 from tests.support.recorder_views import recording_view
@@ -70,6 +72,7 @@ def snapshot(preview: PreviewView = PREVIEW) -> Snapshot:
         pictures=Pictures(viewer_count=2, worst_age_ms=140, link_age_ms=138),
         teleop=stopped_view(NOW_S),
         recorder=recording_view(NOW_S),
+        cloud=uploading_view(NOW_S),
     )
 
 
@@ -85,6 +88,9 @@ class World:
     muted = 36
     expired = 37
     sent_bytes = 38
+    waiting = 39
+    dropped = 40
+    answered = dict.fromkeys(Outcome, 41)
 
     def __init__(self, now: Snapshot) -> None:
         self._now = now
@@ -106,6 +112,7 @@ def families(calls: Stats, now: Snapshot | None = None) -> list[Metric]:
         preview_link=world,
         drive_link=world,
         recorder=RecorderMetrics(world, world, world),
+        bridge=BridgeMetrics(world, world, world),
     )
     return list(text_string_to_metric_families(collector.text().decode()))
 

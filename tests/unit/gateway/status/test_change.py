@@ -7,6 +7,7 @@ import pytest
 
 from gateway.status.board import Board
 from gateway.status.change import EXCLUDED, PROJECTIONS, change_key
+from gateway.status.cloud import CloudState, RecordingCopy, RecordingCopyState
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.preview import Measurement, PreviewState
 from gateway.status.recording import RecorderState, RecorderView
@@ -14,6 +15,8 @@ from gateway.status.snapshot import Runtime, Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY
 from gateway.status.teleop import DrivePhase
 from gateway.status.values import Mode, Received, Velocity
+from tests.support.cloud_views import connected
+from tests.support.cloud_views import view as cloud_view
 from tests.support.drive_views import actual, stopped_view
 from tests.support.recorder_views import status, view
 from tests.support.status import OFF, snapshot_of
@@ -88,6 +91,30 @@ def test_a_recording_that_grows_is_no_change_and_what_an_operator_acts_on_is_one
     ):
         assert change_key(snapshot(recorder=view(changed, 99.0))) != before
     assert change_key(snapshot(recorder=RecorderView("gone"))) != before
+
+
+def test_copying_that_goes_on_is_no_change_and_another_state_is_one() -> None:
+    uploading = RecordingCopy(RecordingCopyState.UPLOADING, bytes_done=1)
+    reported = connected(uploading=uploading, uploading_id="a")
+    before = change_key(snapshot(cloud=cloud_view(reported, 99.0)))
+    grown = replace(
+        reported,
+        uploading=replace(uploading, bytes_done=9**9),
+        events_sent=9,
+        outbox_bytes=9,
+        outbox_events=9,
+        state_age_ms=9,
+        upload_bytes_per_s=9,
+    )
+    assert change_key(snapshot(cloud=cloud_view(grown, 100.0))) == before
+    for changed in (
+        replace(reported, state=CloudState.OFFLINE),
+        replace(reported, uploading=RecordingCopy(RecordingCopyState.VERIFYING)),
+        replace(reported, uploads_waiting=1),
+        replace(reported, last_error="gone"),
+    ):
+        assert change_key(snapshot(cloud=cloud_view(changed, 99.0))) != before
+    assert change_key(snapshot(cloud=cloud_view(reported, 99.0).lost("gone", 99.0))) != before
 
 
 def test_every_field_of_the_snapshot_is_projected_or_excluded_by_name() -> None:

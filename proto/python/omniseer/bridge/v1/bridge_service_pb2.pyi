@@ -85,7 +85,8 @@ class WatchStateResponse(_message.Message):
     @_builtins.property
     def copies(self) -> _containers.RepeatedCompositeFieldContainer[Global___CopyReport]:
         """The copies of the recordings that wait, run or have ended last, at most 64: what the recorder is to know. Those
-        that wait or run come first.
+        that wait or run come first. One that was cancelled is among those that have ended, with
+        RECORDING_COPY_STATE_UNSPECIFIED, so that the recorder may delete the recording again.
         """
 
     @_builtins.property

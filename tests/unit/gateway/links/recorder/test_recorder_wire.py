@@ -19,7 +19,7 @@ from common.errors import (
 from common.reasons import Reason
 from common.refusal import DOMAIN
 from gateway.links.recorder import wire
-from gateway.links.recorder.refusals import refused
+from gateway.links.recorder.refusals import REFUSALS
 from gateway.links.watch import LinkLostError
 from gateway.status.recording import (
     RecorderState,
@@ -67,7 +67,7 @@ def refusal(code: grpc.StatusCode, reason: str = "", domain: str = DOMAIN) -> Do
     details = Status(code=code.value[0])
     details.details.add().Pack(ErrorInfo(reason=reason, domain=domain))
     metadata = grpc.aio.Metadata(("grpc-status-details-bin", details.SerializeToString()))
-    return refused(grpc.aio.AioRpcError(code, grpc.aio.Metadata(), metadata, "its own words"))
+    return REFUSALS.refused(grpc.aio.AioRpcError(code, grpc.aio.Metadata(), metadata, "its own words"))
 
 
 @pytest.mark.parametrize(

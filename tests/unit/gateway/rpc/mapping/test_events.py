@@ -5,9 +5,11 @@ from typing import get_args
 import pytest
 
 from gateway.rpc.mapping.events import event_message, gap_message, position_from, position_message
+from gateway.status.cloud import CloudState, RecordingCopy, RecordingCopyState
 from gateway.status.event import (
     ClientJoined,
     ClientLeft,
+    CloudChanged,
     ControlAction,
     ControlResult,
     Detail,
@@ -19,6 +21,7 @@ from gateway.status.event import (
     ModeChanged,
     PreviewChanged,
     RecordingChanged,
+    RecordingCopyChanged,
 )
 from gateway.status.event_log import Gap, GapReason, Position
 from gateway.status.fault import Condition, Fault, Severity
@@ -50,6 +53,8 @@ DETAILS: list[Detail] = [
         RecordingStopReason.DISK,
         7,
     ),
+    CloudChanged(CloudState.REFUSED, "it was revoked"),
+    RecordingCopyChanged("a", "lap", RecordingCopy(RecordingCopyState.FAILED, "no network", 7)),
 ]
 
 

@@ -19,6 +19,7 @@ from gateway.rpc.mapping.info import gateway_info
 from gateway.rpc.mapping.status import overlay_snapshot, system_status
 from gateway.rpc.server import SERVICE, Services
 from gateway.status.board import Board
+from gateway.status.cloud import CloudState, RecordingCopyState
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
@@ -70,6 +71,7 @@ from gateway.status.values import (
     Vision,
 )
 from omniseer.gateway.v1 import (
+    cloud_pb2,
     event_pb2,
     fault_pb2,
     overlay_pb2,
@@ -80,6 +82,7 @@ from omniseer.gateway.v1 import (
     states_pb2,
     teleop_pb2,
 )
+from tests.support.cloud_views import uploading_view
 from tests.support.drive_views import stopped_view
 from tests.support.recorder_views import recording_view
 
@@ -105,6 +108,8 @@ FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "l
         (RecordingState, enums.RECORDING_STATES, recording_pb2.RecordingState),
         (RecordingStopReason, enums.RECORDING_STOP_REASONS, recording_pb2.RecordingStopReason),
         (RecordingChange, enums.RECORDING_CHANGES, event_pb2.RecordingChange),
+        (CloudState, enums.CLOUD_STATES, cloud_pb2.CloudState),
+        (RecordingCopyState, enums.COPY_STATES, recording_pb2.RecordingCopyState),
     ],
 )
 def test_an_enum_and_its_counterpart_cover_each_other(domain: type[Enum], table: Any, wire_enum: Any) -> None:
@@ -145,6 +150,8 @@ def test_the_control_actions_are_these_and_a_viewer_may_only_stop() -> None:
             "TriggerSnapshot",
             "PinRecording",
             "DeleteRecording",
+            "UploadRecording",
+            "CancelUpload",
         ),
         Role.OPERATOR,
     )
@@ -209,6 +216,7 @@ def everything() -> Snapshot:
         pictures=Pictures(1, 140, 138),
         teleop=stopped_view(NOW_S),
         recorder=recording_view(at_s),
+        cloud=uploading_view(at_s),
     )
 
 

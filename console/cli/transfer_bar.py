@@ -1,4 +1,4 @@
-"""The progress bar of an export: rate, time left, and why nothing comes at the moment."""
+"""The progress bar of a recording that is copied: rate, time left, and why nothing goes on at the moment."""
 
 from types import TracebackType
 from typing import Self
@@ -13,10 +13,10 @@ from rich.progress import (
     TransferSpeedColumn,
 )
 
-from console.client import ExportProgress
+from console.client import ExportProgress, RecordingCopyState, UploadProgress
 
 
-class ExportBar:
+class TransferBar:
     """A progress bar, to be used in a `with` block.
 
     Args:
@@ -38,15 +38,20 @@ class ExportBar:
         )
         self._task = self._progress.add_task("", total=None)
 
-    def update(self, progress: ExportProgress) -> None:
-        """Shows how far it is."""
+    def show_export(self, progress: ExportProgress) -> None:
+        """Shows how far a copy to this computer is."""
         number = f"file {progress.number} of {progress.files}"
-        self._progress.update(
-            self._task,
-            description=f"waiting: {progress.waiting}" if progress.waiting else number,
-            completed=progress.done,
-            total=progress.total,
-        )
+        self._show(number, progress.waiting, progress.done, progress.total)
+
+    def show_upload(self, progress: UploadProgress) -> None:
+        """Shows how far a copy to the fleet's store is."""
+        copy = progress.copy
+        waiting = "" if copy.state is RecordingCopyState.UPLOADING else progress.waiting
+        self._show(copy.state.value, waiting, copy.bytes_done, progress.size)
+
+    def _show(self, what: str, waiting: str, done: int, total: int) -> None:
+        description = f"waiting: {waiting}" if waiting else what
+        self._progress.update(self._task, description=description, completed=done, total=total or None)
 
     def __enter__(self) -> Self:
         self._progress.start()

@@ -1,0 +1,1 @@
+"""The link to the bridge, which owns its state: nothing is reconciled, only watched and passed on."""

@@ -1,0 +1,64 @@
+"""What a service refuses, as an error for the gateway's own callers."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import grpc
+
+from common.errors import DefectError, DomainError
+from common.reasons import Reason
+from common.refusal import refusal_in
+from gateway.links.grpc_client import GONE
+from gateway.links.watch import ABSENT
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusals:
+    """The refusals of one service.
+
+    Attributes:
+        name: of the service, for people.
+        by_code: the error, and the reason where the service gives none that this gateway knows.
+        unreachable: makes the error of a service that does not answer, from why.
+    """
+
+    name: str
+    by_code: Mapping[grpc.StatusCode, tuple[Callable[[str, Reason], DomainError], Reason]]
+    unreachable: Callable[[str], DomainError]
+
+    def refused(self, error: grpc.aio.AioRpcError) -> DomainError:
+        """Returns the error for the caller of a method that the service has not carried out."""
+        code, text = error.code(), error.details() or error.code().name
+        if code in GONE:
+            return self.unreachable("it is gone, or took too long")
+        if code not in self.by_code:
+            _log.error("%s failed: %s %s", self.name, code.name, text)
+            return DefectError(f"{self.name} failed; see its log")
+        kind, reason = self.by_code[code]
+        found = refusal_in(error.trailing_metadata())
+        refusal = kind(text, Reason(found.reason) if found.reason in set(Reason) else reason)
+        refusal.retry_after_s = found.retry_after_s
+        return refusal
+
+    @contextmanager
+    def as_domain_errors(self) -> Iterator[None]:
+        """Turns the errors of a call into the gateway's own; a task that is cancelled stays cancelled."""
+        try:
+            yield
+        except grpc.aio.AioRpcError as error:
+            raise self.refused(error) from None
+        except asyncio.CancelledError:
+            if _is_cancelled():
+                raise
+            raise self.unreachable(ABSENT) from None
+
+
+def _is_cancelled() -> bool:
+    """Whether this task is cancelled: gRPC raises the same when the link closes the channel under a call."""
+    task = asyncio.current_task()
+    return bool(task and task.cancelling())
