@@ -225,7 +225,7 @@ class _Puller:
                 received += 1
                 yield delivery(self._session, message)
             elif self._is_end(message) and (received or message.status != "409"):
-                # A request that has delivered its batch is ended by a status as well, which the next one meets.
+                # A request that has delivered its batch is ended by a status, too, which the next one meets.
                 return
 
     def _is_end(self, message: Message) -> bool:

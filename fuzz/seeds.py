@@ -4,8 +4,8 @@ from typing import Any, Final
 
 from rclpy.serialization import serialize_message
 
-from fuzz.robot import SOURCES, type_of
 from common.ca import new_ca
+from fuzz.robot import SOURCES, type_of
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
 
+from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
 from common.metrics_endpoint import respond
@@ -28,7 +29,6 @@ from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
-from common.ca import certificate_info
 from gateway.access.store import parse_store
 from gateway.access.token import parse_token
 from gateway.config import GatewaySettings, load_settings

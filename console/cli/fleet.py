@@ -24,7 +24,6 @@ from console.fleet.values import CommandAnswer, CommandOutcome, FleetRow, Stored
 from console.presentation.formatting import age
 from console.presentation.json_form import json_form
 from console.robots import Robot, read_robots_file
-from console.robots.credentials import read_public
 from console.target import parse_target
 from fleet.standing import Standing
 
@@ -186,12 +185,10 @@ async def _rows(session: FleetSession) -> tuple[FleetRow, ...]:
 
 async def _recordings(session: FleetSession) -> list[StoredRecording | Unreadable]:
     from console.fleet.hub import read_recordings  # noqa: PLC0415
-    from fleet.receipts import ReceiptKeys  # noqa: PLC0415
 
     login = session.login
-    keys = ReceiptKeys(read_public(login.receivers_file, "file")) if login.receivers_file else None
     async with session.connect() as hub:
-        return await read_recordings(hub, login.fleet, keys)
+        return await read_recordings(hub, login.fleet, login.receivers)
 
 
 async def _command(session: FleetSession, robot: str, wanted: "Command", expires_s: int) -> CommandAnswer:

@@ -20,7 +20,7 @@ from console.fleet.values import (
     StoredRecording,
     Unreadable,
 )
-from console.presentation.formatting import joined, plural, size, wall_clock
+from console.presentation.formatting import plural, size, wall_clock
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 
 _LONGEST_MESSAGE = 500
@@ -34,7 +34,7 @@ _DROP_REASONS = {
 _RECEIPT_STYLES = {
     ReceiptCheck.VALID: SeverityStyle.GOOD,
     ReceiptCheck.MISSING: SeverityStyle.WARNING,
-    ReceiptCheck.UNCHECKED: SeverityStyle.WARNING,
+    ReceiptCheck.UNKNOWN_KEY: SeverityStyle.BAD,
     ReceiptCheck.INVALID: SeverityStyle.BAD,
 }
 OUTCOME_STYLES = {
@@ -111,7 +111,7 @@ def recordings_table(items: list[StoredRecording | Unreadable]) -> Table:
             size(recording.size),
             str(recording.file_count),
             Text(item.receipt.value, style=STYLES[_RECEIPT_STYLES[item.receipt]]),
-            Text(joined(shortened(recording.label or recording.preset), item.receipt_problem)),
+            Text(shortened(recording.label or recording.preset)),
         )
     return table
 

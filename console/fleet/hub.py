@@ -13,7 +13,6 @@ from console.fleet.wire import answer_of, command_bytes, items_of, recording_of
 from fleet import names
 from fleet.clock import HubClock
 from fleet.connection import Delivery, Hub, Start
-from fleet.receipts import ReceiptKeys
 from omniseer.fleet.v1.command_pb2 import Command
 
 _MS_PER_S: Final = 1000
@@ -35,14 +34,14 @@ async def read_board(hub: Hub) -> FleetBoard:
 
 
 async def read_recordings(
-    hub: Hub, fleet: str, keys: ReceiptKeys | None
+    hub: Hub, fleet: str, receivers: tuple[bytes, ...]
 ) -> list[StoredRecording | Unreadable]:
     """Returns the recordings in the hub's store, the newest first, with their receipts checked.
 
     Args:
         hub: The hub.
         fleet: Name of the fleet, which a receipt has to have.
-        keys: Of the fleet's receivers; None if they are not known.
+        receivers: Ed25519 public keys of the fleet's receivers, 32 bytes each.
 
     Raises:
         HubError: The hub does not answer.
@@ -55,14 +54,13 @@ async def read_recordings(
             continue
         recording, files, message = read
         robot = key.partition(".")[0]
-        checked = check_receipt(message, fleet, robot, keys)
+        checked = check_receipt(message, fleet, robot, receivers)
         found.append(
             StoredRecording(
                 robot=robot,
                 recording=recording,
                 files=files,
                 receipt=checked.result,
-                receipt_problem=checked.reason,
                 verified_unix_ms=checked.verified_unix_ms,
                 location=checked.location,
             )

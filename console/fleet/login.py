@@ -4,14 +4,12 @@
 fleet: lab
 name: anna
 servers: tls://hub1:4222, tls://hub2:4222
+receivers: 5d41... (Ed25519 public keys in hex, separated by commas)
 credentials:
 -----BEGIN NATS USER JWT-----
 ...
 authority:
 -----BEGIN CERTIFICATE-----
-...
-receivers:
------BEGIN PUBLIC KEY-----
 ...
 
 Stored beside the file of known robots: fleet.toml with the values, and a folder `fleet` with the secrets.
@@ -33,10 +31,11 @@ from console.robots.robots_file import read_text, robots_file_path
 from fleet.names import ROBOT_NAME
 
 HEAD: Final = "# Robot Gateway fleet login 1"
-_WORDS: Final = ("fleet", "name", "servers")
-_BLOCKS: Final = ("credentials", "authority", "receivers")
-_FILES: Final = {"credentials": "user.creds", "authority": "ca.pem", "receivers": "receipts.pub"}
+_WORDS: Final = ("fleet", "name", "servers", "receivers")
+_BLOCKS: Final = ("credentials", "authority")
+_FILES: Final = {"credentials": "user.creds", "authority": "ca.pem"}
 _SERVER: Final = re.compile(r"(?:tls|nats)://[A-Za-z0-9.:_\[\]-]{1,255}")
+_KEY: Final = re.compile(r"[0-9a-f]{64}")
 _MOST_SERVERS: Final = 16
 
 
@@ -48,17 +47,17 @@ class FleetLogin:
         fleet: Its name.
         name: The operator, as the hub knows them.
         servers: Of the hub, as "tls://host:4222".
+        receivers: Ed25519 public keys of the fleet's receivers, 32 bytes each.
         credentials_file: The operator's NATS credentials; None connects without.
         ca_file: Certificate of the authority of the servers' certificates (PEM); None connects without TLS.
-        receivers_file: Public keys of the fleet's receivers (PEM); None: no receipt can be checked.
     """
 
     fleet: str
     name: str
     servers: tuple[str, ...]
+    receivers: tuple[bytes, ...] = ()
     credentials_file: Path | None = None
     ca_file: Path | None = None
-    receivers_file: Path | None = None
 
 
 def fleet_login_path() -> Path:
@@ -76,13 +75,14 @@ def keep_fleet_login(text: str, path: Path | None = None) -> FleetLogin:
     found = parse_login_text(text, HEAD, _WORDS, _BLOCKS)
     if found is None:
         raise _not_a_login("it does not begin as one")
-    for key in _BLOCKS:
+    for key in ("credentials", "authority"):
         if not found.blocks.get(key, "").strip():
-            raise _not_a_login(f"it has no {key}")
+            raise _not_a_login(f"its {key} are missing" if key == "credentials" else f"its {key} is missing")
     values = {
         "fleet": found.words.get("fleet", ""),
         "name": printable(found.words.get("name", "")),
         "servers": _listed(found.words.get("servers", "")),
+        "receivers": _listed(found.words.get("receivers", "")),
     }
     login = _login(path, values, _not_a_login)
     document = "".join(f"{key} = {json.dumps(value)}\n" for key, value in values.items())
@@ -137,15 +137,19 @@ def login_of_servers(servers: str) -> FleetLogin:
 
 
 def _login(path: Path, values: dict[str, Any], wrong: Any) -> FleetLogin:
-    fleet = values.get("fleet")
+    fleet, receivers = values.get("fleet"), values.get("receivers", [])
     if not isinstance(fleet, str) or not ROBOT_NAME.fullmatch(fleet):
         raise wrong("'fleet' is no name of a fleet")
+    if not isinstance(receivers, list) or not all(_KEY.fullmatch(str(key)) for key in receivers):
+        raise wrong("'receivers' are not public keys of 64 hexadecimal digits")
     folder = path.parent / "fleet"
     return FleetLogin(
         fleet,
         printable(str(values.get("name", ""))),
         _servers(values.get("servers"), wrong),
-        *(folder / _FILES[block] for block in _BLOCKS),
+        tuple(bytes.fromhex(str(key)) for key in receivers),
+        folder / _FILES["credentials"],
+        folder / _FILES["authority"],
     )
 
 

@@ -1,11 +1,18 @@
 """Whether the receipt of a stored recording is that of a receiver, and of this recording."""
 
 from dataclasses import dataclass
+from typing import Final
 
 from console.fleet.values import ReceiptCheck
 from console.printable import printable
-from fleet.receipts import ReceiptError, ReceiptKeys
+from fleet.receipts import ReceiptFlaw, opened
 from omniseer.fleet.v1.upload_pb2 import Receipt, StoredRecording
+
+_CHECKS: Final = {
+    ReceiptFlaw.MISSING: ReceiptCheck.MISSING,
+    ReceiptFlaw.UNKNOWN_KEY: ReceiptCheck.UNKNOWN_KEY,
+    ReceiptFlaw.INVALID: ReceiptCheck.INVALID,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,13 +20,12 @@ class CheckedReceipt:
     """What a receipt proves; without a valid one neither time nor place is known."""
 
     result: ReceiptCheck
-    reason: str = ""
     verified_unix_ms: int | None = None
     location: str = ""
 
 
 def check_receipt(
-    stored: StoredRecording, fleet: str, robot: str, keys: ReceiptKeys | None
+    stored: StoredRecording, fleet: str, robot: str, receivers: tuple[bytes, ...]
 ) -> CheckedReceipt:
     """Returns what the receipt of a stored recording proves.
 
@@ -27,22 +33,18 @@ def check_receipt(
         stored: The recording with its receipt, as the hub has it.
         fleet: Name of the fleet.
         robot: Whose recording it is, by its key.
-        keys: Of the fleet's receivers; None if they are not known.
+        receivers: Public keys of the fleet's receivers.
     """
-    if not stored.receipt.receipt:
-        return CheckedReceipt(ReceiptCheck.MISSING)
-    if keys is None:
-        return CheckedReceipt(ReceiptCheck.UNCHECKED, "this login has no keys of receivers")
+    receipt = opened(stored.receipt, receivers)
+    if isinstance(receipt, ReceiptFlaw):
+        return CheckedReceipt(_CHECKS[receipt])
+    if not _is_of(receipt, stored, fleet, robot):
+        return CheckedReceipt(ReceiptCheck.INVALID)
+    return CheckedReceipt(ReceiptCheck.VALID, receipt.verified_unix_ms, printable(receipt.location))
+
+
+def _is_of(receipt: Receipt, stored: StoredRecording, fleet: str, robot: str) -> bool:
     recording = stored.recording
-    expected = Receipt(
-        fleet=fleet,
-        robot=robot,
-        recording_id=recording.id,
-        size=recording.size,
-        sha256=recording.sha256,
-    )
-    try:
-        receipt = keys.verified(stored.receipt, expected)
-    except ReceiptError as error:
-        return CheckedReceipt(ReceiptCheck.INVALID, str(error))
-    return CheckedReceipt(ReceiptCheck.VALID, "", receipt.verified_unix_ms, printable(receipt.location))
+    said = (receipt.fleet, receipt.robot, receipt.recording_id, receipt.file_name)
+    same = (receipt.size, receipt.sha256) == (recording.size, recording.sha256)
+    return same and said == (fleet, robot, recording.id, "")

@@ -51,10 +51,10 @@ class ReceiptCheck(Enum):
     VALID = "verified"
     """Its signature is that of one of the fleet's receivers, and it is of this recording."""
     MISSING = "no receipt"
-    UNCHECKED = "not checked"
-    """The receivers' keys are not known here."""
+    UNKNOWN_KEY = "unknown key"
+    """It is signed by a key that this login does not have."""
     INVALID = "invalid"
-    """No receiver of the fleet has signed it, or it is of something else."""
+    """The signature does not belong to it, or it is of something else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,8 +184,6 @@ class StoredRecording:
     recording: Recording
     files: tuple[RecordingFile, ...]
     receipt: ReceiptCheck
-    receipt_problem: str
-    """Why it is invalid or not checked; empty otherwise."""
     verified_unix_ms: int | None
     """By the receiver's clock; None without a valid receipt."""
     location: str

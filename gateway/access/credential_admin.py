@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
-from common.errors import UserError
-from common.private_files import directory_lock, write_all_private
 from common.ca import (
     certificate_info,
     issue_client_certificate,
     issue_server_certificate,
     new_ca,
 )
+from common.errors import UserError
+from common.private_files import directory_lock, write_all_private
 from gateway.access.command import credentials_command
 from gateway.access.credential import Credential, Kind, Validity
 from gateway.access.directory import CredentialDirectory, read_public

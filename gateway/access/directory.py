@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
+from common.ca import KeyPair, key_matches
 from common.errors import ExitCode, UserError
 from common.private_files import directory_lock, write_private
-from common.ca import KeyPair, key_matches
 from gateway.access.command import credentials_command
 from gateway.access.store import Store, parse_store, store_text
 

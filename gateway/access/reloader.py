@@ -13,8 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, NoReturn
 
-from common.errors import UserError
 from common.ca import KeyPair, certificate_info
+from common.errors import UserError
 from gateway.access.command import credentials_command
 from gateway.access.directory import CredentialDirectory, KeyPairFiles, read_public
 from gateway.access.store import Store

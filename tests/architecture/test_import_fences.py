@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PROGRAMS = ("gateway", "preview", "drive", "recorder", "console", "simrobot")
-OURS = ("common", *PROGRAMS)
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "console", "simrobot", "bridge", "hub")
+OURS = ("common", "fleet", *PROGRAMS)
+ALSO = {"bridge": ("console",)}
+"""The bridge is an ordinary client of the gateway, by the client library."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,19 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
     ("importer", "forbidden"),
     [
         ("common/", PROGRAMS),
-        *((f"{one}/", tuple(other for other in PROGRAMS if other != one)) for one in PROGRAMS),
+        *(
+            (f"{one}/", tuple(other for other in PROGRAMS if other != one and other not in ALSO.get(one, ())))
+            for one in PROGRAMS
+        ),
+        ("fleet/", (*HEAVY, *PROGRAMS, "grpc", "typer", "rich")),
+        *((f"fleet/{name}.py", ("nats", "nkeys", "asyncio")) for name in ("names", "reading", "standing")),
+        ("bridge/", ("console.cli", "console.fleet", "console.monitor", "console.window", "console.viewer")),
+        ("hub/exporter/", ("hub.receiver", "hub.administration", "boto3")),
+        ("console/fleet/", (*HEAVY, "grpc", "nats", "nkeys", "typer", "rich", "console.cli")),
+        *(
+            (f"console/fleet/{name}.py", ("asyncio", "time", "google.protobuf", "omniseer"))
+            for name in ("model", "columns", "values", "board")
+        ),
         ("drive/", ("omniseer.gateway", "grpc", "asyncio")),
         ("preview/", ("omniseer.gateway",)),
         ("console/", ("omniseer.preview",)),
@@ -176,10 +190,25 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("PySide6", ("console/window/",)),
         ("sdl2", ("console/gamepad/sdl.py",)),
         ("mcap", ("recorder/mcap/",)),
+        ("nats", ("fleet/session.py",)),
+        ("nkeys", ("fleet/",)),
+        ("sqlite3", ("bridge/outbox/",)),
+        ("boto3", ("hub/receiver/",)),
+        ("botocore", ("hub/receiver/",)),
+        ("aiohttp", ("bridge/uploads/",)),
+        ("prometheus_client", ("gateway/metrics/", "hub/", "bridge/")),
         ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
-        ("cryptography", ("common/ca.py", "fleet/receipts.py")),
-        ("yaml", ("common/config.py", "recorder/intake/qos.py", "recorder/mcap/rosbag2.py")),
+        ("cryptography", ("common/ca.py", "fleet/receipts.py", "hub/administration.py")),
+        (
+            "yaml",
+            (
+                "common/config.py",
+                "recorder/intake/qos.py",
+                "recorder/mcap/rosbag2.py",
+                "hub/administration.py",
+            ),
+        ),
         ("zeroconf", ("gateway/platform/advertiser.py", "console/robots/discovery.py")),
         ("google_crc32c", ("console/client/exporting.py", "recorder/store/export.py")),
         ("tomlkit", ("console/robots/robots_file_edit.py",)),
@@ -193,9 +222,25 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "preview/rpc/",
                 "drive/",
                 "console/client/",
+                "fleet/",
+                "bridge/",
+                "hub/",
             ),
         ),
-        ("omniseer.gateway", ("gateway/rpc/", "console/client/", "recorder/rpc/", "recorder/doctor/")),
+        (
+            "omniseer.gateway",
+            (
+                "gateway/rpc/",
+                "console/client/",
+                "recorder/rpc/",
+                "recorder/doctor/",
+                "fleet/",
+                "bridge/",
+                "hub/",
+            ),
+        ),
+        ("omniseer.fleet", ("fleet/", "bridge/", "hub/", "console/fleet/", "console/cli/fleet.py")),
+        ("omniseer.bridge", ("gateway/links/", "bridge/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
         ("omniseer.recorder", ("gateway/links/recorder/", "recorder/rpc/", "recorder/doctor/")),

@@ -127,7 +127,6 @@ def fleet_recordings() -> dict[str, Any]:
         recording=recording,
         files=files,
         receipt=ReceiptCheck.VALID,
-        receipt_problem="",
         verified_unix_ms=1,
         location="",
     )

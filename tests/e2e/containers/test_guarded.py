@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
+from common.ca import new_ca
 from console.client.errors import GatewayError, NotAllowed, NotTrusted, Unreachable
 from console.client.results import PreviewState
 from console.credentials import Credentials
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from console.robots.login import parse_login
-from common.ca import new_ca
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
 from tests.support.engine import ROOT
 from tests.support.receiver import Receiver

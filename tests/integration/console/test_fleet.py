@@ -11,10 +11,11 @@ from typing import Any
 from unittest import mock
 
 import pytest
+from nacl.signing import SigningKey
 
 from console.fleet.hub import read_recordings
 from console.fleet.values import StoredRecording as Stored
-from fleet.receipts import ReceiptKeys, ReceiptSigner, new_signing_key
+from fleet.receipts import PURPOSE, key_id
 from omniseer.fleet.v1.command_pb2 import (
     COMMAND_OUTCOME_DONE,
     COMMAND_OUTCOME_REFUSED,
@@ -23,7 +24,7 @@ from omniseer.fleet.v1.command_pb2 import (
 )
 from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_FULL, DroppedEvents
 from omniseer.fleet.v1.state_pb2 import RobotState
-from omniseer.fleet.v1.upload_pb2 import Receipt, StoredRecording
+from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt, StoredRecording
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.recording_pb2 import Recording
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
@@ -140,16 +141,22 @@ def test_events_are_followed_until_ctrl_c(hub: FleetHub) -> None:
     assert [each["event"]["event"]["position"]["sequence"] for each in (first, second)] == [1, 2]
 
 
-def stored(robot: str, recording_id: str, signer: ReceiptSigner, **wrong: Any) -> StoredRecording:
+def stored(robot: str, recording_id: str, key: SigningKey, **wrong: Any) -> StoredRecording:
     made = StoredRecording(recording=Recording(id=recording_id, label="crash", size=5000, sha256=b"s" * 32))
     said: dict[str, Any] = {"robot": robot, "recording_id": recording_id, "size": 5000, "sha256": b"s" * 32}
-    receipt = Receipt(fleet="lab", **(said | wrong), location=f"s3://fleet/{robot}")
-    made.receipt.CopyFrom(signer.sign(receipt))
+    receipt = Receipt(fleet="lab", **(said | wrong), location=f"s3://fleet/{robot}").SerializeToString()
+    made.receipt.CopyFrom(
+        SignedReceipt(
+            receipt=receipt,
+            signature=key.sign(PURPOSE + receipt).signature,
+            key_id=key_id(bytes(key.verify_key)),
+        )
+    )
     return made
 
 
 def test_recordings_with_their_receipts_checked(hub: FleetHub) -> None:
-    receiver, other = (ReceiptSigner(new_signing_key()) for _ in range(2))
+    receiver, other = (SigningKey.generate() for _ in range(2))
     hub.put_recording("lab1", stored("lab1", "good", receiver))
     hub.put_recording("lab1", stored("lab1", "other", receiver, sha256=b"t" * 32))
     hub.put_recording("lab2", stored("lab1", "stolen", receiver))
@@ -159,19 +166,19 @@ def test_recordings_with_their_receipts_checked(hub: FleetHub) -> None:
     hub.put_recording("lab2", bent)
     hub.put_recording("lab3", StoredRecording(recording=Recording(id="none")))
     hub.put_recording("lab3", b"\xff\xff", "junk")
-    items = hub.run(lambda connection: read_recordings(connection, "lab", ReceiptKeys(receiver.public_pem)))
+    items = hub.run(lambda connection: read_recordings(connection, "lab", (bytes(receiver.verify_key),)))
     assert {each.recording.id: each.receipt.value for each in items if isinstance(each, Stored)} == {
         "good": "verified",
         "other": "invalid",
         "stolen": "invalid",
-        "forged": "invalid",
+        "forged": "unknown key",
         "bent": "invalid",
         "none": "no receipt",
     }
     (line,) = (line for line in shown(hub, "recordings", "lab3") if "unreadable" in line)
     assert "the bytes are no message" in line
     # Without a login no key is known.
-    assert {each["receipt"] for each in answer(hub, "recordings", "lab1")["recordings"]} == {"not checked"}
+    assert {each["receipt"] for each in answer(hub, "recordings", "lab1")["recordings"]} == {"unknown key"}
 
 
 def test_a_command_and_its_answer(hub: FleetHub) -> None:
@@ -362,7 +369,7 @@ def hostile_hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetHub]:
         loud = event(1, message=CONTROL_CHARACTERS)
         loud.component = loud.fault_raised.fault.message = f"{CONTROL_CHARACTERS}\x1b[2J"
         made.put_events(batch("control", loud), batch("giant", event(1, message="y" * 200_000)))
-        recording = stored("control", "r1", ReceiptSigner(new_signing_key()))
+        recording = stored("control", "r1", SigningKey.generate())
         change_texts(recording.recording, lambda _: CONTROL_CHARACTERS)
         recording.recording.id = "r1"
         made.put_recording("control", recording)

@@ -11,7 +11,6 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 from cryptography.x509.verification import PolicyBuilder, Store, VerificationError
 
-from common.errors import UserError
 from common.ca import (
     KeyPair,
     certificate_info,
@@ -20,6 +19,7 @@ from common.ca import (
     key_matches,
     new_ca,
 )
+from common.errors import UserError
 
 DAY_S = 86_400
 CA = new_ca("lab", 100)

@@ -11,12 +11,11 @@ LOGIN = f"""{HEAD}
 fleet: lab
 name: anna\x1b]0;owned\x07
 servers: tls://hub1:4222, tls://[fe80::1]:4222
+receivers: {"0f" * 32}, {"1e" * 32}
 credentials:
 SECRET
 authority:
 CA
-receivers:
-KEY
 """
 
 
@@ -30,8 +29,9 @@ def test_it_is_read_as_it_was_stored(path: Path) -> None:
     assert read_fleet_login(path) == stored
     assert (stored.fleet, stored.servers) == ("lab", ("tls://hub1:4222", "tls://[fe80::1]:4222"))
     assert stored.name.isprintable()
-    files = (stored.credentials_file, stored.ca_file, stored.receivers_file)
-    assert [file.read_text() for file in files if file] == ["SECRET\n", "CA\n", "KEY\n"]
+    assert stored.receivers == (b"\x0f" * 32, b"\x1e" * 32)
+    files = (stored.credentials_file, stored.ca_file)
+    assert [file.read_text() for file in files if file] == ["SECRET\n", "CA\n"]
     assert {file.stat().st_mode & 0o777 for file in (*files, path) if file} == {0o600}
 
 
@@ -43,9 +43,9 @@ def test_it_is_read_as_it_was_stored(path: Path) -> None:
         ("fleet: lab", "", "no name of a fleet"),
         ("tls://hub1:4222, tls://[fe80::1]:4222", "", "1 to 16 addresses"),
         ("tls://hub1:4222", "http://hub1", "is not an address"),
-        ("credentials:\nSECRET\n", "", "no credentials"),
-        ("authority:\nCA\n", "", "no authority"),
-        ("receivers:\nKEY\n", "receivers:\n\n", "no receivers"),
+        ("credentials:\nSECRET\n", "", "credentials are missing"),
+        ("authority:\nCA\n", "", "authority is missing"),
+        ("0f" * 32, "0F" * 32, "64 hexadecimal digits"),
     ],
 )
 def test_what_is_none_is_not_stored_and_not_quoted(path: Path, found: str, instead: str, said: str) -> None:
