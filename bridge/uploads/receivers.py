@@ -44,10 +44,10 @@ _NAMES_BYTES: Final = 512 * 1024
 class Requests(Protocol):
     """What uploads need of the connection to the hub (fleet.connection.Hub)."""
 
-    async def request(self, subject: str, payload: bytes, timeout_s: float) -> bytes:
+    async def request(self, subject: str, payload: bytes, timeout_s: float, /) -> bytes:
         """Returns the answer, or raises a `HubError`."""
 
-    def request_many(self, subject: str, payload: bytes, silence_s: float) -> AsyncIterator[bytes]:
+    def request_many(self, subject: str, payload: bytes, silence_s: float, /) -> AsyncIterator[bytes]:
         """Yields the answers, or raises a `HubError`."""
 
 

@@ -1,0 +1,89 @@
+"""A cluster of three keeps every event, whichever node is killed."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from fleet import names
+from fleet.connection import FleetAddress, Published, connect
+from fleet.errors import HubError, HubReason
+from hub import streams
+from tests.support.nats_servers import NatsServers, nats_servers
+from tests.support.simulated_fleet import received, simulated_fleet
+
+_LONGEST_GAP_S = 15.0
+"""docs/fleet.md."""
+
+
+async def _set_up(servers: NatsServers, replicas: int, limits: streams.StreamLimits | None = None) -> None:
+    async with connect(FleetAddress(servers.urls)) as hub:
+        await hub.connected(20)
+        assert await streams.set_up(hub, replicas, limits or streams.StreamLimits()) == []
+
+
+@pytest.mark.timed
+async def test_a_killed_leader_costs_no_event(tmp_path: Path) -> None:
+    """The whole proof, with every node killed in turn, is `scripts/bench fleet`."""
+    robots, messages = 100, 10
+    with nats_servers(tmp_path, 3) as servers:
+        await _set_up(servers, 3)
+        async with simulated_fleet(servers.urls, robots) as fleet, asyncio.TaskGroup() as tasks:
+            sending = tasks.create_task(fleet.send(range(messages)))
+            await fleet.sent_at_least(robots * messages // 4)
+            leader = servers.leader(names.EVENTS)
+            assert leader is not None
+            servers.kill(leader)
+            await sending
+            assert fleet.longest_s < _LONGEST_GAP_S
+        result = await received(servers.urls, robots, messages)
+    assert (result.lost, result.duplicates, result.disordered) == (0, 0, 0)
+
+
+async def test_a_full_hub_refuses_and_loses_nothing(tmp_path: Path) -> None:
+    """Publishers wait until there is room; what they had delivered before is there."""
+    limits = streams.StreamLimits(events_bytes=64 * 1024)
+    with nats_servers(tmp_path, 1) as servers:
+        await _set_up(servers, 1, limits)
+        async with connect(FleetAddress(servers.urls)) as hub:
+            await hub.connected(10)
+            for delivered in range(10):
+                await hub.publish_once(names.event_subject("r", "run", delivered), b"x" * 4096)
+            with pytest.raises(HubError) as refused:  # noqa: PT012  # which of them is refused, the store says
+                for delivered in range(10, 20):
+                    await hub.publish_once(names.event_subject("r", "run", delivered), b"x" * 4096)
+            assert refused.value.reason is HubReason.FULL
+            # A repeat is still known as one, and the first is still there.
+            assert (
+                await hub.publish_once(names.event_subject("r", "run", 0), b"x" * 4096) is Published.REPEATED
+            )
+            config = streams.stream_configs(1, streams.StreamLimits())[names.EVENTS]
+            await hub.api(f"STREAM.UPDATE.{names.EVENTS}", config)
+            subject = names.event_subject("r", "run", delivered)
+            assert await hub.publish_once(subject, b"x" * 4096) is Published.DELIVERED
+        assert (await received(servers.urls, 1, delivered + 1)).lost == 0
+
+
+async def test_without_a_majority_nothing_is_acknowledged(tmp_path: Path) -> None:
+    with nats_servers(tmp_path, 3) as servers:
+        await _set_up(servers, 3)
+        async with connect(FleetAddress(servers.urls)) as hub:
+            await hub.connected(10)
+            survivor = servers.urls.index(hub.link.server)
+            for node in {0, 1, 2} - {survivor}:
+                servers.kill(node)
+            with pytest.raises(HubError) as refused:
+                await hub.publish_once("fleet.r.ev.run.0", b"", 2.0)
+            unsure = {HubReason.TIMEOUT, HubReason.NO_RESPONDERS, HubReason.NO_QUORUM, HubReason.UNREACHABLE}
+            assert refused.value.reason in unsure
+            servers.start((survivor + 1) % 3)
+            async with asyncio.timeout(60):
+                while True:
+                    try:
+                        await hub.publish_once("fleet.r.ev.run.0", b"", 2.0)
+                    except HubError:
+                        await hub.connected(30)
+                    else:
+                        break
+        result = await received(servers.urls, 1, 1)
+    assert (result.lost, result.duplicates) == (0, 0)

@@ -1,0 +1,107 @@
+"""The table of an upload's states, its pauses, and the order of the queue."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.uploads.queue import (
+    LONGEST_PAUSE_S,
+    RUNNING,
+    TRANSITIONS,
+    WAITING,
+    Event,
+    IllegalEventError,
+    Priority,
+    State,
+    Upload,
+    in_order,
+    next_upload,
+    pause_s,
+    step,
+)
+
+UPLOAD = Upload(recording_id="one", size=100)
+
+
+def test_the_table_has_every_state_and_only_a_receipt_verifies() -> None:
+    assert set(TRANSITIONS) == set(State)
+    for state, row in TRANSITIONS.items():
+        for event, after in row.items():
+            if after is State.VERIFIED and state is not State.VERIFIED:
+                assert event is Event.CONFIRMED
+                assert state in RUNNING
+
+
+def test_an_event_that_can_t_happen_names_state_and_event() -> None:
+    with pytest.raises(IllegalEventError, match="'sent' can't happen to an upload that is local"):
+        step(UPLOAD, Event.SENT, 0)
+
+
+def test_the_way_of_an_upload() -> None:
+    upload = UPLOAD
+    for event, state in (
+        (Event.ENQUEUE, State.QUEUED),
+        (Event.BEGIN, State.UPLOADING),
+        (Event.FAILURE, State.FAILED),
+        (Event.RESUME, State.QUEUED),
+        (Event.BEGIN, State.UPLOADING),
+        (Event.SENT, State.VERIFYING),
+        (Event.CONFIRMED, State.VERIFIED),
+        (Event.RESTART, State.VERIFIED),
+        (Event.ENQUEUE, State.VERIFIED),
+        (Event.CHANGED, State.QUEUED),
+        (Event.REMOVE, State.LOCAL),
+    ):
+        upload = step(upload, event, 10.0, "because")
+        assert upload.state is state
+        assert upload.reason == ("because" if state is State.FAILED else "")
+    assert upload.failures == 0
+
+
+def test_failures_of_its_own_are_counted_and_pause_it_longer_each_time() -> None:
+    upload = replace(UPLOAD, state=State.UPLOADING)
+    for count, due_s in ((1, 1.0), (2, 2.0), (3, 4.0)):
+        upload = step(upload, Event.FAILURE, 0.0, "no")
+        assert (upload.failures, upload.due_s) == (count, due_s)
+        upload = step(step(upload, Event.RESUME, 0.0), Event.BEGIN, 0.0)
+    cut = step(upload, Event.CUT, 5.0, "no network")
+    assert (cut.state, cut.reason, cut.failures, cut.due_s) == (State.FAILED, "no network", 3, 0.0)
+
+
+@given(st.integers(min_value=1, max_value=10**9))
+def test_pauses_stay_within_one_and_three_hundred_seconds(failures: int) -> None:
+    assert 1 <= pause_s(failures) <= LONGEST_PAUSE_S
+    assert pause_s(failures) <= pause_s(failures + 1)
+
+
+@given(st.lists(st.sampled_from(Event), max_size=40))
+def test_no_sequence_of_events_ends_outside_the_table(events: list[Event]) -> None:
+    upload = UPLOAD
+    for event in events:
+        if event in TRANSITIONS[upload.state]:
+            upload = step(upload, event, 1.0, "why")
+        assert (upload.state in WAITING) == (upload.state not in {State.LOCAL, State.VERIFIED})
+        assert bool(upload.reason) == (upload.state in {State.PAUSED, State.FAILED})
+
+
+def test_the_most_urgent_is_next_and_one_that_just_failed_waits() -> None:
+    old, new = (
+        replace(UPLOAD, recording_id=name, state=State.QUEUED, started_unix_ms=start)
+        for name, start in (("old", 1), ("new", 2))
+    )
+    by_hand = replace(new, recording_id="hand", priority=Priority.BY_HAND)
+    failed = replace(old, recording_id="incident", priority=Priority.INCIDENT, state=State.FAILED, due_s=10.0)
+    uploads = [new, old, by_hand, failed]
+    assert next_upload(uploads, 0.0) is by_hand
+    assert next_upload(uploads, 10.0) is failed
+    assert next_upload([replace(new, state=State.VERIFIED), UPLOAD], 0.0) is None
+    running = replace(new, recording_id="runs", state=State.UPLOADING)
+    assert [each.recording_id for each in in_order([*uploads, running])] == [
+        "runs",
+        "incident",
+        "hand",
+        "old",
+        "new",
+    ]
