@@ -4,23 +4,30 @@ import asyncio
 import logging
 import secrets
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any
 
 from bridge.commands.desk import Desk
 from bridge.commands.taker import CommandTaker
 from bridge.config import BridgeSettings
-from bridge.outbox.outbox import outbox
+from bridge.outbox.outbox import Outbox, outbox
+from bridge.outbox.uploads import StoredUploads
 from bridge.robot.events import EventReader
+from bridge.robot.gateway import credentials
 from bridge.robot.status import StatusReader
 from bridge.rpc.servicer import SERVICE, BridgeServicer
 from bridge.sender import Sender
+from bridge.state import is_charging
 from bridge.state_sender import StateSender
 from bridge.status import Status
-from bridge.uploading import NoUploads
+from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
+from bridge.uploads.uploads import Fleet, Uploads
 from common import bind, rpc
 from common.health import Health
-from fleet.connection import FleetAddress, connect
+from console.client import AsyncGatewayClient
+from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
+from fleet.receipt_keys import read_keys
 
 _log = logging.getLogger(__name__)
 
@@ -31,18 +38,20 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
     """Connects the robot with its fleet, and serves the gateway, until `stop`.
 
     Raises:
-        UserError: the socket can't be used.
+        UserError: the socket can't be used, or a file of the robot's credentials or enrolment can't be read.
     """
     robot, run_id = settings.hub.robot, secrets.token_hex(_RUN_ID_BYTES)
     async with (
         outbox(settings.root, settings.outbox.max_bytes) as kept,
         connect(_address(settings)) as hub,
+        AsyncGatewayClient(settings.gateway.target, credentials=credentials(settings.gateway)) as gateway,
     ):
-        uploads = NoUploads()
+        robot_status = StatusReader(settings.gateway)
+        queue = _queue(settings, kept, hub, gateway, robot_status)
+        uploads: Uploading = QueuedUploads(queue) if queue else NoUploads()
         sender = Sender(robot, kept, hub)
         status = Status(robot, settings.hub.fleet, outbox=kept, hub=hub, sender=sender, uploads=uploads)
         desk = Desk(robot, kept, status.changes.notify_all)
-        robot_status = StatusReader(settings.gateway)
         states = StateSender(
             robot,
             settings.advertised_target,
@@ -58,6 +67,8 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
             sender.run,
             states.run,
         ]
+        if queue:
+            parts += [partial(queue.run, stop), partial(apply_rule, queue, gateway)]
         if settings.commands.allowed:
             parts.append(CommandTaker(settings, hub, desk).run)
         server = rpc.new_server()
@@ -71,6 +82,24 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         finally:
             await server.stop(rpc.STOP_GRACE_S)
             settings.socket.unlink(missing_ok=True)
+
+
+def _queue(
+    settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: AsyncGatewayClient, status: StatusReader
+) -> Uploads | None:
+    """Returns the uploads; None for a robot that has no receivers' keys."""
+    if settings.hub.receipts is None:
+        return None
+    fleet = Fleet(fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_keys(settings.hub.receipts))
+    return Uploads(
+        settings.uploads,
+        fleet,
+        store=StoredUploads(kept),
+        source=gateway,
+        hub=hub,
+        charging=lambda: is_charging(status.newest),
+        changed=status.changes.notify_all,
+    )
 
 
 def _address(settings: BridgeSettings) -> FleetAddress:

@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, field_validator, model_validator
 from pydantic_settings import SettingsConfigDict
 
+from bridge.uploads.config import UploadSettings
 from common.config import Section, Settings
 from common.errors import UserError
 from console.target import DEFAULT_TARGET, parse_target
@@ -82,6 +83,7 @@ class BridgeSettings(Settings):
     hub: HubSettings = HubSettings()
     outbox: OutboxSettings = OutboxSettings()
     commands: CommandSettings = CommandSettings()
+    uploads: UploadSettings = UploadSettings()
     advertised_target: str = Field(default="", max_length=255)
     """Where operators near the robot reach its gateway, as HOST:PORT, for the fleet's table."""
 

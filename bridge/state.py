@@ -59,6 +59,14 @@ def robot_state(own: Own, status: SystemStatus | None) -> pb.RobotState:
     return state
 
 
+def is_charging(status: SystemStatus | None) -> bool | None:
+    """Returns whether the main battery is being charged; None if that is not known."""
+    if status is None:
+        return None
+    battery = status.platform.power.lipo_battery
+    return battery.charging if battery.available and battery.charging_available else None
+
+
 def same_but_for_time(state: pb.RobotState) -> bytes:
     """Returns what two states have in common if nothing but time has passed between them."""
     key = pb.RobotState()
@@ -93,6 +101,8 @@ def _add_status(state: pb.RobotState, status: SystemStatus) -> None:
     state.drive = status.teleop.phase
     state.recorder = status.recording.state
     state.recordings_to_copy = status.recording.to_copy
+    if (charging := is_charging(status)) is not None:
+        state.charging = charging
     _add_platform(state, status.platform)
 
 
@@ -100,8 +110,6 @@ def _add_platform(state: pb.RobotState, platform: PlatformStatus) -> None:
     battery = platform.power.lipo_battery
     if battery.available and battery.percentage_available:
         state.battery_percent = _percent(battery.percentage)
-    if battery.available and battery.charging_available:
-        state.charging = battery.charging
     if platform.compute.disk_available:
         state.disk_used_percent = _percent(platform.compute.disk_used_percent)
 

@@ -1,14 +1,38 @@
-"""What the bridge needs of the uploads, and a stand-in for a robot that uploads nothing."""
+"""The uploads as the rest of the bridge sees them, and a stand-in for a robot that uploads nothing."""
 
+import asyncio
+import logging
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
-from common.errors import NotFoundError, PreconditionError
+from bridge.pauses import Pauses
+from bridge.uploads.queue import State, Upload
+from bridge.uploads.uploads import Uploads
+from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
 from common.reasons import Reason
+from console.client import AsyncGatewayClient, GatewayError
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import cloud_pb2
-from omniseer.gateway.v1.recording_pb2 import RecordingCopy
+from omniseer.gateway.v1 import recording_pb2 as recording_pb
+
+_log = logging.getLogger(__name__)
+
+MOST_COPIES: Final = 64
+"""Reported to the gateway."""
+_LOOK_S: Final = 30.0
+"""How often the robot's recordings are looked at for the rule."""
+_PAGE: Final = 200
+_MOST_PAGES: Final = 50
+STATES: Final = {
+    State.LOCAL: recording_pb.RECORDING_COPY_STATE_UNSPECIFIED,
+    State.QUEUED: recording_pb.RECORDING_COPY_STATE_QUEUED,
+    State.UPLOADING: recording_pb.RECORDING_COPY_STATE_UPLOADING,
+    State.VERIFYING: recording_pb.RECORDING_COPY_STATE_VERIFYING,
+    State.VERIFIED: recording_pb.RECORDING_COPY_STATE_VERIFIED,
+    State.PAUSED: recording_pb.RECORDING_COPY_STATE_PAUSED,
+    State.FAILED: recording_pb.RECORDING_COPY_STATE_FAILED,
+}
 
 
 class Uploading(Protocol):
@@ -21,12 +45,12 @@ class Uploading(Protocol):
         """Returns those that run or wait, in their order."""
 
     def copies(self) -> Sequence[bridge_pb.CopyReport]:
-        """Returns the copies that the recorder is to know, at most 64; those that run or wait first."""
+        """Returns the copies that the recorder is to know; those that run or wait first."""
 
-    async def enqueue(self, recording_id: str) -> RecordingCopy:
+    async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Queues a recording; raises a DomainError."""
 
-    async def cancel(self, recording_id: str) -> RecordingCopy:
+    async def cancel(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Takes a recording from the queue; raises a DomainError."""
 
 
@@ -44,13 +68,94 @@ class NoUploads:
         """Returns none."""
         return ()
 
-    async def enqueue(self, recording_id: str) -> RecordingCopy:
+    async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Refuses."""
         raise PreconditionError(
             f"{recording_id} can't be uploaded: hub.receipts does not name the enrolment's receipts.pub",
             Reason.RECORDING_NOT_CONFIGURED,
         )
 
-    async def cancel(self, recording_id: str) -> RecordingCopy:
+    async def cancel(self, recording_id: str) -> recording_pb.RecordingCopy:
         """Refuses."""
         raise NotFoundError(f"{recording_id} is not queued for upload", Reason.RECORDING_NOT_FOUND)
+
+
+class QueuedUploads:
+    """Uploads from the queue.
+
+    Args:
+        uploads: the queue and what works on it.
+    """
+
+    def __init__(self, uploads: Uploads) -> None:
+        self._uploads = uploads
+
+    def describe(self, status: cloud_pb2.CloudStatus) -> None:
+        """Writes the fields about uploads into a status."""
+        uploads = self._uploads
+        status.uploads_waiting = len(uploads.waiting)
+        status.uploads_paused = uploads.disk_error or uploads.paused
+        if current := uploads.current:
+            status.uploading_id = current.recording_id
+            status.uploading.CopyFrom(_copy(current))
+            status.uploading_size = current.size
+            status.upload_bytes_per_s = uploads.bytes_per_s
+
+    def briefs(self) -> Sequence[UploadBrief]:
+        """Returns those that run or wait, in their order."""
+        current = self._uploads.current
+        return [
+            UploadBrief(
+                recording_id=each.recording_id,
+                label=each.label,
+                copy=_copy(each),
+                size=each.size,
+                bytes_per_s=self._uploads.bytes_per_s if each is current else 0,
+            )
+            for each in self._uploads.waiting
+        ]
+
+    def copies(self) -> Sequence[bridge_pb.CopyReport]:
+        """Returns the copies that the recorder is to know; those that run or wait first."""
+        known = [*self._uploads.waiting, *self._uploads.settled][:MOST_COPIES]
+        return [bridge_pb.CopyReport(recording_id=each.recording_id, copy=_copy(each)) for each in known]
+
+    async def enqueue(self, recording_id: str) -> recording_pb.RecordingCopy:
+        """Queues a recording; raises a DomainError."""
+        try:
+            return _copy(await self._uploads.enqueue(recording_id))
+        except GatewayError as error:
+            raise _no_answer(error) from error
+
+    async def cancel(self, recording_id: str) -> recording_pb.RecordingCopy:
+        """Takes a recording from the queue; raises a DomainError."""
+        return _copy(await self._uploads.cancel(recording_id))
+
+
+async def apply_rule(uploads: Uploads, gateway: AsyncGatewayClient) -> None:
+    """Has the rule look at the robot's recordings every 30 s, until cancelled."""
+    pauses = Pauses()
+    while True:
+        try:
+            token = ""
+            for _ in range(_MOST_PAGES):
+                page = await gateway.list_recordings(_PAGE, token)
+                await uploads.consider(page.recordings)
+                if not (token := page.next_page_token):
+                    break
+        except GatewayError as error:
+            _log.info("the robot's recordings can't be listed: %s", error)
+            await pauses.wait()
+        else:
+            pauses.reset()
+            await asyncio.sleep(_LOOK_S)
+
+
+def _copy(upload: Upload) -> recording_pb.RecordingCopy:
+    return recording_pb.RecordingCopy(
+        state=STATES[upload.state], reason=upload.reason, bytes_done=upload.bytes_done
+    )
+
+
+def _no_answer(error: GatewayError) -> DomainError:
+    return RecorderUnreachableError(f"the recording can't be looked up: {error}")

@@ -36,6 +36,8 @@ NAMES: Final = (
     "audit_line",
     "admission",
     "video_stream",
+    "hubs_command",
+    "gateways_event",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

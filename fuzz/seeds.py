@@ -6,7 +6,15 @@ from rclpy.serialization import serialize_message
 
 from common.ca import new_ca
 from fuzz.robot import SOURCES, type_of
-from omniseer.gateway.v1 import overlay_pb2, preview_pb2, robot_gateway_pb2, states_pb2, system_status_pb2
+from omniseer.fleet.v1 import command_pb2
+from omniseer.gateway.v1 import (
+    event_pb2,
+    overlay_pb2,
+    preview_pb2,
+    robot_gateway_pb2,
+    states_pb2,
+    system_status_pb2,
+)
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame
 
@@ -90,6 +98,20 @@ _SEEDS: Final = {
     "terminal_text": ["robot healthy\x1b]0;x\x07\u202e\u00fc".encode()],
     "audit_line": [b"enabled: true, profile: LOW_BW"],
     "admission": [bytes((0, 8, 1, 0, 4, 0, 2, 1, 8, 0, 7, 90, 8, 0, 3, 1, 5, 0, 6, 0))],
+    "hubs_command": [
+        command_pb2.Command(
+            command_id="c1",
+            robot="lab2",
+            issued_by="anna",
+            expires_after_s=60,
+            snapshot=command_pb2.SnapshotCommand(pre_s=20, label="door"),
+        ).SerializeToString()
+    ],
+    "gateways_event": [
+        robot_gateway_pb2.SubscribeEventsResponse(
+            event=event_pb2.Event(run_id="a", sequence=5, message="a fault")
+        ).SerializeToString()
+    ],
     "video_stream": [_video("h264"), _video("h265")],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }

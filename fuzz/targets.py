@@ -13,6 +13,10 @@ from typing import Any, Final
 
 from google.protobuf.message import DecodeError, Message
 
+from bridge.commands.judgement import LONGEST_EXPIRY_S, Snapshot, Stray, judge
+from bridge.commands.judgement import Request as Handed
+from bridge.robot.feed import Feed, FeedError
+from bridge.values import DropReason, Position
 from common.ca import certificate_info
 from common.config import load
 from common.errors import DomainError, InvalidRequestError, UserError
@@ -38,6 +42,7 @@ from gateway.ros.list_truncation import truncate_list
 from gateway.rpc.calls.methods import CONTRACT, Method
 from gateway.rpc.interceptors.validation import Validation
 from gateway.status.event import ControlAction, ControlResult
+from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsResponse
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from preview.config import PreviewSettings
 from preview.rpc.mapping import desired_state
@@ -198,6 +203,28 @@ def video_stream(data: bytes) -> None:
     assert reorder.held <= 64
 
 
+def hubs_command(data: bytes) -> None:
+    """A message of the hub's stream of commands: what is handed over is one of two actions, allowed and in time."""
+    judgement = judge("fleet.lab2.cmd.c1", data, robot="lab2", allowed=("snapshot",), age_s=5.0)
+    assert not isinstance(judgement, Stray)
+    if isinstance(judgement, Handed):
+        assert isinstance(judgement.action, Snapshot)
+        assert 0 < judgement.remaining_s <= LONGEST_EXPIRY_S - 5
+        _must_be_one_line(judgement.issued_by + judgement.action.label)
+
+
+def gateways_event(data: bytes) -> None:
+    """What the bridge takes from the gateway's stream of events: no hole, none twice."""
+    response = SubscribeEventsResponse()
+    if not _parses(response, data):
+        return
+    feed = Feed(Position("a", 3))
+    with suppress(FeedError):
+        items = feed.take(response, DropReason.NO_LONGER_KEPT)
+        assert all(each.last >= each.first - 1 for each in items)
+        assert not items or feed.position == Position(items[-1].run_id, items[-1].last)
+
+
 TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
     {
         target.__name__: target
@@ -221,6 +248,8 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             audit_line,
             admission,
             video_stream,
+            hubs_command,
+            gateways_event,
         )
     }
 )

@@ -108,7 +108,7 @@ class Desk:
         self._changed()
 
     async def expire(self) -> None:
-        """Ends the requests that may not be begun any more; one that the disk refuses is tried again later."""
+        """Ends the requests that may not be begun any more; tried again if the disk refuses."""
         now_s = self._clock()
         for each in tuple(self._pending.values()):
             if each.until_s <= now_s:

@@ -8,7 +8,7 @@ from bridge.pauses import Pauses
 from bridge.robot.gateway import STATUS_SILENT_S, statuses
 from common.broadcast import Broadcast
 from common.errors import UserError
-from omniseer.gateway.v1.system_status_pb2 import SystemStatus
+from omniseer.gateway.v1.system_status_pb2 import SystemStatus  # noqa: TC001
 
 _log = logging.getLogger(__name__)
 

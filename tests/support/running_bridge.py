@@ -63,9 +63,7 @@ class Received:
         there = set(sequences) | missing
         assert there <= set(range(1, issued + 1)), "none that was not issued"
         twice = missing.intersection(sequences)
-        assert not twice or DROP_REASON_OUTBOX_LOST in self.reasons, (
-            "only a lost outbox announces what has come"
-        )
+        assert not twice or DROP_REASON_OUTBOX_LOST in self.reasons, "announced and there"
         return len(there) == issued
 
 

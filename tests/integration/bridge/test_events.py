@@ -47,6 +47,15 @@ async def begin(bridge: BridgeProgram, hub: Hub) -> None:
     await eventually(lambda: received(hub), lambda found: found.batches, "it has begun")
 
 
+async def kept_up(bridge: BridgeProgram, least: int) -> None:
+    """Waits until the bridge has taken so many events."""
+
+    def enough(status: cloud_pb2.CloudStatus) -> bool:
+        return status.outbox_events + status.events_dropped >= least
+
+    await eventually(lambda: status_of(bridge), enough, "the bridge keeps up")
+
+
 async def status_of(bridge: BridgeProgram) -> cloud_pb2.CloudStatus:
     return await asyncio.to_thread(lambda: bridge.status)
 
@@ -127,13 +136,7 @@ async def test_a_hub_that_is_gone_for_longer_than_the_outbox_holds(
             for number in range(120):
                 severity = Severity.WARNING if number % 10 == 0 else Severity.INFO
                 gateway.happen(100, severity, 1000)
-                await eventually(
-                    lambda: status_of(bridge),
-                    lambda status, most=(number + 1) * 100 - 500: (
-                        status.outbox_events + status.events_dropped > most
-                    ),
-                    "the bridge keeps up",
-                )
+                await kept_up(bridge, (number + 1) * 100 - 500)
                 size = max(size, sum(path.stat().st_size for path in bridge.root.iterdir()))
             status = await status_of(bridge)
             assert status.state == cloud_pb2.CLOUD_STATE_OFFLINE

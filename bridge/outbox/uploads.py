@@ -1,0 +1,72 @@
+"""The queue of uploads in the outbox's database: a row for each recording."""
+
+import json
+import logging
+from dataclasses import asdict
+from typing import Any
+
+from bridge.outbox.outbox import Outbox
+from bridge.uploads.queue import Priority, State, Upload
+from bridge.values import OutboxError
+
+_log = logging.getLogger(__name__)
+
+
+class StoredUploads:
+    """Implements `UploadStore`.
+
+    Args:
+        outbox: has the database.
+    """
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+
+    async def uploads(self) -> list[Upload]:
+        """Returns all rows, with `due_s` 0; one that can't be understood is left out.
+
+        Raises:
+            OSError: the disk can't be read.
+        """
+        try:
+            rows = await self._outbox.upload_rows()
+        except OutboxError as error:
+            raise OSError(str(error)) from error
+        return [upload for row in rows if (upload := _upload(row))]
+
+    async def put_upload(self, upload: Upload) -> None:
+        """Writes a row; raises as `uploads`."""
+        try:
+            await self._outbox.put_upload_row(upload.recording_id, _row(upload))
+        except OutboxError as error:
+            raise OSError(str(error)) from error
+
+    async def delete_upload(self, recording_id: str) -> None:
+        """Deletes a row; raises as `uploads`."""
+        try:
+            await self._outbox.delete_upload_row(recording_id)
+        except OutboxError as error:
+            raise OSError(str(error)) from error
+
+
+def _row(upload: Upload) -> str:
+    values: dict[str, Any] = asdict(upload)
+    del values["due_s"]  # Of this run's clock.
+    values |= {
+        "priority": upload.priority.name,
+        "state": upload.state.name,
+        "sha256": upload.sha256.hex(),
+    }
+    return json.dumps(values)
+
+
+def _upload(row: str) -> Upload | None:
+    try:
+        values = json.loads(row)
+        values["priority"] = Priority[values["priority"]]
+        values["state"] = State[values["state"]]
+        values["sha256"] = bytes.fromhex(values["sha256"])
+        return Upload(**values)
+    except (ValueError, KeyError, TypeError) as error:
+        _log.warning("a row of the queue of uploads can't be understood: %s", error)
+        return None
