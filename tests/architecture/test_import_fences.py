@@ -115,6 +115,12 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("gateway/links/link.py", (*WIRE, "gateway.links.preview", "gateway.links.grpc_client")),
         ("gateway/links/watch.py", (*WIRE, "gateway.links")),
         ("gateway/links/recorder/", ("gateway.links.preview", "gateway.links.drive", "gateway.links.link")),
+        (
+            "gateway/links/bridge/",
+            ("gateway.links.preview", "gateway.links.drive", "gateway.links.link", "gateway.teleop"),
+        ),
+        ("gateway/links/bridge/requests.py", (*WIRE, "omniseer", "asyncio", "time", "gateway.links")),
+        ("gateway/rpc/hub_requests.py", ("omniseer.bridge", "gateway.teleop", "gateway.access", "grpc")),
         ("gateway/links/drive/", ("gateway.teleop", "gateway.links.preview")),
         ("gateway/teleop/", (*HEAVY, *WIRE, "omniseer", "gateway.ros", "gateway.rpc", "gateway.config")),
         *(
@@ -243,6 +249,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("omniseer.bridge", ("gateway/links/", "bridge/")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
+        ("omniseer.bridge", ("gateway/links/bridge/", "bridge/")),
         ("omniseer.recorder", ("gateway/links/recorder/", "recorder/rpc/", "recorder/doctor/")),
     ],
 )
