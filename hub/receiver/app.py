@@ -14,7 +14,7 @@ from common.metrics_endpoint import serving_metrics
 from fleet.connection import FleetAddress, Handler, Hub, Request, connect
 from fleet.errors import HubError
 from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
-from fleet.receipt_keys import ReceiptSigner, read_keys
+from fleet.receipt_keys import read_public_keys, read_signer
 from hub.receiver.config import ReceiverSettings
 from hub.receiver.metrics import ReceiverMetrics
 from hub.receiver.service import THREADS, Party, ReceiverService, busy
@@ -38,8 +38,8 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
     Raises:
         UserError: A key can't be read, or a socket can't be used.
     """
-    signer = ReceiptSigner(read_keys(settings.signing_key)[0])
-    others = read_keys(settings.receipt_keys) if settings.receipt_keys else ()
+    signer = read_signer(settings.signing_key)
+    others = read_public_keys(settings.receipt_keys) if settings.receipt_keys else ()
     party = Party(settings.fleet, signer, (signer.public_key, *others))
     address = FleetAddress(
         settings.hub.servers, settings.hub.credentials, settings.hub.ca, name=f"receiver of {settings.fleet}"

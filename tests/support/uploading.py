@@ -8,6 +8,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding, PrivateFormat, PublicFormat
+
 from bridge.uploads.config import UploadSettings
 from bridge.uploads.queue import Upload
 from bridge.uploads.receivers import Requests
@@ -16,11 +20,12 @@ from common.healthcheck import state_of
 from console.client import results
 from console.client.errors import GatewayError, Refused
 from console.client.mapping.reader import read
-from fleet.receipt_keys import ReceiptSigner, as_text, new_seed
+from fleet.receipt_keys import ReceiptSigner
 from hub.receiver.app import serve
 from hub.receiver.config import HubSettings, ReceiverSettings, StoreSettings
 from omniseer.gateway.v1 import recording_pb2 as pb
 from tests.support.eventually import eventually
+from tests.support.secure_hub import SecureHub
 
 FLEET: Final = "lab"
 ROBOT: Final = "r1"
@@ -118,36 +123,43 @@ class Rows:
         self.rows.pop(recording_id, None)
 
 
-@dataclass
+def new_signer() -> ReceiptSigner:
+    """Signs with a new key."""
+    return ReceiptSigner(Ed25519PrivateKey.generate())
+
+
 class Keys:
-    """The files of a fleet's key of receipts."""
+    """The files of a new key of receipts.
 
-    directory: Path
-    signer: ReceiptSigner = field(init=False)
+    Args:
+        directory: Gets them.
+    """
 
-    def __post_init__(self) -> None:
-        seed = new_seed()
-        self.signer = ReceiptSigner(seed)
-        self.private.write_text(as_text([seed]), encoding="ascii")
-
-    @property
-    def private(self) -> Path:
-        return self.directory / "receipts.key"
-
-    @property
-    def public(self) -> tuple[bytes, ...]:
-        return (self.signer.public_key,)
+    def __init__(self, directory: Path) -> None:
+        key = Ed25519PrivateKey.generate()
+        self.private, self.public_file = directory / "receipts.key", directory / "receipts.pub"
+        self.public = (key.public_key().public_bytes_raw(),)
+        directory.mkdir(exist_ok=True)
+        self.private.write_bytes(
+            key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, serialization.NoEncryption())
+        )
+        self.public_file.write_bytes(
+            key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+        )
 
 
 def receiver_settings(
-    urls: tuple[str, ...], store: StoreSettings, keys: Keys, number: int = 1
+    hub: SecureHub, store: StoreSettings, directory: Path, number: int = 1
 ) -> ReceiverSettings:
+    """Settings of a receiver with credentials that the hub's administration has issued."""
+    files = hub.path / "receiver"
+    address = hub.address(files / "receiver.creds")
     return ReceiverSettings(
         fleet=FLEET,
-        hub=HubSettings(servers=urls),
+        hub=HubSettings(servers=address.servers, credentials=address.credentials, ca=address.ca),
         store=store,
-        signing_key=keys.private,
-        socket=keys.directory / f"receiver-{number}.sock",
+        signing_key=files / "receipts.key",
+        socket=directory / f"receiver-{number}.sock",
     )
 
 

@@ -8,21 +8,20 @@ import pytest
 from common.errors import UserError
 from fleet.receipt_keys import (
     ReceiptError,
-    ReceiptSigner,
-    as_text,
     confirmed,
     digest_of,
-    new_seed,
-    read_keys,
+    read_public_keys,
+    read_signer,
 )
 from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt
 from omniseer.gateway.v1.recording_pb2 import RecordingFile
+from tests.support.uploading import Keys, new_signer
 
 RECEIPT = Receipt(fleet="lab", robot="r1", recording_id="one", file_name="a", size=3, sha256=b"s" * 32)
 
 
 def test_a_receipt_of_a_known_key_confirms_what_it_says() -> None:
-    signer, other = ReceiptSigner(new_seed()), ReceiptSigner(new_seed())
+    signer, other = new_signer(), new_signer()
     signed = signer.sign(Receipt(**_values(RECEIPT), verified_unix_ms=5, location="s3://b/k"))
     found = confirmed(signed, (other.public_key, signer.public_key), RECEIPT)
     assert found.location == "s3://b/k"
@@ -44,14 +43,14 @@ def test_a_receipt_of_a_known_key_confirms_what_it_says() -> None:
     ],
 )
 def test_a_receipt_for_something_else_confirms_nothing(name: str, value: object) -> None:
-    signer = ReceiptSigner(new_seed())
+    signer = new_signer()
     signed = signer.sign(Receipt(**_values(RECEIPT) | {name: value}))
     with pytest.raises(ReceiptError, match=f"its {name} differs"):
         confirmed(signed, (signer.public_key,), RECEIPT)
 
 
 def test_every_bit_of_a_receipt_is_signed() -> None:
-    signer = ReceiptSigner(new_seed())
+    signer = new_signer()
     signed = signer.sign(RECEIPT)
     for field in ("receipt", "signature"):
         content = getattr(signed, field)
@@ -65,16 +64,31 @@ def test_every_bit_of_a_receipt_is_signed() -> None:
 
 
 def test_the_files_of_keys(tmp_path: Path) -> None:
-    keys = (new_seed(), new_seed())
-    path = tmp_path / "receipts.pub"
-    path.write_text(as_text(keys), encoding="ascii")
-    assert read_keys(path) == keys
-    for wrong in ("", "zz\n", "ab" * 31, "-----BEGIN PUBLIC KEY-----\n"):
-        path.write_text(wrong, encoding="ascii")
-        with pytest.raises(UserError, match="no list of keys"):
-            read_keys(path)
-    with pytest.raises(UserError, match="can't be read"):
-        read_keys(tmp_path / "none")
+    first, second = Keys(tmp_path / "first"), Keys(tmp_path / "second")
+    both = tmp_path / "receipts.pub"
+    both.write_bytes(first.public_file.read_bytes() + second.public_file.read_bytes())
+    assert read_public_keys(both) == (*first.public, *second.public)
+    signed = read_signer(first.private).sign(RECEIPT)
+    assert confirmed(signed, read_public_keys(both), RECEIPT) == RECEIPT
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"5d41" * 16,
+        b"-----BEGIN PUBLIC KEY-----\nAAAA\n-----END PUBLIC KEY-----\n",
+        b"-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n",
+    ],
+)
+def test_files_with_something_else_are_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "receipts"
+    path.write_bytes(content)
+    for reading in (read_public_keys, read_signer):
+        with pytest.raises(UserError, match="no key of receipts"):
+            reading(path)
+        with pytest.raises(UserError, match="can't be read"):
+            reading(tmp_path / "none")
 
 
 def test_the_sum_of_a_recording_is_in_the_order_of_names() -> None:

@@ -1,4 +1,4 @@
-"""A hub of one node, a store, and the way to it, for the files of this folder."""
+"""A hub with identities, a store, and the way to it, for the files of this folder."""
 
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from fleet.connection import FleetAddress, Hub, connect
-from hub.receiver.config import StoreSettings
-from hub.streams import set_up
-from tests.support.nats_servers import NatsServers, nats_servers
+from fleet.connection import Hub, connect
+from fleet.receipt_keys import read_public_keys
+from hub.receiver.config import ReceiverSettings, StoreSettings
 from tests.support.s3_server import FaultyStore, S3Server, faulty_store, s3_server
-from tests.support.uploading import Keys
+from tests.support.secure_hub import SecureHub, secure_hub
+from tests.support.uploading import ROBOT, receiver_settings
 
 
 @dataclass
@@ -22,17 +22,17 @@ class Ground:
         server: the store.
         proxy: the way to it.
         store: how receivers reach a bucket of the test's own.
-        nats: the hub's servers.
         hub: the robot's connection.
-        keys: of receipts.
+        keys: of receipts, as the robot has them from its enrolment.
+        receivers: settings of two receivers.
     """
 
     server: S3Server
     proxy: FaultyStore
     store: StoreSettings
-    nats: NatsServers
     hub: Hub
-    keys: Keys
+    keys: tuple[bytes, ...]
+    receivers: tuple[ReceiverSettings, ReceiverSettings]
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +42,20 @@ def store_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[S3Server]
 
 
 @pytest.fixture(scope="module")
-def nats(tmp_path_factory: pytest.TempPathFactory) -> Iterator[NatsServers]:
-    with nats_servers(tmp_path_factory.mktemp("nats")) as servers:
-        yield servers
+def secure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SecureHub]:
+    with secure_hub(tmp_path_factory.mktemp("hub")) as hub:
+        hub.enroll(ROBOT)
+        hub.receiver()
+        yield hub
 
 
 @pytest.fixture
-async def ground(store_server: S3Server, nats: NatsServers, tmp_path: Path) -> AsyncIterator[Ground]:
-    async with (
-        faulty_store(store_server) as proxy,
-        connect(FleetAddress(nats.urls, inbox="_INBOX_r1")) as hub,
-    ):
+async def ground(store_server: S3Server, secure: SecureHub, tmp_path: Path) -> AsyncIterator[Ground]:
+    files = secure.path / ROBOT
+    address = secure.address(files / "bridge.creds", f"_INBOX_{ROBOT}")
+    async with faulty_store(store_server) as proxy, connect(address) as hub:
         await hub.connected(20)
-        await set_up(hub, 1)
         store = store_server.settings(public_endpoint=proxy.url)
-        yield Ground(store_server, proxy, store, nats, hub, Keys(tmp_path))
+        receivers = [receiver_settings(secure, store, tmp_path, number) for number in (1, 2)]
+        keys = read_public_keys(files / "receipts.pub")
+        yield Ground(store_server, proxy, store, hub, keys, (receivers[0], receivers[1]))

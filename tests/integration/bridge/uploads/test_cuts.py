@@ -14,7 +14,6 @@ from tests.support.uploading import (
     Robot,
     Rows,
     content,
-    receiver_settings,
     running_receiver,
     running_uploads,
 )
@@ -32,10 +31,9 @@ CUTS = sorted(
 async def test_a_cut_costs_at_most_one_part(ground: Ground, cut: int) -> None:
     robot, rows, data = Robot(), Rows(), content(SIZE, cut)
     robot.add("one", {"data.bin": data})
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     ground.proxy.cut_at = cut
-    async with running_receiver(settings):
-        async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public, rows) as running:
+    async with running_receiver(ground.receivers[0]):
+        async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys, rows) as running:
             await running.uploads.enqueue("one")
 
             async def cuts() -> int:
@@ -43,7 +41,7 @@ async def test_a_cut_costs_at_most_one_part(ground: Ground, cut: int) -> None:
 
             await eventually(cuts, bool, "the connection is cut")
         # Another process, which knows the rows of the queue alone.
-        async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public, rows) as running:
+        async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys, rows) as running:
             await running.until("one", lambda upload: upload and upload.state is State.VERIFIED)
     assert ground.proxy.total - SIZE <= PART
     found = ground.server.client.get_object(Bucket=ground.store.bucket, Key=f"{FLEET}/{ROBOT}/one/data.bin")

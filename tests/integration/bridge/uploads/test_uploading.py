@@ -11,19 +11,20 @@ import pytest
 from bridge.uploads.queue import Priority, State, Upload
 from common.errors import NotFoundError, PreconditionError, TooMuchError
 from console.client.errors import Unreachable
+from fleet.connection import Entry, connect
 from fleet.receipt_keys import confirmed
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1 import recording_pb2 as wire
 from tests.integration.bridge.uploads.conftest import Ground
+from tests.support.secure_hub import SecureHub
 from tests.support.uploading import (
     FLEET,
     MIB,
     ROBOT,
-    Keys,
     Robot,
     Rows,
     content,
-    receiver_settings,
+    new_signer,
     running_receiver,
     running_uploads,
 )
@@ -41,13 +42,18 @@ def is_in(*states: State) -> Callable[[Upload | None], bool]:
     return lambda upload: upload is not None and upload.state in states
 
 
-async def test_a_recording_is_uploaded_read_again_and_confirmed(ground: Ground) -> None:
+async def stored_recordings(secure: SecureHub) -> dict[str, Entry]:
+    async with connect(secure.administrator()) as hub:
+        await hub.connected(20)
+        return await hub.entries("fleet_recordings")
+
+
+async def test_a_recording_is_uploaded_read_again_and_confirmed(ground: Ground, secure: SecureHub) -> None:
     robot = Robot()
     robot.add("one", FILES, label="a run")
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         await running.until("one", is_in(State.VERIFIED))
@@ -56,19 +62,19 @@ async def test_a_recording_is_uploaded_read_again_and_confirmed(ground: Ground) 
             key = f"{FLEET}/{ROBOT}/one/{name}"
             assert client.get_object(Bucket=ground.store.bucket, Key=key)["Body"].read() == data
         assert ground.proxy.total == SIZE, "every byte went once"
-        entry = (await ground.hub.entries("fleet_recordings"))["r1.one"]
+        entry = (await stored_recordings(secure))["r1.one"]
         stored = pb.StoredRecording.FromString(entry.value)
         assert [file.name for file in stored.files] == sorted(FILES)
         lines = "".join(f"{hashlib.sha256(FILES[name]).hexdigest()}  {name}\n" for name in sorted(FILES))
         digest = hashlib.sha256(lines.encode()).digest()
         expected = pb.Receipt(fleet=FLEET, robot=ROBOT, recording_id="one", size=SIZE, sha256=digest)
-        receipt = confirmed(stored.receipt, ground.keys.public, expected)
+        receipt = confirmed(stored.receipt, ground.keys, expected)
         assert receipt.location.endswith("/lab/r1/one")
         assert stored.recording.label == "a run"
     # A robot that has forgotten all of it gets the receipt at once.
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         await running.until("one", is_in(State.VERIFIED))
@@ -81,10 +87,9 @@ async def test_an_expired_url_is_renewed(ground: Ground) -> None:
     for early in (True, False):
         ground.proxy.early = early
         ground.proxy.answers.extend((None, (403, "AccessDenied")))
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         await running.until("one", is_in(State.VERIFIED))
@@ -98,10 +103,9 @@ async def test_a_refusal_before_the_body_is_read_holds_nothing_up(ground: Ground
     robot.add("one", {"data.bin": content(9 * MIB)})
     ground.proxy.early = True
     ground.proxy.answers.append((403, "AccessDenied"))
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         await running.until("one", is_in(State.VERIFIED), 15)
@@ -122,10 +126,9 @@ async def test_a_store_that_refuses_is_tried_again(
     robot = Robot()
     robot.add("one", {"data.bin": content(MIB)})
     ground.proxy.answers.append(answer)
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         failed = await running.until("one", is_in(State.FAILED))
@@ -139,10 +142,9 @@ async def test_wrong_bytes_are_deleted_and_sent_again(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(9 * MIB)})
     ground.proxy.damage = 2
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         failed = await running.until("one", is_in(State.FAILED, State.VERIFIED))
@@ -157,12 +159,9 @@ async def test_wrong_bytes_are_deleted_and_sent_again(ground: Ground) -> None:
 async def test_a_receipt_of_another_key_verifies_nothing(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": b"data"})
-    (ground.keys.directory / "other").mkdir()
-    other = Keys(ground.keys.directory / "other")
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, other.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, (new_signer().public_key,)) as running,
     ):
         await running.uploads.enqueue("one")
         failed = await running.until("one", is_in(State.FAILED, State.VERIFIED))
@@ -174,10 +173,9 @@ async def test_a_receipt_of_another_key_verifies_nothing(ground: Ground) -> None
 async def test_a_gateway_that_fails_is_a_cut_and_costs_no_part_that_was_sent(ground: Ground) -> None:
     robot = Robot(failure=Unreachable("no robot gateway reached"), fails_at=9 * MIB)
     robot.add("one", {"data.bin": content(20 * MIB)})
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         failed = await running.until("one", is_in(State.FAILED))
@@ -190,10 +188,9 @@ async def test_a_gateway_that_fails_is_a_cut_and_costs_no_part_that_was_sent(gro
 async def test_a_recording_that_is_deleted_meanwhile_leaves_the_queue(ground: Ground) -> None:
     robot = Robot(failure=Unreachable("cut"), fails_at=MIB)
     robot.add("one", {"data.bin": content(9 * MIB)})
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running,
     ):
         await running.uploads.enqueue("one")
         await running.until("one", is_in(State.FAILED))
@@ -207,7 +204,7 @@ async def test_requests_that_can_t_be_carried_out_are_refused(ground: Ground) ->
     robot.add("running", {"data.bin": b"x"}, state=wire.RECORDING_STATE_RECORDING)
     robot.add("one", {"data.bin": b"x"})
     rows = Rows()
-    async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public, rows) as running:
+    async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys, rows) as running:
         with pytest.raises(NotFoundError):
             await running.uploads.enqueue("none")
         with pytest.raises(PreconditionError):
@@ -223,7 +220,7 @@ async def test_requests_that_can_t_be_carried_out_are_refused(ground: Ground) ->
 async def test_without_a_receiver_it_waits_and_says_so(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": b"data"})
-    async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public) as running:
+    async with running_uploads(robot, ground.hub, ground.proxy.host, ground.keys) as running:
         await running.uploads.enqueue("one")
         failed = await running.until("one", is_in(State.FAILED))
         assert failed
@@ -248,19 +245,16 @@ async def test_the_rule_queues_in_order_and_the_most_urgent_goes_first(ground: G
         robot.add(name, {"data.bin": name.encode()}, **more)
     rows = Rows()
     order: list[str] = []
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with running_uploads(
-        robot, ground.hub, ground.proxy.host, ground.keys.public, rows, rule="all", only_while_charging=True
+        robot, ground.hub, ground.proxy.host, ground.keys, rows, rule="all", only_while_charging=True
     ) as running:
         await running.uploads.consider(robot.recordings.values())
         order = [each.recording_id for each in running.uploads.waiting]
     assert order == ["incident", "pinned", "other-old", "bundle", "other-new"]
     # The next run finds them on the disk.
     async with (
-        running_receiver(settings),
-        running_uploads(
-            robot, ground.hub, ground.proxy.host, ground.keys.public, rows, rule="all"
-        ) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys, rows, rule="all") as running,
     ):
         for name in order:
             await running.until(name, is_in(State.VERIFIED))
@@ -276,14 +270,13 @@ async def test_gates_open_and_close_while_it_runs(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(20 * MIB)})
     charging: list[bool | None] = [None]
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
+        running_receiver(ground.receivers[0]),
         running_uploads(
             robot,
             ground.hub,
             ground.proxy.host,
-            ground.keys.public,
+            ground.keys,
             charging=lambda: charging[0],
             only_while_charging=True,
             max_bytes_per_s=6 * MIB,
@@ -312,11 +305,10 @@ async def test_an_urgent_recording_takes_the_place_of_another(ground: Ground) ->
     robot = Robot()
     robot.add("long", {"data.bin": content(30 * MIB)})
     robot.add("incident", {"data.bin": b"data"}, kind=wire.RECORDING_KIND_INCIDENT)
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
+        running_receiver(ground.receivers[0]),
         running_uploads(
-            robot, ground.hub, ground.proxy.host, ground.keys.public, max_bytes_per_s=12 * MIB
+            robot, ground.hub, ground.proxy.host, ground.keys, max_bytes_per_s=12 * MIB
         ) as running,
     ):
         await running.uploads.enqueue("long")
@@ -335,12 +327,11 @@ async def test_an_urgent_recording_takes_the_place_of_another(ground: Ground) ->
 async def test_the_cap_is_kept_within_ten_percent(ground: Ground) -> None:
     robot = Robot()
     robot.add("one", {"data.bin": content(16 * MIB)})
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     loop = asyncio.get_running_loop()
     async with (
-        running_receiver(settings),
+        running_receiver(ground.receivers[0]),
         running_uploads(
-            robot, ground.hub, ground.proxy.host, ground.keys.public, max_bytes_per_s=2 * MIB
+            robot, ground.hub, ground.proxy.host, ground.keys, max_bytes_per_s=2 * MIB
         ) as running,
     ):
         await running.uploads.enqueue("one")
@@ -355,12 +346,11 @@ async def test_two_receivers_answer_the_same_robot(ground: Ground) -> None:
     robots = Robot()
     for number in range(4):
         robots.add(f"rec-{number}", {"data.bin": content(9 * MIB, number), "more.bin": b"%d" % number})
-    settings = [receiver_settings(ground.nats.urls, ground.store, ground.keys, n) for n in (1, 2)]
     async with (
-        running_receiver(settings[0]),
-        running_receiver(settings[1]),
-        running_uploads(robots, ground.hub, ground.proxy.host, ground.keys.public) as running,
-        running_uploads(robots, ground.hub, ground.proxy.host, ground.keys.public) as twin,
+        running_receiver(ground.receivers[0]),
+        running_receiver(ground.receivers[1]),
+        running_uploads(robots, ground.hub, ground.proxy.host, ground.keys) as running,
+        running_uploads(robots, ground.hub, ground.proxy.host, ground.keys) as twin,
     ):
         # The twin is the same robot once more: both race for the same files.
         for number in range(4):
@@ -380,10 +370,9 @@ async def test_nothing_is_sent_outside_the_hours(ground: Ground) -> None:
     robot.add("one", {"data.bin": b"data"})
     now = datetime.now().astimezone()
     hours = f"{(now.hour + 2) % 24:02}:00-{(now.hour + 3) % 24:02}:00"
-    settings = receiver_settings(ground.nats.urls, ground.store, ground.keys)
     async with (
-        running_receiver(settings),
-        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys.public, hours=(hours,)) as running,
+        running_receiver(ground.receivers[0]),
+        running_uploads(robot, ground.hub, ground.proxy.host, ground.keys, hours=(hours,)) as running,
     ):
         await running.uploads.enqueue("one")
         paused = await running.until("one", is_in(State.PAUSED))

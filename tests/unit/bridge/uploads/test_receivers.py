@@ -17,11 +17,11 @@ from bridge.uploads.receivers import MOST_PARTS, PART_BYTES, Receivers
 from console.client import results
 from console.client.mapping.reader import read
 from fleet.errors import HubError, HubReason
-from fleet.receipt_keys import ReceiptSigner, new_seed
+from fleet.receipt_keys import ReceiptSigner
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1 import recording_pb2 as wire
 from tests.support.filled import fill
-from tests.support.uploading import Robot
+from tests.support.uploading import Robot, new_signer
 from tests.support.virtual_time import in_virtual_time
 
 FILE = wire.RecordingFile(name="data.bin", size=20 * 1024 * 1024, sha256=b"s" * 32, final=True)
@@ -129,7 +129,7 @@ async def test_a_silent_receiver_is_asked_three_times() -> None:
 async def test_forged_foreign_and_old_receipts_verify_nothing() -> None:
     robot = Robot()
     recording = robot.add("one", {"data.bin": b"data"})
-    signer, other = ReceiptSigner(new_seed()), ReceiptSigner(new_seed())
+    signer, other = new_signer(), new_signer()
     message = recording_message(recording)
     right = pb.Receipt(fleet="lab", robot="r1", recording_id="one", size=4, sha256=message.sha256)
     changed = {"robot": "r2", "fleet": "other", "recording_id": "two", "size": 5, "sha256": b"old" * 8}
@@ -168,7 +168,7 @@ async def test_a_url_elsewhere_gets_nothing() -> None:
     }
     hub = Hub(lambda name, _asked: answers[name])
     with pytest.raises(CutError, match=r"192\.168\.0\.1, which is not in uploads\.store_hosts"):
-        await attempt(robot, Receivers(hub, "r1"), ReceiptSigner(new_seed()))
+        await attempt(robot, Receivers(hub, "r1"), new_signer())
     assert robot.opened == [], "nothing was even read"
 
 
@@ -185,7 +185,7 @@ async def test_what_can_t_be_uploaded_says_why() -> None:
     ):
         robot.recordings["one"] = replace(good, **changed)
         with pytest.raises(RecordingError, match=words):
-            await attempt(robot, receivers, ReceiptSigner(new_seed()))
+            await attempt(robot, receivers, new_signer())
 
 
 def test_a_recording_reaches_the_hub_as_the_gateway_sent_it() -> None:
