@@ -27,7 +27,7 @@ from common.health import Health
 from console.client import AsyncGatewayClient
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
-from fleet.receipt_keys import read_keys
+from fleet.receipt_keys import read_public_keys
 
 _log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ def _queue(
     """Returns the uploads; None for a robot that has no receivers' keys."""
     if settings.hub.receipts is None:
         return None
-    fleet = Fleet(fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_keys(settings.hub.receipts))
+    fleet = Fleet(fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_public_keys(settings.hub.receipts))
     return Uploads(
         settings.uploads,
         fleet,
