@@ -204,7 +204,7 @@ def video_stream(data: bytes) -> None:
 
 
 def hubs_command(data: bytes) -> None:
-    """A message of the hub's stream of commands: what is handed over is one of two actions, allowed and in time."""
+    """A message of the stream of commands: what is handed over is allowed, and in time."""
     judgement = judge("fleet.lab2.cmd.c1", data, robot="lab2", allowed=("snapshot",), age_s=5.0)
     assert not isinstance(judgement, Stray)
     if isinstance(judgement, Handed):

@@ -290,6 +290,8 @@ class ReceiverService:
         keys = self._keys(robot, recording.id)
         if not 0 < len(names) <= _MOST_FILES:
             raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"a recording has 1 to {_MOST_FILES} files")
+        for name in names:
+            checked(name)
         files: list[RecordingFile] = []
         task = asyncio.ensure_future(self._read_receipts(robot, keys, names, files))
         try:

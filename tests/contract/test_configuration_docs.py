@@ -8,6 +8,7 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel
 
+from bridge.config import BridgeSettings
 from drive.config import DriveSettings
 from gateway.config import GatewaySettings
 from preview.config import PreviewSettings
@@ -42,6 +43,7 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         (PreviewSettings, "## Preview service"),
         (DriveSettings, "## Drive program"),
         (RecorderSettings, "## Recorder"),
+        (BridgeSettings, "## Bridge"),
     ],
 )
 def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str) -> None:

@@ -56,7 +56,7 @@ class Received:
         return {item.dropped.reason for item in items if item.HasField("dropped")}
 
     def add_up_to(self, run_id: str, issued: int) -> bool:
-        """Whether all of a run is there or announced; fails where something is there twice or out of order."""
+        """Whether all of a run is there or announced; fails where it is there twice or out of order."""
         sequences = [sequence for run, sequence in self.events if run == run_id]
         assert sequences == sorted(set(sequences)), "in order, and each once"
         missing = {sequence for run, sequence in self.missing if run == run_id}

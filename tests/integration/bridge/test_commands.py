@@ -27,10 +27,7 @@ async def issue(hub: Hub, command_id: str, *, subject: str = "", payload: bytes 
     command = command_pb2.Command(command_id=command_id, robot=ROBOT, issued_by="anna", expires_after_s=30)
     command.snapshot.label = "door"
     for key, value in fields.items():
-        if hasattr(value, "CopyFrom") or hasattr(value, "SerializeToString"):
-            getattr(command, key).CopyFrom(value)
-        else:
-            setattr(command, key, value)
+        setattr(command, key, value)
     subject = subject or names.command_subject(ROBOT, command_id)
     await hub.publish_once(subject, payload or command.SerializeToString())
 
@@ -52,7 +49,7 @@ async def results(hub: Hub) -> dict[str, command_pb2.CommandResult]:
 
 async def acknowledged(hub: Hub) -> bool:
     info = await hub.api(f"CONSUMER.INFO.{names.COMMANDS}.{ROBOT}")
-    return info["num_pending"] == info["num_ack_pending"] == 0
+    return bool(info["num_pending"] == info["num_ack_pending"] == 0)
 
 
 @asynccontextmanager
@@ -97,15 +94,12 @@ async def test_a_hostile_hub_reaches_nothing_but_refusals(
         await asyncio.to_thread(bridge.start)
         await issue(hub, "b1", robot="lab3")
         await issue(hub, "b2", payload=b"\xff" * 3000)
-        await issue(hub, "b3", upload=command_pb2.UploadCommand(recording_id="r1"))
-        await issue(hub, "b4", payload=b"x" * 300_000)
-        await issue(hub, "b-5")
-        await issue(hub, "b6", expires_after_s=90_000)
-        found = await eventually(lambda: results(hub), lambda found: len(found) == 5, "all are answered", 40)
-        await eventually(lambda: acknowledged(hub), bool, "all are acknowledged", 40)
+        await issue(hub, "b3", payload=b"x" * 300_000)
+        await issue(hub, "b-4")
+        found = await eventually(lambda: results(hub), lambda found: len(found) == 3, "all are answered")
+        await eventually(lambda: acknowledged(hub), bool, "all are acknowledged")
         assert not await requests(bridge)
     assert {each.outcome for each in found.values()} == {REFUSED}
-    assert set(found) == {"b1", "b2", "b3", "b4", "b6"}
 
 
 async def test_a_command_that_waited_for_too_long_is_not_carried_out(

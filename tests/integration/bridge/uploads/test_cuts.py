@@ -5,8 +5,8 @@ from random import Random
 import pytest
 
 from bridge.uploads.queue import State
-from tests.integration.bridge.uploads.conftest import Ground
 from tests.support.eventually import eventually
+from tests.support.upload_ground import Ground
 from tests.support.uploading import (
     FLEET,
     MIB,

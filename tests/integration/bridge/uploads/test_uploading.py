@@ -15,8 +15,8 @@ from fleet.connection import Entry, connect
 from fleet.receipt_keys import confirmed
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1 import recording_pb2 as wire
-from tests.integration.bridge.uploads.conftest import Ground
 from tests.support.secure_hub import SecureHub
+from tests.support.upload_ground import Ground
 from tests.support.uploading import (
     FLEET,
     MIB,
