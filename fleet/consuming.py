@@ -191,7 +191,8 @@ class _Puller:
         self._consumer = consumer
         self._subject = _next_subject(stream, consumer)
         self._waiter = waiter
-        self._reply = reply
+        self._inbox = reply
+        self._requests = 0
 
     @classmethod
     @asynccontextmanager
@@ -217,15 +218,17 @@ class _Puller:
             "expires": int(expires_s * _NANOSECONDS),
             "idle_heartbeat": int(heartbeat_s * _NANOSECONDS),
         }
-        await self._session.send(self._subject, json.dumps(request).encode(), self._reply)
+        self._requests += 1
+        reply = f"{self._inbox}.{self._requests}"
+        await self._session.send(self._subject, json.dumps(request).encode(), reply)
         received = 0
         while received < batch:
             message = await self._waiter.get(2 * heartbeat_s + _TIMEOUT_S / 2)
             if not message.status:
                 received += 1
                 yield delivery(self._session, message)
-            elif self._is_end(message) and (received or message.status != "409"):
-                # A request that has delivered its batch is ended by a status, too, which the next one meets.
+            elif message.subject == reply and self._is_end(message):
+                # A status of an earlier request, which was complete, may come late.
                 return
 
     def _is_end(self, message: Message) -> bool:

@@ -231,10 +231,11 @@ class Session:
                 sessions.append(session)
                 await client.subscribe(f"{session._inbox}.*", cb=session._on_reply, **_BOUNDS)
                 await client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
-        except (OSError, ValueError, nats_errors.Error, ssl.SSLError, HubError) as error:
+        except Exception as error:
+            # The library trips over what is no server of NATS in many ways: a greeting may be anything.
             await _close(client)
             raise _connect_error(server, errors[-1] if errors else error) from error
-        except BaseException:
+        except asyncio.CancelledError:
             await _close(client)
             raise
         return session
@@ -301,6 +302,8 @@ class Session:
     async def channel(self, subject: str) -> AsyncIterator[tuple[Waiter, str]]:
         """As `waiter`, for requests that a stream answers: messages of a stream keep their own subjects.
 
+        The reply subject of each request is the yielded one with one more part.
+
         Raises:
             UnreachableError: the connection is lost.
         """
@@ -311,7 +314,7 @@ class Session:
 
             inbox = reply.replace(".", ".s.", 1)
             try:
-                subscription = await self._client.subscribe(inbox, cb=on_message, **_BOUNDS)
+                subscription = await self._client.subscribe(f"{inbox}.*", cb=on_message, **_BOUNDS)
             except nats_errors.Error as error:
                 raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
             try:
@@ -330,6 +333,8 @@ class Session:
 
         try:
             await self._client.subscribe(subject, queue=queue, cb=on_message, **_BOUNDS)
+            # What is published after this, the server passes on.
+            await self._client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
         except nats_errors.Error as error:
             raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
 

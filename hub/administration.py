@@ -17,10 +17,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
-import yaml
-from cryptography.hazmat.primitives import serialization
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-
 from common.ca import KeyPair, issue_node_certificate, new_ca
 from common.errors import ExitCode, UserError
 from common.private_files import write_all_private
@@ -37,11 +33,12 @@ from fleet.identity import (
     new_user,
     operator_jwt,
 )
+from fleet.receipt_keys import ReceiptSigner, as_text, new_seed
 from hub import permissions, streams
 from hub.directory import HubDirectory, HubRecord, KeyName, Kind, User
 from hub.server_config import Node, Places, server_config
 
-_CONNECT_S: Final = 10.0
+_CONNECT_S: Final = 5.0
 _CA_DAYS: Final = 3650.0
 _SYSTEM: Final = Permissions(publish=("$SYS.REQ.CLAIMS.UPDATE",), subscribe=("_INBOX.>",))
 _PUSH_WITHIN_S: Final = 3.0
@@ -81,7 +78,7 @@ def create(directory: HubDirectory, plan: HubPlan) -> None:
         ca = new_ca(f"{plan.fleet} hub", _CA_DAYS)
         admin, _ = new_user(keys["fleet"], "administrator", permissions.administrator())
         system, _ = new_user(keys["system"], "administrator", _SYSTEM)
-        signing, checking = _receipt_keys()
+        seed = new_seed()
         root = directory.path
         files = {
             **{root / "keys" / f"{name}.nk": key.seed for name, key in keys.items()},
@@ -89,8 +86,8 @@ def create(directory: HubDirectory, plan: HubPlan) -> None:
             root / "keys" / "ca.key": ca.key,
             root / "admin.creds": admin.text().encode(),
             root / "system.creds": system.text().encode(),
-            root / "receipts.key": signing,
-            root / "receipts.pub": checking,
+            root / "receipts.key": as_text([seed]).encode(),
+            root / "receipts.pub": as_text([ReceiptSigner(seed).public_key]).encode(),
         }
         for node in plan.nodes:
             files |= _node_files(root / "nodes" / node.name, node, plan, keys, ca)
@@ -140,13 +137,12 @@ async def enroll(
         async with _connected(directory) as hub:
             await streams.add_command_consumer(hub, robot)
             await _list_robot(hub, user)
-        settings = {"servers": list(record.servers), "robot": robot, "fleet": record.fleet}
         write_all_private(
             {
                 out / "bridge.creds": creds.text().encode(),
                 out / "ca.pem": directory.secret("keys/ca.pem"),
                 out / "receipts.pub": directory.secret("receipts.pub"),
-                out / "fleet.yaml": yaml.safe_dump(settings, sort_keys=False).encode(),
+                out / "fleet.yaml": _fragment(record, f"robot: {robot}\n"),
             }
         )
         directory.write(record)
@@ -186,7 +182,7 @@ def operator_login(
         allowed = permissions.operator(commands=commands)
         record, creds = _issue(directory, "operator", name, allowed, days, again=again)
         directory.write(record)
-    keys = ", ".join(key.hex() for key in _public_keys(directory.secret("receipts.pub")))
+    keys = ", ".join(directory.secret("receipts.pub").decode().split())
     return (
         "# Robot Gateway fleet login 1\n"
         f"fleet: {record.fleet}\nname: {name}\nservers: {', '.join(record.servers)}\nreceivers: {keys}\n"
@@ -202,13 +198,12 @@ def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float
     """
     with directory.locked():
         record, creds = _issue(directory, "receiver", name, permissions.receiver(), days, again=again)
-        settings = {"servers": list(record.servers), "fleet": record.fleet}
         write_all_private(
             {
                 out / "receiver.creds": creds.text().encode(),
                 out / "ca.pem": directory.secret("keys/ca.pem"),
                 out / "receipts.key": directory.secret("receipts.key"),
-                out / "fleet.yaml": yaml.safe_dump(settings, sort_keys=False).encode(),
+                out / "fleet.yaml": _fragment(record),
             }
         )
         directory.write(record)
@@ -323,21 +318,10 @@ async def _connected(directory: HubDirectory, *, system: bool = False) -> AsyncG
         yield hub
 
 
-def _receipt_keys() -> tuple[bytes, bytes]:
-    key = Ed25519PrivateKey.generate()
-    return (
-        key.private_bytes(
-            serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-        ),
-        key.public_key().public_bytes(
-            serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo
-        ),
-    )
-
-
-def _public_keys(pem: bytes) -> list[bytes]:
-    key = serialization.load_pem_public_key(pem)
-    return [key.public_bytes(serialization.Encoding.Raw, serialization.PublicFormat.Raw)]
+def _fragment(record: HubRecord, more: str = "") -> bytes:
+    """Returns what a configuration file needs of the hub; names and addresses need no quotes in YAML."""
+    servers = "".join(f"  - {server}\n" for server in record.servers)
+    return f"servers:\n{servers}{more}fleet: {record.fleet}\n".encode()
 
 
 def _no_name(name: str) -> UserError:

@@ -16,12 +16,11 @@ from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
 from hub import administration
 from hub.directory import HubDirectory, Kind
-from hub.receiver.cli import receiver as run_receiver
+from hub.receiver.cli import receiver
 from hub.server_config import Node, Places
 from hub.streams import StreamLimits
 
 app = typer.Typer(help="The fleet's hub: make it, enroll robots, revoke them.", no_args_is_help=True)
-app.command("receiver")(run_receiver)
 
 _DEFAULT_DIR: Final = Path("hub")
 _MIB: Final = 1024 * 1024
@@ -187,6 +186,9 @@ def exporter(
     names = tuple(part.strip() for part in servers.split(",") if part.strip())
     address = FleetAddress(names, credentials, ca, name="robot-bridge hub exporter")
     asyncio.run(export_until_stopped(address, host, port))
+
+
+app.command("receiver")(receiver)
 
 
 def _run(work: Coroutine[Any, Any, ResultT]) -> ResultT:

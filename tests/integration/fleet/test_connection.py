@@ -1,0 +1,196 @@
+"""The connection to a real server: how it is lost, found to be lost, and made again."""
+
+import asyncio
+import time
+from collections.abc import Iterator
+from contextlib import aclosing
+from pathlib import Path
+
+import pytest
+
+from fleet import names
+from fleet.connection import FleetAddress, Published, Request, Start, connect
+from fleet.errors import HubError, HubReason, UnreachableError
+from hub import streams
+from tests.support.free import free_tcp_port
+from tests.support.nats_servers import NatsServers, nats_servers
+
+_FOUND_WITHIN_S = 15.0
+"""docs/fleet.md: a half-open connection."""
+
+
+@pytest.fixture
+def servers(tmp_path: Path) -> Iterator[NatsServers]:
+    with nats_servers(tmp_path) as servers:
+
+        async def set_up() -> None:
+            async with connect(FleetAddress(servers.urls)) as hub:
+                await hub.connected(10)
+                await streams.set_up(hub, 1, streams.StreamLimits())
+                await streams.add_command_consumer(hub, "r1")
+
+        asyncio.run(set_up())
+        yield servers
+
+
+async def test_without_a_server_calls_fail_at_once() -> None:
+    async with connect(FleetAddress((f"nats://127.0.0.1:{free_tcp_port()}",))) as hub:
+        begin_s = time.monotonic()
+        with pytest.raises(UnreachableError):
+            await hub.publish_once("fleet.r1.ev.run.1", b"")
+        assert time.monotonic() - begin_s < 0.5
+        with pytest.raises(UnreachableError, match="can't be reached"):
+            await hub.connected(1.0)
+        assert hub.link.reason is HubReason.UNREACHABLE
+
+
+async def test_a_restart_of_the_server_is_survived(servers: NatsServers) -> None:
+    """What is followed goes on where it was, and what is served is served again."""
+
+    async def answer(request: Request) -> None:
+        await request.respond(request.payload)
+
+    async with (
+        connect(FleetAddress(servers.urls)) as hub,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r1"))) as robot,
+    ):
+        for each in (hub, robot):
+            await each.connected(10)
+        await hub.serve(names.UPLOAD_SUBJECTS, names.RECEIVERS, answer)
+        await robot.publish_once("fleet.r1.ev.run.1", b"1")
+        async with (
+            aclosing(hub.follow(names.EVENTS, "fleet.r1.ev.>", Start.all())) as events,
+            aclosing(robot.pull(names.COMMANDS, "r1")) as commands,
+        ):
+            assert (await anext(events)).payload == b"1"
+            # At first there is none: the request waits at the server that is killed.
+            command = asyncio.ensure_future(anext(commands))
+            servers.kill(0)
+            assert await robot.changed.wait_until(lambda: not robot.link.connected, 5)
+            with pytest.raises(UnreachableError):
+                await robot.request("fleet.r1.up.begin_file", b"")
+            await asyncio.to_thread(servers.start_all)
+            for each in (hub, robot):
+                await each.connected(20)
+            assert await robot.publish_once("fleet.r1.ev.run.1", b"1") is Published.REPEATED
+            await robot.publish_once("fleet.r1.ev.run.2", b"2")
+            assert (await anext(events)).payload == b"2"
+            await hub.publish_once(names.command_subject("r1", "c1"), b"do")
+            delivery = await command
+            assert delivery.payload == b"do"
+            await delivery.ack()
+            assert await robot.request("fleet.r1.up.begin_file", b"again") == b"again"
+
+
+@pytest.mark.timed
+async def test_a_silent_server_is_found(servers: NatsServers) -> None:
+    """Frozen, it keeps its connections open, as a half-open TCP connection is."""
+    async with connect(FleetAddress(servers.urls)) as hub:
+        await hub.connected(10)
+        servers.freeze(0)
+        try:
+            assert await hub.changed.wait_until(lambda: not hub.link.connected, _FOUND_WITHIN_S)
+        finally:
+            servers.thaw(0)
+        await hub.connected(20)
+        await hub.publish_once("fleet.r1.ev.run.1", b"")
+
+
+async def test_a_bucket_is_read_and_watched(servers: NatsServers) -> None:
+    async with connect(FleetAddress(servers.urls)) as hub:
+        await hub.connected(10)
+        assert await hub.entries(names.STATES) == {}
+        for number in range(300):
+            await hub.put(names.STATES, f"r{number}", b"old")
+        await hub.put(names.STATES, "r7", b"new")
+        await hub.delete(names.STATES, "r8")
+        entries = await hub.entries(names.STATES)
+        assert len(entries) == 299
+        assert entries["r7"].value == b"new"
+        async with aclosing(hub.watch_bucket(names.STATES)) as watched:
+            first = [await anext(watched) for _ in range(300)]
+            assert {each.key for each in first if not each.deleted} == entries.keys()
+            assert first[-1].pending == 0
+            await hub.put(names.STATES, "r8", b"back")
+            assert (await anext(watched)).value == b"back"
+
+
+async def test_answers_for_another_robot_are_not_given(servers: NatsServers) -> None:
+    asked: list[str] = []
+
+    async def answer(request: Request) -> None:
+        asked.append(request.robot)
+        await request.respond(b"")
+
+    async with (
+        connect(FleetAddress(servers.urls)) as receiver,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r1"))) as robot,
+    ):
+        for each in (receiver, robot):
+            await each.connected(10)
+        with pytest.raises(HubError) as nobody:
+            await robot.request("fleet.r1.up.begin_file", b"")
+        assert nobody.value.reason is HubReason.NO_RESPONDERS
+        await receiver.serve(names.UPLOAD_SUBJECTS, names.RECEIVERS, answer)
+        # In a hub without identities nothing else keeps it from that.
+        with pytest.raises(HubError):
+            await robot.request("fleet.r2.up.begin_file", b"", 0.5)
+        await robot.request("fleet.r1.up.begin_file", b"")
+        assert asked == ["r1"]
+
+
+async def test_more_requests_than_permitted_are_told_so(servers: NatsServers) -> None:
+    proceed = asyncio.Event()
+
+    async def answer(request: Request) -> None:
+        await proceed.wait()
+        await request.respond(b"done")
+
+    async with (
+        connect(FleetAddress(servers.urls)) as receiver,
+        connect(FleetAddress(servers.urls, inbox=names.inbox_prefix("r1"))) as robot,
+    ):
+        for each in (receiver, robot):
+            await each.connected(10)
+        await receiver.serve(names.UPLOAD_SUBJECTS, names.RECEIVERS, answer, at_once=2, busy=b"busy")
+        pending = [asyncio.ensure_future(robot.request("fleet.r1.up.x", b"")) for _ in range(3)]
+        done, _ = await asyncio.wait(pending, return_when=asyncio.FIRST_COMPLETED)
+        assert [each.result() for each in done] == [b"busy"]
+        proceed.set()
+        assert sorted(await asyncio.gather(*pending)) == [b"busy", b"done", b"done"]
+
+
+_GREETINGS = (
+    b"",
+    b"HTTP/1.1 400 Bad Request\r\n\r\n",
+    b"INFO {\r\n",
+    b"INFO []\r\n",
+    b"INFO " + b"x" * 200_000,
+    b'INFO {"max_payload":1000,"headers":true}\r\nPONG\r\nMSG a 1 999999999\r\n' + b"x" * 8_000_000,
+    b'INFO {"max_payload":"x","headers":true}\r\nPONG\r\n',
+    b"-ERR 'Maximum Connections Exceeded'\r\n",
+)
+
+
+async def test_a_server_may_say_anything() -> None:
+    await asyncio.gather(*(_hear(greeting) for greeting in _GREETINGS))
+
+
+async def _hear(greeting: bytes) -> None:
+    """Connects to a server that says this, whatever it is asked."""
+
+    async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(greeting)
+        try:
+            while await reader.read(65536):
+                pass
+        except ConnectionError:
+            return
+        finally:
+            writer.close()
+
+    async with await asyncio.start_server(talk, "127.0.0.1", 0) as server:
+        url = f"nats://127.0.0.1:{server.sockets[0].getsockname()[1]}"
+        async with connect(FleetAddress((url,))) as hub:
+            await hub.changed.wait_until(lambda: hub.link.reason is not None, 12)
+            assert (hub.link.connected, hub.link.reason) == (False, HubReason.UNREACHABLE), greeting[:80]

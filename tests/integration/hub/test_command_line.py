@@ -1,0 +1,128 @@
+"""From nothing to an enrolled robot and back, by the commands of the documentation."""
+
+import asyncio
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from common.errors import UserError
+from fleet import names
+from fleet.connection import FleetAddress, connect
+from fleet.errors import RefusedError
+from hub.cli import app
+from tests.support.free import free_tcp_port
+from tests.support.nats_servers import NatsServers
+
+
+def _type(*words: str) -> Result:
+    return CliRunner().invoke(app, words, catch_exceptions=False)
+
+
+@pytest.fixture
+def hub(tmp_path: Path) -> Iterator[Path]:
+    """A hub's directory, and its server, which was started as `init` says."""
+    made = tmp_path / "hub"
+    result = _type("init", "--out", str(made), "--fleet", "lab", "--host", "127.0.0.1")
+    assert f"hub apply --dir {made}" in result.output
+    servers = NatsServers(tmp_path, whole=lambda servers, _node: _moved(made, tmp_path, servers))
+    # The ports of the documentation may be in use on this machine.
+    record = json.loads((made / "hub.json").read_text(encoding="utf-8"))
+    record["servers"] = [f"tls://127.0.0.1:{servers.ports[0]}"]
+    (made / "hub.json").write_text(json.dumps(record), encoding="utf-8")
+    try:
+        servers.start_all()
+        yield made
+    finally:
+        servers.close()
+
+
+def _moved(made: Path, home: Path, servers: NatsServers) -> str:
+    text = (made / "nodes" / "n1" / "nats.conf").read_text(encoding="utf-8")
+    text = text.replace("/etc/nats", str(made / "nodes" / "n1")).replace("/var/lib/nats", str(home / "data"))
+    text = text.replace("0.0.0.0:4222", f"127.0.0.1:{servers.ports[0]}").replace('"n1"', '"n0"')
+    return text.replace("127.0.0.1:8222", f"127.0.0.1:{servers.monitors[0]}")
+
+
+def test_a_robot_comes_and_goes(hub: Path, tmp_path: Path) -> None:
+    assert "The hub is ready" in _type("apply", "--dir", str(hub)).output
+    assert "The hub is ready" in _type("apply", "--dir", str(hub)).output
+    files = tmp_path / "r1"
+    _type("enroll", "r1", "--dir", str(hub), "--out", str(files))
+    assert {each.name for each in files.iterdir()} == {"bridge.creds", "ca.pem", "receipts.pub", "fleet.yaml"}
+    assert all(each.stat().st_mode & 0o077 == 0 for each in files.iterdir())
+    fragment = (files / "fleet.yaml").read_text(encoding="utf-8")
+    assert "robot: r1\nfleet: lab\n" in fragment
+    with pytest.raises(UserError, match="has credentials already"):
+        _type("enroll", "r1", "--dir", str(hub), "--out", str(files))
+    url = re.search(r"tls://\S+", fragment)
+    assert url is not None
+    address = FleetAddress((url[0],), files / "bridge.creds", files / "ca.pem", names.inbox_prefix("r1"))
+    asyncio.run(_publish(address))
+    listed = json.loads(_type("robots", "--json", "--dir", str(hub)).output)
+    assert [(each["name"], each["revoked_unix_s"]) for each in listed] == [("r1", None)]
+    _type("revoke", "r1", "--dir", str(hub))
+    assert json.loads(_type("robots", "--json", "--dir", str(hub)).output)[0]["revoked_unix_s"]
+    assert "r1" in _type("robots", "--dir", str(hub)).output
+    with pytest.raises(RefusedError):
+        asyncio.run(_publish(address))
+
+
+def test_other_limits_are_reported_and_not_changed(hub: Path) -> None:
+    _type("apply", "--dir", str(hub))
+    result = _type("apply", "--dir", str(hub), "--events-days", "3")
+    assert result.exit_code == 1
+    assert "fleet_events: max_age is" in result.output
+
+
+def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:
+    login = _type("operator", "anna", "--dir", str(hub)).output
+    assert login.startswith("# Robot Gateway fleet login 1\nfleet: lab\nname: anna\nservers: tls://")
+    assert re.search(r"^receivers: [0-9a-f]{64}$", login, re.MULTILINE)
+    assert "BEGIN NATS USER JWT" in login
+    assert login.rstrip().endswith("-----END CERTIFICATE-----")
+    _type("receiver-credentials", "--dir", str(hub), "--out", str(tmp_path / "receiver"))
+    assert {each.name for each in (tmp_path / "receiver").iterdir()} == {
+        "receiver.creds",
+        "ca.pem",
+        "receipts.key",
+        "fleet.yaml",
+    }
+    assert len(json.loads(_type("robots", "--all", "--json", "--dir", str(hub)).output)) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (("init", "--out", "{}/x", "--nodes", "3", "--host", "a"), "as many times --host"),
+        (("init", "--out", "{}/x", "--nodes", "2", "--host", "a", "--host", "b"), "a cluster has three"),
+        (("init", "--out", "{}/x", "--fleet", "No Name"), "is no name"),
+        (("apply", "--dir", "{}/missing"), "no hub's directory"),
+        (("robots", "--dir", "{}/missing"), "no hub's directory"),
+    ],
+)
+def test_mistakes_are_explained(tmp_path: Path, words: tuple[str, ...], error: str) -> None:
+    with pytest.raises(UserError, match=error) as refused:
+        _type(*(word.format(tmp_path) for word in words))
+    assert refused.value.remedy
+
+
+def test_a_hub_that_is_off_is_reported(tmp_path: Path) -> None:
+    made = tmp_path / "hub"
+    _type("init", "--out", str(made), "--host", "127.0.0.1")
+    record = json.loads((made / "hub.json").read_text(encoding="utf-8"))
+    record["servers"] = [f"tls://127.0.0.1:{free_tcp_port()}"]
+    (made / "hub.json").write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(UserError, match="can't be reached") as refused:
+        _type("enroll", "r1", "--dir", str(made), "--out", str(tmp_path / "r1"))
+    assert refused.value.exit_code == 3
+    assert not (tmp_path / "r1").exists()
+
+
+async def _publish(address: FleetAddress) -> None:
+    async with connect(address) as robot:
+        await robot.connected(5)
+        await robot.publish_once("fleet.r1.ev.run.1", b"")

@@ -1,0 +1,36 @@
+"""The text of nats.conf; that servers take it, the integration tests show."""
+
+from hub.server_config import Node, Places, server_config
+
+NODES = tuple(Node(f"n{number}", f"hub{number}.example") for number in (1, 2, 3))
+
+
+def _config(nodes: tuple[Node, ...], *, sync_always: bool = True) -> str:
+    return server_config(
+        nodes[0],
+        nodes,
+        operator="OPERATOR",
+        system_account="ASYS",
+        accounts={"ASYS": "TOKEN"},
+        places=Places(),
+        max_store="32GB",
+        sync_always=sync_always,
+    )
+
+
+def test_one_node_has_no_cluster() -> None:
+    text = _config(NODES[:1])
+    assert "cluster {" not in text
+    assert "sync_interval: always" in text
+    assert 'tls { cert_file: "/etc/nats/server.pem"' in text
+    assert "ASYS: TOKEN" in text
+
+
+def test_nodes_of_a_cluster_know_each_other_by_tls() -> None:
+    text = _config(NODES)
+    assert all(f'"nats-route://hub{number}.example:6222"' in text for number in (1, 2, 3))
+    assert "verify: true" in text
+
+
+def test_an_old_server_gets_no_setting_that_it_does_not_know() -> None:
+    assert "sync_interval" not in _config(NODES[:1], sync_always=False)
