@@ -5,7 +5,7 @@ import logging
 import secrets
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bridge.commands.desk import Desk
 from bridge.commands.taker import CommandTaker
@@ -21,13 +21,14 @@ from bridge.state import is_charging
 from bridge.state_sender import StateSender
 from bridge.status import Status
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
-from bridge.uploads.uploads import Fleet, Uploads
 from common import bind, rpc
 from common.health import Health
 from console.client import AsyncGatewayClient
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
-from fleet.receipt_keys import read_public_keys
+
+if TYPE_CHECKING:
+    from bridge.uploads.uploads import Uploads
 
 _log = logging.getLogger(__name__)
 
@@ -86,11 +87,17 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
 
 def _queue(
     settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: AsyncGatewayClient, status: StatusReader
-) -> Uploads | None:
+) -> "Uploads | None":
     """Returns the uploads; None for a robot that has no receivers' keys."""
     if settings.hub.receipts is None:
         return None
-    fleet = Fleet(fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_public_keys(settings.hub.receipts))
+    # Late: a robot that uploads nothing does without the memory of their libraries.
+    from bridge.uploads.uploads import Fleet, Uploads  # noqa: PLC0415
+    from fleet.receipt_keys import read_public_keys  # noqa: PLC0415
+
+    fleet = Fleet(
+        fleet=settings.hub.fleet, robot=settings.hub.robot, keys=read_public_keys(settings.hub.receipts)
+    )
     return Uploads(
         settings.uploads,
         fleet,

@@ -3,11 +3,10 @@
 import asyncio
 import logging
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from bridge.pauses import Pauses
 from bridge.uploads.queue import State, Upload
-from bridge.uploads.uploads import Uploads
 from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
 from common.reasons import Reason
 from console.client import AsyncGatewayClient, GatewayError
@@ -15,6 +14,9 @@ from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import cloud_pb2
 from omniseer.gateway.v1 import recording_pb2 as recording_pb
+
+if TYPE_CHECKING:
+    from bridge.uploads.uploads import Uploads
 
 _log = logging.getLogger(__name__)
 
@@ -87,7 +89,7 @@ class QueuedUploads:
         uploads: the queue and what works on it.
     """
 
-    def __init__(self, uploads: Uploads) -> None:
+    def __init__(self, uploads: "Uploads") -> None:
         self._uploads = uploads
 
     def describe(self, status: cloud_pb2.CloudStatus) -> None:
@@ -132,7 +134,7 @@ class QueuedUploads:
         return _copy(await self._uploads.cancel(recording_id))
 
 
-async def apply_rule(uploads: Uploads, gateway: AsyncGatewayClient) -> None:
+async def apply_rule(uploads: "Uploads", gateway: AsyncGatewayClient) -> None:
     """Has the rule look at the robot's recordings every 30 s, until cancelled."""
     pauses = Pauses()
     while True:

@@ -2,26 +2,26 @@
 
 | file | content |
 |---|---|
-| receipts.key | a private key, PKCS #8 in PEM; all receivers of a fleet may share it |
-| receipts.pub | the public keys that count, in PEM; several, one after the other, while keys change |
+| receipts.key | the seed of a key, 32 bytes in hexadecimal digits; all receivers of a fleet may share it |
+| receipts.pub | the public keys that count, one a line in hexadecimal digits; several while keys change |
 """
 
 import hashlib
 import re
+import secrets
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
-from cryptography.exceptions import UnsupportedAlgorithm
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
-from cryptography.hazmat.primitives.serialization import load_pem_private_key, load_pem_public_key
+from nacl.signing import SigningKey
 
 from common.errors import ExitCode, UserError
 from fleet.receipts import PURPOSE, ReceiptFlaw, key_id, opened
 from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt
 from omniseer.gateway.v1.recording_pb2 import RecordingFile
 
-_PUBLIC_KEY: Final = re.compile(rb"-----BEGIN PUBLIC KEY-----[^-]{1,1024}-----END PUBLIC KEY-----")
+_KEY_BYTES: Final = 32
+_KEY: Final = re.compile(r"[0-9a-f]{64}")
 _MOST_KEYS: Final = 64
 _LONGEST_FILE: Final = 64 * 1024
 _COMPARED: Final = ("fleet", "robot", "recording_id", "file_name", "size", "sha256")
@@ -40,22 +40,32 @@ class ReceiptSigner:
     """Signs receipts.
 
     Args:
-        key: Of a receiver.
+        seed: Of the key, 32 bytes.
     """
 
-    def __init__(self, key: Ed25519PrivateKey) -> None:
-        self._key = key
+    def __init__(self, seed: bytes) -> None:
+        self._key = SigningKey(seed)
 
     @property
     def public_key(self) -> bytes:
         """What robots check its receipts with, 32 bytes."""
-        return self._key.public_key().public_bytes_raw()
+        return bytes(self._key.verify_key)
 
     def sign(self, receipt: Receipt) -> SignedReceipt:
         """Returns the receipt with its signature."""
         content = receipt.SerializeToString(deterministic=True)
-        signature = self._key.sign(PURPOSE + content)
+        signature = self._key.sign(PURPOSE + content).signature
         return SignedReceipt(receipt=content, signature=signature, key_id=key_id(self.public_key))
+
+
+def new_seed() -> bytes:
+    """Returns the seed of a new key."""
+    return secrets.token_bytes(_KEY_BYTES)
+
+
+def as_text(keys: Iterable[bytes]) -> str:
+    """Returns the content of receipts.key, or of receipts.pub."""
+    return "".join(f"{key.hex()}\n" for key in keys)
 
 
 def read_signer(path: Path) -> ReceiptSigner:
@@ -64,13 +74,7 @@ def read_signer(path: Path) -> ReceiptSigner:
     Raises:
         UserError: The file can't be read, or has something else.
     """
-    try:
-        key = load_pem_private_key(_content(path), password=None)
-    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise _wrong(path) from error
-    if not isinstance(key, Ed25519PrivateKey):
-        raise _wrong(path)
-    return ReceiptSigner(key)
+    return ReceiptSigner(_keys(path, most=1)[0])
 
 
 def read_public_keys(path: Path) -> tuple[bytes, ...]:
@@ -79,10 +83,7 @@ def read_public_keys(path: Path) -> tuple[bytes, ...]:
     Raises:
         UserError: The file can't be read, or has something else.
     """
-    blocks = _PUBLIC_KEY.findall(_content(path))
-    if not 0 < len(blocks) <= _MOST_KEYS:
-        raise _wrong(path)
-    return tuple(_public_key(path, block) for block in blocks)
+    return _keys(path, _MOST_KEYS)
 
 
 def confirmed(signed: SignedReceipt, public_keys: Sequence[bytes], expected: Receipt) -> Receipt:
@@ -111,26 +112,18 @@ def digest_of(files: Iterable[RecordingFile]) -> bytes:
     return hashlib.sha256("".join(lines).encode()).digest()
 
 
-def _content(path: Path) -> bytes:
+def _keys(path: Path, most: int) -> tuple[bytes, ...]:
     try:
         with path.open("rb") as file:
-            return file.read(_LONGEST_FILE)
+            lines = file.read(_LONGEST_FILE).decode("ascii").split()
     except OSError as error:
         raise UserError(
             f"{path} can't be read: {error.strerror}", "Copy it again from the hub", exit_code=ExitCode.USAGE
         ) from error
-
-
-def _public_key(path: Path, block: bytes) -> bytes:
-    try:
-        key = load_pem_public_key(block)
-    except (ValueError, UnsupportedAlgorithm) as error:
-        raise _wrong(path) from error
-    if not isinstance(key, Ed25519PublicKey):
-        raise _wrong(path)
-    return key.public_bytes_raw()
-
-
-def _wrong(path: Path) -> UserError:
-    what = f"{path} has no key of receipts (Ed25519 in PEM)"
-    return UserError(what, "Copy it again from the hub", exit_code=ExitCode.USAGE)
+    except UnicodeDecodeError:
+        lines = []
+    if not 0 < len(lines) <= most or not all(map(_KEY.fullmatch, lines)):
+        raise UserError(
+            f"{path} has no key of receipts", "Copy it again from the hub", exit_code=ExitCode.USAGE
+        )
+    return tuple(map(bytes.fromhex, lines))

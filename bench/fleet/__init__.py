@@ -10,6 +10,7 @@ _MODULES = {
     "bench.fleet.failures": ("fleet.lost", "fleet.duplicates", "fleet.disordered", "fleet.gap_s"),
     "bench.fleet.rates": ("fleet.events_s", "fleet.batched_events_s"),
     "bench.fleet.cost": ("fleet.robot_kib", "fleet.robot_cpu"),
+    "bench.fleet.uploading": ("fleet.upload_resume_mib",),
 }
 """Each has `rows(workdir, wanted)`, which measures the wanted ones of its rows."""
 

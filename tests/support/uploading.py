@@ -8,10 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from cryptography.hazmat.primitives import serialization
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from cryptography.hazmat.primitives.serialization import Encoding, PrivateFormat, PublicFormat
-
+from bridge.uploads.attempt import RecordingSource
 from bridge.uploads.config import UploadSettings
 from bridge.uploads.queue import Upload
 from bridge.uploads.receivers import Requests
@@ -20,7 +17,7 @@ from common.healthcheck import state_of
 from console.client import results
 from console.client.errors import GatewayError, Refused
 from console.client.mapping.reader import read
-from fleet.receipt_keys import ReceiptSigner
+from fleet.receipt_keys import ReceiptSigner, new_seed
 from hub.receiver.app import serve
 from hub.receiver.config import HubSettings, ReceiverSettings, StoreSettings
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -125,27 +122,7 @@ class Rows:
 
 def new_signer() -> ReceiptSigner:
     """Signs with a new key."""
-    return ReceiptSigner(Ed25519PrivateKey.generate())
-
-
-class Keys:
-    """The files of a new key of receipts.
-
-    Args:
-        directory: Gets them.
-    """
-
-    def __init__(self, directory: Path) -> None:
-        key = Ed25519PrivateKey.generate()
-        self.private, self.public_file = directory / "receipts.key", directory / "receipts.pub"
-        self.public = (key.public_key().public_bytes_raw(),)
-        directory.mkdir(exist_ok=True)
-        self.private.write_bytes(
-            key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, serialization.NoEncryption())
-        )
-        self.public_file.write_bytes(
-            key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
-        )
+    return ReceiptSigner(new_seed())
 
 
 def receiver_settings(
@@ -210,7 +187,7 @@ class Running:
 
 @asynccontextmanager
 async def running_uploads(
-    robot: Robot,
+    robot: RecordingSource,
     hub: Requests,
     host: str,
     keys: tuple[bytes, ...],

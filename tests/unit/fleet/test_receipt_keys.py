@@ -8,14 +8,16 @@ import pytest
 from common.errors import UserError
 from fleet.receipt_keys import (
     ReceiptError,
+    as_text,
     confirmed,
     digest_of,
+    new_seed,
     read_public_keys,
     read_signer,
 )
 from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt
 from omniseer.gateway.v1.recording_pb2 import RecordingFile
-from tests.support.uploading import Keys, new_signer
+from tests.support.uploading import new_signer
 
 RECEIPT = Receipt(fleet="lab", robot="r1", recording_id="one", file_name="a", size=3, sha256=b"s" * 32)
 
@@ -64,23 +66,18 @@ def test_every_bit_of_a_receipt_is_signed() -> None:
 
 
 def test_the_files_of_keys(tmp_path: Path) -> None:
-    first, second = Keys(tmp_path / "first"), Keys(tmp_path / "second")
-    both = tmp_path / "receipts.pub"
-    both.write_bytes(first.public_file.read_bytes() + second.public_file.read_bytes())
-    assert read_public_keys(both) == (*first.public, *second.public)
-    signed = read_signer(first.private).sign(RECEIPT)
-    assert confirmed(signed, read_public_keys(both), RECEIPT) == RECEIPT
+    seed, other = new_seed(), new_signer()
+    private, public = tmp_path / "receipts.key", tmp_path / "receipts.pub"
+    private.write_text(as_text([seed]), encoding="ascii")
+    signer = read_signer(private)
+    public.write_text(as_text([other.public_key, signer.public_key]), encoding="ascii")
+    assert read_public_keys(public) == (other.public_key, signer.public_key)
+    assert confirmed(signer.sign(RECEIPT), read_public_keys(public), RECEIPT) == RECEIPT
+    with pytest.raises(UserError, match="no key"):
+        read_signer(public)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"5d41" * 16,
-        b"-----BEGIN PUBLIC KEY-----\nAAAA\n-----END PUBLIC KEY-----\n",
-        b"-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n",
-    ],
-)
+@pytest.mark.parametrize("content", [b"", b"zz", b"ab" * 31, b"AB" * 32, b"-----BEGIN PUBLIC KEY-----", b"\xff"])
 def test_files_with_something_else_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "receipts"
     path.write_bytes(content)
