@@ -29,7 +29,7 @@ def check(ground: FleetGround, hub_s: float) -> None:
         start_receiver(ground)
         for robot in ROBOTS:
             start_robot(ground, robot)
-        rows = ground.programs.wait_until(lambda: _if_all_up(ground), "all robots are up", _UP_WITHIN_S)
+        rows = ground.programs.wait_until(lambda: _if_all_up(ground), "all robots are ready", _UP_WITHIN_S)
         ages = ", ".join(f"{name} seen {row['last_seen_ms']} ms ago" for name, row in rows.items())
         say(f"{len(rows)} enrolled and up; {ages}")
     with _step("event", ground) as say:
@@ -60,9 +60,14 @@ def _step(name: str, ground: FleetGround) -> Iterator[Callable[[str], None]]:
         yield seen.append
         ground.programs.check_alive()
     except (UserError, AssertionError) as error:
-        print(f"FAIL {time.monotonic() - began_s:6.2f} s  {name}: {error}", flush=True)
+        standings = ", ".join(f"{robot} {_standing(row)}" for robot, row in ground.rows().items())
+        print(f"FAIL {time.monotonic() - began_s:6.2f} s  {name}: {error}; {standings}", flush=True)
         raise
     print(f"ok   {time.monotonic() - began_s:6.2f} s  {name}: {'; '.join(seen)}", flush=True)
+
+
+def _standing(row: dict[str, Any]) -> str:
+    return f"{row['standing']} ({row['state']['summary'] if row['state'] else row['problem']})"
 
 
 def _if_all_up(ground: FleetGround) -> dict[str, dict[str, Any]] | None:
