@@ -171,7 +171,8 @@ def receiver_credentials(
 @app.command()
 def exporter(
     servers: Annotated[
-        str, typer.Option(envvar="ROBOT_HUB_SERVERS", help="Of the hub, as tls://host:4222, separated by commas.")
+        str,
+        typer.Option(envvar="ROBOT_HUB_SERVERS", help="Of the hub, as tls://host:4222, separated by commas."),
     ],
     credentials: Annotated[
         Path | None, typer.Option(envvar="ROBOT_HUB_CREDENTIALS", help="An operator's NATS credentials.")

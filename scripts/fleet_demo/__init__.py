@@ -1,1 +1,1 @@
-"""The fleet's demo: robots, hub, store and console on this machine, watched by a person or checked step by step."""
+"""The demo of the fleet: robots, hub, store and console on this machine, watched or checked step by step."""

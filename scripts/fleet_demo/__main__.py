@@ -18,7 +18,7 @@ def main() -> int:
     """Ends 0, or 1 with a reason."""
     parser = argparse.ArgumentParser(
         prog="scripts/fleet-demo",
-        description="Three robots, a hub of three nodes, a store and a receiver on this machine, until Ctrl-C.",
+        description="Three robots, a hub of three nodes, a store and a receiver here, until Ctrl-C.",
     )
     parser.add_argument("--check", action="store_true", help="run the main job once, say what was seen, end")
     is_check = parser.parse_args().check

@@ -12,10 +12,10 @@ from fleet_demo.parts import NODES, ROBOTS, FleetGround, start_receiver, start_r
 from hub import administration
 from simrobot.control import ask
 
-_UP_WITHIN_S: Final = 60.0
-_SEEN_WITHIN_S: Final = 30.0
-_VERIFIED_WITHIN_S: Final = 40.0
-_REVOKED_WITHIN_S: Final = 10.0
+_UP_WITHIN_S: Final = 150.0
+_SEEN_WITHIN_S: Final = 60.0
+_VERIFIED_WITHIN_S: Final = 90.0
+_REVOKED_WITHIN_S: Final = 30.0
 _FAULT: Final = "odometry"
 _AFFECTED: Final = "lab2"
 _RECORDING: Final = "lab1"
@@ -127,7 +127,9 @@ def _uploaded(ground: FleetGround, recording_id: str) -> str:
         return next((each for each in found if each["receipt"] == "verified"), None)
 
     stored = ground.programs.wait_until(verified, "the recording is verified", _VERIFIED_WITHIN_S)
-    return f"{len(stored['files'])} files, {stored['recording']['size']} bytes, verified at {stored['location']}"
+    return (
+        f"{len(stored['files'])} files, {stored['recording']['size']} bytes, verified at {stored['location']}"
+    )
 
 
 def _is_revoked(ground: FleetGround) -> bool:

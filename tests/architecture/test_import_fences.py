@@ -249,7 +249,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "console/fleet/",
             ),
         ),
-                ("omniseer.fleet", ("fleet/", "bridge/", "hub/", "console/fleet/", "console/cli/fleet.py")),
+        ("omniseer.fleet", ("fleet/", "bridge/", "hub/", "console/fleet/", "console/cli/fleet.py")),
         ("omniseer.preview", ("gateway/links/preview/", "preview/rpc/")),
         ("omniseer.drive", ("gateway/links/", "drive/")),
         ("omniseer.bridge", ("gateway/links/bridge/", "bridge/")),
