@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from common.errors import ExitCode, UserError
+from fleet.connection import FleetAddress
 from fleet.errors import HubError, HubReason
 from hub import administration
 from hub.directory import HubDirectory, Kind
@@ -165,6 +166,27 @@ def receiver_credentials(
     """Write the files of a receiver of recordings."""
     administration.receiver_files(HubDirectory(directory), name, out, days=days, again=again)
     typer.echo(f"{out}: credentials and signing key of the receiver.")
+
+
+@app.command()
+def exporter(
+    servers: Annotated[
+        str,
+        typer.Option(envvar="ROBOT_HUB_SERVERS", help="Of the hub, as tls://host:4222, separated by commas."),
+    ],
+    credentials: Annotated[
+        Path | None, typer.Option(envvar="ROBOT_HUB_CREDENTIALS", help="An operator's NATS credentials.")
+    ] = None,
+    ca: Annotated[Path | None, typer.Option(envvar="ROBOT_HUB_CA", help="ca.pem of the hub.")] = None,
+    host: Annotated[str, typer.Option(help="Address to serve the metrics on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Its port.")] = 9109,
+) -> None:
+    """Serve the fleet's metrics for Prometheus, until Ctrl-C."""
+    from hub.exporter.app import export_until_stopped  # noqa: PLC0415 - prometheus_client
+
+    names = tuple(part.strip() for part in servers.split(",") if part.strip())
+    address = FleetAddress(names, credentials, ca, name="robot-bridge hub exporter")
+    asyncio.run(export_until_stopped(address, host, port))
 
 
 app.command("receiver")(receiver)

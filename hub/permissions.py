@@ -44,6 +44,8 @@ def robot(name: str) -> Permissions:
             f"fleet.{name}.res.*",
             f"$KV.{names.STATES}.{name}",
             f"$JS.API.CONSUMER.MSG.NEXT.{consumer}",
+            # Says what time it is at the hub, from 2.10 on: by it a robot knows how old a command is.
+            f"$JS.API.CONSUMER.INFO.{consumer}",
             f"$JS.ACK.{consumer}.>",
         ),
         subscribe=(f"{names.inbox_prefix(name)}.>",),

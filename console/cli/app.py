@@ -59,6 +59,10 @@ COMMANDS: Final[Mapping[str, tuple[str, str]]] = {
         "console.cli.record:record_app",
         "Record on the robot, keep its last minutes, copy recordings to this computer.",
     ),
+    "fleet": (
+        "console.cli.fleet:fleet_app",
+        "Show all robots of a fleet, by its hub, without asking any of them.",
+    ),
     "robots": ("console.cli.robots:robots_app", "List the robots known by name, or change the list."),
 }
 """Each command's function (or group of commands), and the first line of its own help."""

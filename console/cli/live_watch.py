@@ -6,12 +6,13 @@ Nothing blocks it: a key never delays a redraw, and a robot that does not answer
 import asyncio
 import signal
 import time
-from collections.abc import Callable, Coroutine, Iterator, Mapping
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final
 
 from console.cli.keyboard import Key, Keyboard, has_keyboard, keys_in
 from console.cli.live_screen import Fitted, Screen, live_view
+from console.cli.loop_signals import ENDING, handled
 from console.cli.preview_keys import PreviewKeys
 from console.cli.session import Session
 from console.client import DesiredPreview, GatewayError, Outage, WatchedStatus
@@ -19,7 +20,6 @@ from console.client import DesiredPreview, GatewayError, Outage, WatchedStatus
 _MS_PER_S: Final = 1000
 # Messages expire, and ages count up, between two statuses as well.
 _REDRAW_EVERY_S: Final = 1.0
-_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 def watch_on_a_terminal(session: Session, interval_s: float, count: int | None) -> None:
@@ -47,7 +47,7 @@ class _LiveWatch:
 
     async def run(self) -> None:
         """Runs until it is ended."""
-        with _signals(dict.fromkeys(_ENDING, self._ending.set)):
+        with handled(dict.fromkeys(ENDING, self._ending.set)):
             async with self._session.connect_async() as self._robot:
                 self._stream = self._robot.watch_status(self._interval_s)
                 if await self._first_status():
@@ -74,7 +74,7 @@ class _LiveWatch:
             signal.SIGCONT: self._on_continue,
             signal.SIGWINCH: self._changed.set,
         }
-        with self._screen, _signals(signals), self._keys():
+        with self._screen, handled(signals), self._keys():
             self._start(self._read())
             self._start(self._redraw())
             try:
@@ -176,17 +176,3 @@ class _LiveWatch:
     def _on_continue(self) -> None:
         self._screen.take_keyboard()
         self._changed.set()
-
-
-@contextmanager
-def _signals(actions: Mapping[signal.Signals, Callable[[], object]]) -> Iterator[None]:
-    """Handles these signals while the block lasts, except those that the program was started to ignore."""
-    loop = asyncio.get_running_loop()
-    handled = [number for number in actions if signal.getsignal(number) is not signal.SIG_IGN]
-    for number in handled:
-        loop.add_signal_handler(number, actions[number])
-    try:
-        yield
-    finally:
-        for number in handled:
-            loop.remove_signal_handler(number)

@@ -24,7 +24,7 @@ from console.target import parse_target
 
 AnswerT = TypeVar("AnswerT")
 
-_STANDARD_INPUT = "-"
+STANDARD_INPUT = "-"
 _FIRST_PAUSE_S: Final = 0.25
 _LONGEST_PAUSE_S: Final = 1.0
 _RETRIES: Final = 3
@@ -36,7 +36,7 @@ def login(
     target: Annotated[str, typer.Argument(metavar="HOST:PORT", help="Address of its gateway.")],
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="File with the login; - is standard input.")
-    ] = _STANDARD_INPUT,
+    ] = STANDARD_INPUT,
     *,
     ca: Annotated[Path | None, typer.Option(help="Replace the robot's CA certificate only (PEM).")] = None,
     offline: Annotated[bool, typer.Option(help="Store it without contacting the robot.")] = False,
@@ -102,13 +102,24 @@ def _check_free(name: str) -> None:
         )
 
 
-def _read(file: str) -> tuple[str, Credentials]:
+def login_text(file: str) -> str:
+    """Returns the content of a file with a login.
+
+    Args:
+        file: Its name; "-" is standard input.
+
+    Raises:
+        UserError: It can't be read, or is not text.
+    """
     try:
-        text = sys.stdin.read() if file == _STANDARD_INPUT else Path(file).read_text(encoding="utf-8")
+        return sys.stdin.read() if file == STANDARD_INPUT else Path(file).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise UserError(f"{file} can't be read: {reason}", exit_code=ExitCode.USAGE) from error
-    login = parse_login(text)
+
+
+def _read(file: str) -> tuple[str, Credentials]:
+    login = parse_login(login_text(file))
     return ", ".join(word for word in (login.name, login.role) if word), login.credentials
 
 

@@ -127,10 +127,20 @@ def with_session(function: Callable[..., None]) -> Callable[..., None]:
     ) -> None:
         function(session_of(context, target, robot, as_json), **own)
 
+    take_parameters(command, function)
+    return command
+
+
+def take_parameters(command: Callable[..., None], function: Callable[..., None]) -> None:
+    """Gives a command the parameters of the function that it calls, as options before its own.
+
+    Args:
+        command: Takes the context, its own options, and those of the function by name.
+        function: Its first parameter is what the command makes for it.
+    """
     _, *own = inspect.signature(function).parameters.values()
     context, *shared, _ = inspect.signature(command, follow_wrapped=False).parameters.values()
     parameters = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in (context, *own, *shared)]
     # Typer reads options from these two.
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # of any callable
     command.__annotations__ = {each.name: each.annotation for each in parameters}
-    return command

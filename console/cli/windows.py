@@ -1,7 +1,7 @@
 """robotctl view and robotctl monitor: the robot's video, in a window or without one."""
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -106,9 +106,21 @@ def monitor(context: typer.Context, target: TargetOption = None, robot: RobotOpt
 
     Keys: F1 lists all; p preview on or off, 1-3 profile, F9 side panel, f picture only, s save, q quit.
     """
+    open_monitor(lambda: session_of(context, target, robot))
+
+
+def open_monitor(session_of_robot: Callable[[], Session]) -> None:
+    """Opens the window, until it is closed.
+
+    Args:
+        session_of_robot: Called once it is known that there can be a window.
+
+    Raises:
+        UserError: There can be none, or of `session_of_robot`.
+    """
     with requiring_qt():
         from console.window.programs import run_monitor  # noqa: PLC0415 - Qt is needed here only
-    session = session_of(context, target, robot)
+    session = session_of_robot()
 
     def login_of(choice: RobotChoice) -> LoadCredentials:
         name = choice.name if choice.known else None

@@ -28,7 +28,7 @@ def read_credentials(robot: Robot) -> Credentials:
     return Credentials(
         ca_certificate=_read_optional(robot.ca_certificate_file, "CA certificate file"),
         client_certificate=_read_optional(robot.client_certificate_file, "client certificate file"),
-        client_key=_read_private(robot.client_key_file, "client key file") if robot.client_key_file else None,
+        client_key=read_private(robot.client_key_file, "client key file") if robot.client_key_file else None,
         token=_read_token(robot.token_file) if robot.token_file else None,
     )
 
@@ -67,11 +67,16 @@ def read_public(path: Path, what: str) -> bytes:
     return _read(path, what)[0]
 
 
-def _read_optional(path: Path | None, what: str) -> bytes | None:
-    return read_public(path, what) if path else None
+def read_private(path: Path, what: str) -> bytes:
+    """Returns the content of a file with a secret.
 
+    Args:
+        path: The file.
+        what: Its kind, for the message: "token file".
 
-def _read_private(path: Path, what: str) -> bytes:
+    Raises:
+        UserError: It is missing, another user's, or others may read or change it.
+    """
     content, status = _read(path, what)
     if status.st_uid not in (os.geteuid(), 0):
         raise _wrong(f"the {what} {path} belongs to another user", "Make a copy of your own")
@@ -85,8 +90,12 @@ def _read_private(path: Path, what: str) -> bytes:
     return content
 
 
+def _read_optional(path: Path | None, what: str) -> bytes | None:
+    return read_public(path, what) if path else None
+
+
 def _read_token(path: Path) -> str:
-    text = _read_private(path, "token file").decode("ascii", errors="replace").strip()
+    text = read_private(path, "token file").decode("ascii", errors="replace").strip()
     if not text or not _TOKEN_CHARACTERS.issuperset(text):
         # Never the text itself: it may be a token with a typing error in it.
         raise _wrong(f"the token file {path} does not hold one token on one line", _LOGIN)

@@ -17,13 +17,13 @@ from common.errors import ExitCode, UserError
 from console.credentials import Credentials
 from console.printable import printable
 from console.robots.credentials import credentials_directory
+from console.robots.login_text import parse_login_text
 from console.robots.robots_file import Robot, RobotsFile, robots_file_path
 from console.robots.robots_file_edit import put_robot
 
 _HEAD: Final = "# Robot Gateway login 1"
 _WORDS: Final = ("robot", "name", "role", "token")
 _PARTS: Final = ("authority", "certificate", "key")
-_LARGEST: Final = 64 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,27 +47,17 @@ def parse_login(text: str) -> Login:
     Raises:
         UserError: It is not a login, or a part is missing. The line quotes nothing of it.
     """
-    lines = text[:_LARGEST].splitlines()
-    if not lines or lines[0].strip() != _HEAD:
+    found = parse_login_text(text, _HEAD, _WORDS, _PARTS)
+    if found is None:
         raise _not_a_login("it does not begin as one")
-    words: dict[str, str] = {}
-    parts: dict[str, list[str]] = {}
-    part: list[str] | None = None
-    for line in lines[1:]:
-        key, colon, value = line.partition(":")
-        if colon and key in _WORDS:
-            words[key], part = value.strip(), None
-        elif colon and key in _PARTS and not value.strip():
-            part = parts[key] = []
-        elif part is not None:
-            part.append(line)
+    words, parts = found.words, found.blocks
     if "authority" not in parts:
         raise _not_a_login("the robot's certificate authority is not in it")
     if ("certificate" in parts) != ("key" in parts):
         raise _not_a_login("a certificate and its key belong together")
     if not (words.get("token") or "key" in parts):
         raise _not_a_login("neither a token nor a key is in it")
-    pems = {key: ("\n".join(those) + "\n").encode() for key, those in parts.items()}
+    pems = {key: block.encode() for key, block in parts.items()}
     shown = Credentials(
         ca_certificate=pems["authority"],
         client_certificate=pems.get("certificate"),

@@ -8,6 +8,9 @@ from google.protobuf.message import Message
 
 from common.findings import findings_json, good
 from console.cli.error_report import error_as_json
+from console.cli.fleet import recordings_json
+from console.cli.fleet_events import item_json
+from console.cli.fleet_watch import fleet_json
 from console.cli.info import info_json
 from console.cli.record import exported_json
 from console.client import Unreachable
@@ -28,7 +31,14 @@ from console.client.mapping.methods import (
     SUBSCRIBE_EVENTS,
     UPLOAD_RECORDING,
 )
+from console.fleet.model import ReportedState, fleet_rows
+from console.fleet.values import Enrolment, ReceiptCheck, StoredRecording, Unreadable
+from console.fleet.wire import answer_of, items_of, recording_of, state_of
 from console.presentation.json_form import json_form
+from omniseer.fleet.v1.command_pb2 import CommandResult
+from omniseer.fleet.v1.event_pb2 import DroppedEvents, EventBatch, EventItem
+from omniseer.fleet.v1.state_pb2 import RobotState
+from omniseer.fleet.v1.upload_pb2 import StoredRecording as StoredRecordingMessage
 from omniseer.gateway.v1.event_pb2 import Event, EventGap
 from omniseer.gateway.v1.overlay_pb2 import OverlaySnapshot
 from omniseer.gateway.v1.recording_pb2 import (
@@ -88,6 +98,47 @@ def events_document() -> dict[str, Any]:
     }
 
 
+def fleet_list() -> dict[str, Any]:
+    # The robot's name is "first", as every text of a filled message.
+    state = ReportedState(state_of("first", filled(RobotState())), 0)
+    return fleet_json(fleet_rows({"first": Enrolment("first")}, {"first": state}, 1))
+
+
+def fleet_events() -> dict[str, Any]:
+    """An item of each kind at once, as no hub sends it."""
+    dropped = DroppedEvents(first_sequence=1, last_sequence=2)
+    batch = EventBatch(
+        robot="r", run_id="g", first_sequence=1, last_sequence=2, items=[EventItem(dropped=dropped)]
+    )
+    (gap,) = items_of("fleet.r.ev.g.1", batch.SerializeToString(), 0)
+    (unreadable,) = items_of("fleet.r.ev.g.1", b"?", 0)
+    event = {"robot": "r", "received_unix_ms": 0, "event": events_document()["event"]}
+    return {"event": event, "gap": item_json(gap)["gap"], "unreadable": item_json(unreadable)["unreadable"]}
+
+
+def fleet_recordings() -> dict[str, Any]:
+    stored = StoredRecordingMessage()
+    fill(stored)
+    found = recording_of(f"r.{stored.recording.id}", stored.SerializeToString())
+    assert not isinstance(found, Unreadable)
+    recording, files, _ = found
+    shown = StoredRecording(
+        robot="r",
+        recording=recording,
+        files=files,
+        receipt=ReceiptCheck.VALID,
+        verified_unix_ms=1,
+        location="",
+    )
+    return recordings_json([shown, Unreadable(robot="r", problem="")])
+
+
+def fleet_command() -> dict[str, Any]:
+    result = CommandResult(robot="r", command_id="c")
+    answer = answer_of("fleet.r.res.c", result.SerializeToString())
+    return {"ok": True, **json_form(answer)}
+
+
 @pytest.mark.parametrize(
     ("heading", "document"),
     [
@@ -139,6 +190,10 @@ def events_document() -> dict[str, Any]:
             id="record cancel-upload",
         ),
         pytest.param("record export --json", {"ok": True, **exported_json(EXPORTED)}, id="record export"),
+        pytest.param("fleet list --json", fleet_list(), id="fleet list"),
+        pytest.param("fleet events --json", fleet_events(), id="fleet events"),
+        pytest.param("fleet recordings --json", fleet_recordings(), id="fleet recordings"),
+        pytest.param("fleet command --json", fleet_command(), id="fleet command"),
         pytest.param("doctor --json", findings_json([good("tcp", "answers")]), id="doctor"),
     ],
 )

@@ -22,6 +22,7 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     "status": (dict,),
     "preview": (dict,),
     "recording": (dict,),
+    "event": (dict,),
 }
 
 
@@ -101,6 +102,10 @@ def _referred(said: Documented) -> dict[str, Type]:
             more |= {f"{key}.{inner}": type_ for inner, type_ in documented("status --json").items()}
         elif kind.words == "recording":
             more |= {f"{key}.{inner}": type_ for inner, type_ in documented("record show --json").items()}
+        elif kind.words == "event":
+            said_of_events = documented("events --json").items()
+            inner_keys = {inner: type_ for inner, type_ in said_of_events if inner.startswith("event.")}
+            more |= {f"{key}.{inner.removeprefix('event.')}": type_ for inner, type_ in inner_keys.items()}
         elif kind.words == "preview" or (key, kind.words) == ("gateway", "object"):
             status = documented("status --json")
             more |= {inner: type_ for inner, type_ in status.items() if inner.startswith(f"{key}.")}

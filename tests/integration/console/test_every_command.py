@@ -15,7 +15,7 @@ from tests.support.robotctl_docs import DOCS
 RECORDS = ("start", "stop", "snapshot", "list", "show", "pin", "unpin", "delete", "export")
 GROUPS = {"preview": ("on", "off"), "record": RECORDS, "robots": ("add", "remove", "default")}
 # They talk to a file, or show a window, which has no answer to print.
-WITHOUT_A_ROBOT = {"robots", "login", "logout"}
+WITHOUT_A_ROBOT = {"robots", "login", "logout", "fleet"}
 WINDOW = {"monitor"}
 # Without further words these would not end by themselves.
 WORDS = {

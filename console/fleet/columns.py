@@ -1,0 +1,162 @@
+"""The columns of the fleet's table, in the order of an operator's interest. Pure text with styles."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from console.client.results import FaultSeverity, RecordingCopyState
+from console.fleet.model import FleetSummary, worst_fault
+from console.fleet.values import FleetRow, RobotState
+from console.presentation.formatting import UNKNOWN, age, joined, plural, quantity, size
+from console.presentation.severity_style import FAULT_STYLES, HEALTH_STYLES, SeverityStyle
+from console.presentation.value_style import CHARGE_PERCENT, DISK_PERCENT, Judgement
+from fleet.standing import Standing
+
+STANDING_STYLES: Final[Mapping[Standing, SeverityStyle]] = {
+    Standing.UP: SeverityStyle.GOOD,
+    Standing.NO_GATEWAY: SeverityStyle.BAD,
+    Standing.AWAY: SeverityStyle.WARNING,
+    Standing.NEVER_SEEN: SeverityStyle.QUIET,
+    Standing.REVOKED: SeverityStyle.QUIET,
+    Standing.NOT_ENROLLED: SeverityStyle.WARNING,
+    Standing.UNREADABLE: SeverityStyle.BAD,
+}
+LONGEST_TEXT: Final = 60
+"""Characters of a robot's own words in a cell: one robot must not push the others off the screen."""
+_PERCENT: Final = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A text and its style; None is the terminal's own."""
+
+    text: str
+    style: SeverityStyle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column.
+
+    Args:
+        title: Its heading.
+        width: Characters that it takes at the most, as a rule.
+        cell: Its cell of a row.
+        right: Whether it is aligned right, as numbers are.
+        wide: Whether only a wide terminal shows it.
+    """
+
+    title: str
+    width: int
+    cell: Callable[[FleetRow], Cell]
+    right: bool = False
+    wide: bool = False
+
+
+def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
+    """Returns a text of at most so many characters, with an ellipsis where something is missing."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def columns_for(width: int) -> tuple[Column, ...]:
+    """Returns the columns for a terminal of so many characters: all, or those that matter most."""
+    total = sum(column.width + _GAP for column in COLUMNS)
+    return COLUMNS if total <= width else tuple(column for column in COLUMNS if not column.wide)
+
+
+def summary_line(found: FleetSummary) -> str:
+    """Returns the fleet on one line."""
+    return joined(
+        f"{found.up} of {plural(found.robots, 'robot')} up",
+        f"{found.silent} silent" if found.silent else "",
+        f"{found.with_errors} with errors" if found.with_errors else "",
+        f"{found.with_warnings} with warnings" if found.with_warnings else "",
+        plural(found.uploads, "upload") if found.uploads else "",
+        f"{plural(found.outbox_events, 'event')} waiting" if found.outbox_events else "",
+        f"{plural(found.events_dropped, 'event')} dropped" if found.events_dropped else "",
+    )
+
+
+def _standing(row: FleetRow) -> Cell:
+    return Cell(row.standing.value.upper(), STANDING_STYLES[row.standing])
+
+
+def _health(row: FleetRow) -> Cell:
+    if row.problem:
+        return Cell(row.problem, SeverityStyle.BAD)
+    state = row.state
+    if state is None:
+        return Cell(UNKNOWN, SeverityStyle.QUIET)
+    worst = worst_fault(state)
+    if worst is None:
+        return Cell(
+            shortened(state.summary or state.health.value), _last_known(row, HEALTH_STYLES[state.health])
+        )
+    others = f" (+{state.fault_count - 1})" if state.fault_count > 1 else ""
+    word = "" if worst.severity is FaultSeverity.UNKNOWN else f"{worst.severity.value}: "
+    text = shortened(f"{word}{worst.message or worst.fault_id}", LONGEST_TEXT - len(others))
+    return Cell(f"{text}{others}", _last_known(row, FAULT_STYLES[worst.severity]))
+
+
+def _battery(state: RobotState) -> Cell:
+    found = CHARGE_PERCENT.judge(state.battery_percent)
+    charging = " +" if state.charging else ""
+    return _judged(found, f"{quantity(state.battery_percent, '%', 0)}{charging}")
+
+
+def _disk(state: RobotState) -> Cell:
+    return _judged(DISK_PERCENT.judge(state.disk_used_percent), quantity(state.disk_used_percent, "%", 0))
+
+
+def _uploads(state: RobotState) -> Cell:
+    if not state.uploads:
+        return Cell(str(state.upload_count or UNKNOWN), SeverityStyle.QUIET)
+    first = state.uploads[0]
+    done = f" {min(first.copy.bytes_done, first.size) * _PERCENT // first.size} %" if first.size else ""
+    rate = f" {size(first.bytes_per_s)}/s" if first.bytes_per_s else ""
+    more = f" (+{state.upload_count - 1})" if state.upload_count > 1 else ""
+    stuck = first.copy.state in (RecordingCopyState.FAILED, RecordingCopyState.PAUSED)
+    return Cell(
+        f"{first.copy.state.value}{done}{rate}{more}", SeverityStyle.WARNING if stuck else SeverityStyle.GOOD
+    )
+
+
+def _outbox(state: RobotState) -> Cell:
+    dropped = f", {state.events_dropped} dropped" if state.events_dropped else ""
+    style = SeverityStyle.WARNING if dropped else SeverityStyle.QUIET
+    return Cell(f"{state.outbox_events or UNKNOWN}{dropped}", style)
+
+
+def _judged(found: Judgement, text: str) -> Cell:
+    return Cell(joined(text, found.word), None if found.style is SeverityStyle.GOOD else found.style)
+
+
+def _of_state(cell: Callable[[RobotState], Cell]) -> Callable[[FleetRow], Cell]:
+    """Returns a cell of the robot's state, which is quiet where that is only the last known one."""
+
+    def shown(row: FleetRow) -> Cell:
+        if row.state is None:
+            return Cell(UNKNOWN, SeverityStyle.QUIET)
+        found = cell(row.state)
+        return Cell(found.text, _last_known(row, found.style))
+
+    return shown
+
+
+def _last_known(row: FleetRow, style: SeverityStyle | None) -> SeverityStyle | None:
+    return style if row.standing is Standing.UP else SeverityStyle.QUIET
+
+
+_GAP: Final = 2
+COLUMNS: Final = (
+    Column("robot", 16, lambda row: Cell(shortened(row.robot))),
+    Column("", 12, _standing),
+    Column("since", 11, lambda row: Cell(age(row.since_ms)), right=True),
+    Column("health", 36, _health),
+    Column("battery", 8, _of_state(_battery), right=True),
+    Column("disk", 5, _of_state(_disk), right=True, wide=True),
+    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), wide=True),
+    Column("uploads", 20, _of_state(_uploads), wide=True),
+    Column("outbox", 8, _of_state(_outbox), right=True, wide=True),
+    Column("seen", 11, lambda row: Cell(age(row.last_seen_ms), SeverityStyle.QUIET), right=True),
+)

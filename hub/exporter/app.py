@@ -1,0 +1,99 @@
+"""The exporter's program: follows the hub's buckets, and serves the metrics."""
+
+import asyncio
+import signal
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from typing import Final
+
+from common.metrics_endpoint import serving_metrics
+from fleet.clock import HubClock, read_clock
+from fleet.connection import FleetAddress, Hub, connect
+from fleet.errors import HubError
+from fleet.names import ROBOTS, STATES
+from hub.exporter.collector import FleetCollector
+
+_MS_PER_S: Final = 1000
+_CLOCK_AGAIN_AFTER_S: Final = 60.0
+_FIRST_CLOCK_WITHIN_S: Final = 2.0
+"""Without an answer it is tried again so soon: until then, this computer's clock counts."""
+
+
+class FleetExporter:
+    """Follows the hub into a collector. Made for one connection.
+
+    Args:
+        hub: The hub; it need not answer yet.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._clock = HubClock(time.time() - time.monotonic())
+        self.collector = FleetCollector(self._now_unix_ms, lambda: hub.link.connected)
+
+    async def run(self) -> None:
+        """Follows until it is cancelled, over all lost connections."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._robots())
+            tasks.create_task(self._states())
+            tasks.create_task(self._keep_time())
+
+    def _now_unix_ms(self) -> int:
+        # The clock is read again and again.
+        return self._clock.unix_ms()
+
+    async def _robots(self) -> None:
+        async for entry in self._hub.watch_bucket(ROBOTS):
+            self.collector.take_robot(entry.key, entry.value, deleted=entry.deleted)
+
+    async def _states(self) -> None:
+        async for entry in self._hub.watch_bucket(STATES):
+            received = round(entry.unix_s * _MS_PER_S)
+            self.collector.take_state(entry.key, entry.value, received, deleted=entry.deleted)
+
+    async def _keep_time(self) -> None:
+        while True:
+            pause_s = _FIRST_CLOCK_WITHIN_S
+            # While the hub does not answer, the last reading counts on; `hub_connected` says so.
+            with suppress(HubError):
+                self._clock = await read_clock(self._hub)
+                pause_s = _CLOCK_AGAIN_AFTER_S
+            await asyncio.sleep(pause_s)
+
+
+@asynccontextmanager
+async def exporting(address: FleetAddress, host: str, port: int) -> AsyncIterator[int]:
+    """Serves the fleet's metrics until the block ends; yields the bound port.
+
+    Args:
+        address: Of the hub.
+        host: An address of this machine.
+        port: 0 for any free one.
+
+    Raises:
+        UserError: The address can't be bound.
+    """
+    async with connect(address) as hub:
+        exporter = FleetExporter(hub)
+        following = asyncio.create_task(exporter.run())
+        try:
+            async with serving_metrics(exporter.collector.text, host, port) as bound:
+                yield bound
+        finally:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+
+
+async def export_until_stopped(address: FleetAddress, host: str, port: int) -> None:
+    """Serves until SIGINT or SIGTERM.
+
+    Raises:
+        UserError: The address can't be bound.
+    """
+    stopped = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stopped.set)
+    async with exporting(address, host, port):
+        await stopped.wait()

@@ -1,0 +1,190 @@
+"""The metrics by name. docs/fleet.md explains each; a test holds the page and this module together."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily as CounterFamily
+from prometheus_client.core import GaugeMetricFamily as Gauge
+from prometheus_client.core import Metric
+from prometheus_client.registry import Collector
+
+from fleet.enrolment import is_revoked
+from fleet.names import ROBOT_NAME
+from fleet.reading import NotReadableError, robot_state
+from fleet.standing import Evidence, Standing, standing
+from omniseer.fleet.v1.state_pb2 import RobotState
+from omniseer.gateway.v1 import fault_pb2
+
+_PREFIX: Final = "robot_fleet"
+_MS_PER_S: Final = 1000
+MOST_ROBOTS: Final = 10_000
+"""Further ones get no metrics: Prometheus keeps a time series for each name that it has ever seen."""
+_SEVERITIES: Final[Mapping["fault_pb2.FaultSeverity.ValueType", str]] = {
+    fault_pb2.FAULT_SEVERITY_INFO: "info",
+    fault_pb2.FAULT_SEVERITY_WARNING: "warning",
+    fault_pb2.FAULT_SEVERITY_ERROR: "error",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SeenState:
+    """The newest value of a robot's key.
+
+    Args:
+        state: None if it is not readable.
+        received_unix_ms: When the hub took it, by the hub's clock.
+    """
+
+    state: RobotState | None
+    received_unix_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSample:
+    """An enrolled robot at one instant.
+
+    Args:
+        name: Its name.
+        standing: Where it stands.
+        age_s: Age of its newest state; None without one.
+        state: None if it was never seen or is not readable.
+    """
+
+    name: str
+    standing: Standing
+    age_s: float | None
+    state: RobotState | None
+
+
+@dataclass(eq=False)
+class FleetCollector(Collector):
+    """Keeps what the hub has about enrolled robots, and collects all metrics at one instant.
+
+    Attributes:
+        now_unix_ms: Returns the hub's time.
+        connected: Returns whether the hub answers.
+    """
+
+    now_unix_ms: Callable[[], int]
+    connected: Callable[[], bool]
+    _enrolled: dict[str, bool] = field(default_factory=dict)
+    _states: dict[str, SeenState] = field(default_factory=dict)
+
+    def take_robot(self, name: str, entry: bytes, *, deleted: bool) -> None:
+        """Takes an entry of the hub's list."""
+        if deleted:
+            self._enrolled.pop(name, None)
+        elif ROBOT_NAME.fullmatch(name) and (name in self._enrolled or len(self._enrolled) < MOST_ROBOTS):
+            self._enrolled[name] = is_revoked(entry)
+
+    def take_state(self, name: str, value: bytes, received_unix_ms: int, *, deleted: bool) -> None:
+        """Takes a robot's newest state."""
+        if deleted:
+            self._states.pop(name, None)
+        elif name in self._states or len(self._states) < MOST_ROBOTS:
+            self._states[name] = SeenState(_state(name, value), received_unix_ms)
+
+    def text(self) -> bytes:
+        """Returns the metrics in Prometheus' text format."""
+        registry = CollectorRegistry()
+        registry.register(self)
+        return generate_latest(registry)
+
+    def describe(self) -> list[Metric]:
+        """Returns nothing: without this method, registering would collect."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Yields every family."""
+        robots = [self._sample(name) for name in sorted(self._enrolled)]
+        yield Gauge(f"{_PREFIX}_hub_connected", "1 while the hub answers.", value=self.connected())
+        yield _standings(robots)
+        current = [robot for robot in robots if robot.standing is not Standing.REVOKED]
+        up = {robot.name: float(robot.standing is Standing.UP) for robot in current}
+        yield _gauge("up", "1 while bridge and gateway are up.", up)
+        ages = {robot.name: robot.age_s for robot in current if robot.age_s is not None}
+        yield _gauge("last_seen_seconds", "Age of the newest state, by the hub's clock.", ages)
+        yield from _of_states({robot.name: robot.state for robot in current if robot.state})
+
+    def _sample(self, name: str) -> RobotSample:
+        seen = self._states.get(name)
+        age_s = max(0, self.now_unix_ms() - seen.received_unix_ms) / _MS_PER_S if seen else None
+        state = seen.state if seen else None
+        evidence = Evidence(
+            enrolled=True,
+            revoked=self._enrolled[name],
+            age_s=age_s,
+            readable=state is not None,
+            gateway_reachable=state is not None and state.gateway_reachable,
+        )
+        return RobotSample(name, standing(evidence), age_s, state)
+
+
+def _standings(robots: list[RobotSample]) -> Metric:
+    counts = Counter(robot.standing for robot in robots)
+    family = Gauge(f"{_PREFIX}_robots", "Enrolled robots, by where they stand.", labels=("standing",))
+    for each in Standing:
+        if each is not Standing.NOT_ENROLLED:
+            family.add_metric((each.value,), counts[each])
+    return family
+
+
+def _of_states(states: Mapping[str, RobotState]) -> Iterator[Metric]:
+    """What robots last reported, those that are away included: `up` says which."""
+    yield _gauge("ready", "1 while the robot can take work.", {name: it.ready for name, it in states.items()})
+    faults = Gauge(
+        f"{_PREFIX}_faults", "Active faults by severity, of the 8 worst.", labels=("robot", "severity")
+    )
+    for name, state in states.items():
+        counts = Counter(fault.severity for fault in state.faults)
+        for number, severity in _SEVERITIES.items():
+            faults.add_metric((name, severity), counts[number])
+    yield faults
+    yield _gauge(
+        "battery_percent",
+        "State of charge; absent if it is not known.",
+        {name: it.battery_percent for name, it in states.items() if it.HasField("battery_percent")},
+    )
+    yield _gauge(
+        "disk_used_percent",
+        "Used part of the robot's disk; absent if it is not known.",
+        {name: it.disk_used_percent for name, it in states.items() if it.HasField("disk_used_percent")},
+    )
+    yield _gauge(
+        "outbox_events",
+        "Events that wait in the robot.",
+        {name: it.outbox_events for name, it in states.items()},
+    )
+    yield _gauge(
+        "uploads", "Uploads that run or wait.", {name: it.upload_count for name, it in states.items()}
+    )
+    yield _gauge(
+        "recordings_to_copy",
+        "Recordings that still have to be copied.",
+        {name: it.recordings_to_copy for name, it in states.items()},
+    )
+    rates = {name: sum(each.bytes_per_s for each in it.uploads) for name, it in states.items()}
+    yield _gauge("upload_bytes_per_second", "At present.", rates)
+    dropped = CounterFamily(
+        f"{_PREFIX}_events_dropped", "Events dropped since the robot's outbox was made.", labels=("robot",)
+    )
+    for name, state in states.items():
+        dropped.add_metric((name,), state.events_dropped)
+    yield dropped
+
+
+def _gauge(name: str, what: str, values: Mapping[str, float]) -> Metric:
+    family = Gauge(f"{_PREFIX}_{name}", what, labels=("robot",))
+    for robot, value in values.items():
+        family.add_metric((robot,), value)
+    return family
+
+
+def _state(name: str, value: bytes) -> RobotState | None:
+    try:
+        return robot_state(name, value)
+    except NotReadableError:
+        return None
