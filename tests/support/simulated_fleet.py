@@ -85,7 +85,7 @@ async def simulated_fleet(servers: Sequence[str], count: int, batch: int = 1) ->
 
 
 async def _settled(hub: Hub, expected: int) -> int:
-    """The number of messages in the stream. A new leader has all that was acknowledged, but has to apply it."""
+    """The number of messages in the stream. A new leader still has to apply what was acknowledged."""
     deadline = time.monotonic() + _SETTLED_WITHIN_S
     while True:
         try:
