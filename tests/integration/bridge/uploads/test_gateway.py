@@ -19,7 +19,8 @@ async def test_what_the_gateway_exports_is_what_the_store_has(
     ground: Ground, tmp_path_factory: pytest.TempPathFactory, kind: pb.RecordingKind.ValueType
 ) -> None:
     double = RecorderDouble()
-    double.add(FILES, id="one", kind=kind)
+    double.add(FILES, id="one")
+    double.recordings["one"].kind = kind
     async with (
         recording_robot(tmp_path_factory.mktemp("g"), double) as robot,
         AsyncGatewayClient(f"127.0.0.1:{robot.port}") as client,
