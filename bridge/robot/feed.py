@@ -69,8 +69,8 @@ class Feed:
         items = self._up_to(before, reason)
         here = self.position
         # In a new outbox all is left out that was before it: CaughtUp ends that.
-        if here is None or (here.run_id == event.run_id and event.sequence <= here.sequence):
-            return []
+        if here is None or event.sequence <= here.sequence:
+            return items
         self.position = Position(event.run_id, event.sequence)
         return [*items, _event(event)]
 

@@ -172,6 +172,14 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ),
         ("console/steering.py", (*HEAVY, *WIRE, "asyncio", "time")),
         ("console/window/", ("console.cli",)),
+        *(
+            (f"bridge/{name}.py", (*HEAVY, *WIRE, "omniseer", "asyncio", "time", "fleet"))
+            for name in ("values", "lifecycle", "commands/ages")
+        ),
+        ("bridge/robot/feed.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
+        ("bridge/state.py", ("grpc", "asyncio", "time", "fleet", "bridge.outbox")),
+        ("bridge/outbox/", (*HEAVY, *WIRE, "omniseer", "fleet", "bridge.robot", "bridge.commands")),
+        ("bridge/commands/judgement.py", ("grpc", "asyncio", "time", "fleet.connection", "bridge.outbox")),
     ],
 )
 def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) -> None:
@@ -197,6 +205,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("PySide6", ("console/window/",)),
         ("sdl2", ("console/gamepad/sdl.py",)),
         ("mcap", ("recorder/mcap/",)),
+        ("sqlite3", ("bridge/outbox/",)),
         ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
         ("nats", ("fleet/session.py",)),

@@ -32,7 +32,7 @@ from tests.support.running_bridge import BridgeProgram, Received, bridge_program
 _KILLS = int(os.environ.get("BRIDGE_KILLS", "15"))
 
 
-async def all_there(hub: Hub, gateway: EventServer, within_s: float = 30.0) -> Received:
+async def all_there(hub: Hub, gateway: EventServer, within_s: float = 60.0) -> Received:
     """Waits until everything is there or announced."""
 
     def adds_up(found: Received) -> bool:
@@ -44,7 +44,7 @@ async def all_there(hub: Hub, gateway: EventServer, within_s: float = 30.0) -> R
 async def begin(bridge: BridgeProgram, hub: Hub) -> None:
     """Starts a bridge; what happens from now on is after what its new outbox does not know."""
     await asyncio.to_thread(bridge.start)
-    await eventually(lambda: received(hub), lambda found: found.batches, "it has begun")
+    await eventually(lambda: received(hub), lambda found: found.batches, "it has begun", 40.0)
 
 
 async def kept_up(bridge: BridgeProgram, least: int) -> None:
@@ -53,7 +53,7 @@ async def kept_up(bridge: BridgeProgram, least: int) -> None:
     def enough(status: cloud_pb2.CloudStatus) -> bool:
         return status.outbox_events + status.events_dropped >= least
 
-    await eventually(lambda: status_of(bridge), enough, "the bridge keeps up")
+    await eventually(lambda: status_of(bridge), enough, "the bridge keeps up", 40.0)
 
 
 async def status_of(bridge: BridgeProgram) -> cloud_pb2.CloudStatus:
@@ -208,6 +208,7 @@ async def test_an_outbox_that_was_cut_costs_what_it_says(
                     lambda: status_of(bridge),
                     lambda status: status.outbox_events >= 100,
                     "the outbox has them",
+                    40.0,
                 )
                 bridge.kill()
                 os.truncate(bridge.root / "outbox.db", length)
@@ -236,6 +237,7 @@ async def test_a_disk_that_is_full_is_a_fault_and_then_a_gap(
             lambda: status_of(bridge),
             lambda status: status.state == cloud_pb2.CLOUD_STATE_FAULTED and "full" in status.last_error,
             "it says what is wrong",
+            40.0,
         )
         gateway.happen(1100)
         filled.unlink()

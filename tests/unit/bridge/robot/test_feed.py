@@ -1,7 +1,7 @@
 """What the gateway's stream becomes in the outbox's order."""
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge.robot.feed import MOST_EVENT_BYTES, Feed, FeedError
@@ -95,6 +95,7 @@ _RESPONSES = st.builds(
 
 
 @given(st.lists(_RESPONSES, max_size=30))
+@example([event(0, "b")])
 def test_whatever_comes_there_is_no_hole_and_nothing_twice(responses: list[SubscribeEventsResponse]) -> None:
     feed = Feed(Position("a", 0))
     here = feed.position

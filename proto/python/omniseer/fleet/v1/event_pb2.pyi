@@ -36,7 +36,7 @@ class _DropReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DropReason
     DROP_REASON_DISK: _DropReason.ValueType  # 3
     """The bridge could not write them to its disk."""
     DROP_REASON_OUTBOX_LOST: _DropReason.ValueType  # 4
-    """The outbox was damaged, or was deleted."""
+    """The outbox was damaged, was deleted, or is new. Some of them may have arrived before that."""
 
 class DropReason(_DropReason, metaclass=_DropReasonEnumTypeWrapper):
     """Why events are missing."""
@@ -50,7 +50,7 @@ DROP_REASON_NO_LONGER_KEPT: DropReason.ValueType  # 2
 DROP_REASON_DISK: DropReason.ValueType  # 3
 """The bridge could not write them to its disk."""
 DROP_REASON_OUTBOX_LOST: DropReason.ValueType  # 4
-"""The outbox was damaged, or was deleted."""
+"""The outbox was damaged, was deleted, or is new. Some of them may have arrived before that."""
 Global___DropReason: _TypeAlias = DropReason  # noqa: Y015
 
 @_typing.final
@@ -71,7 +71,7 @@ class EventBatch(_message.Message):
     run_id: _builtins.str
     """The run of the robot's gateway to which all of them belong."""
     first_sequence: _builtins.int
-    """Sequence of the first item."""
+    """Sequence of the first item; 0, the place before the first event, if that is a gap with earlier_run_incomplete."""
     last_sequence: _builtins.int
     """Sequence of the last item."""
     @_builtins.property
@@ -143,7 +143,7 @@ class DroppedEvents(_message.Message):
     first_sequence: _builtins.int
     """The first one's sequence."""
     last_sequence: _builtins.int
-    """The last one's sequence."""
+    """The last one's sequence; first_sequence - 1 if none of this run is missing, only an earlier run's."""
     worst_severity: _fault_pb2.FaultSeverity.ValueType
     """The highest severity among them. Unspecified: not known."""
     earlier_run_incomplete: _builtins.bool

@@ -1,0 +1,57 @@
+"""The queue of uploads over a restart."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bridge.outbox.outbox import Outbox, outbox
+from bridge.outbox.uploads import StoredUploads
+from bridge.uploading import STATES
+from bridge.uploads.queue import Priority, State, Upload
+from omniseer.gateway.v1.recording_pb2 import RecordingCopyState
+
+UPLOAD = Upload(
+    recording_id="r1",
+    label="door",
+    priority=Priority.PINNED,
+    started_unix_ms=5,
+    size=7,
+    sha256=b"\x01\xff",
+    state=State.FAILED,
+    reason="why",
+    bytes_done=3,
+    failures=2,
+    due_s=9.0,
+)
+
+
+async def test_rows_outlive_the_program(tmp_path: Path) -> None:
+    async with outbox(tmp_path, 64 << 20) as kept:
+        await StoredUploads(kept).put_upload(UPLOAD)
+        await StoredUploads(kept).put_upload(replace(UPLOAD, recording_id="r2"))
+        await StoredUploads(kept).delete_upload("r2")
+    async with outbox(tmp_path, 64 << 20) as kept:
+        assert await StoredUploads(kept).uploads() == [replace(UPLOAD, due_s=0.0)]
+
+
+@pytest.mark.parametrize("row", ["", "{}", "[]", '{"state": "QUEUED"}', '{"priority": 1}'])
+async def test_a_row_that_is_none_is_left_out(tmp_path: Path, row: str) -> None:
+    async with outbox(tmp_path, 64 << 20) as kept:
+        await kept.put_upload_row("r1", row)
+        assert await StoredUploads(kept).uploads() == []
+
+
+async def test_a_disk_that_fails_is_an_error_of_the_disk(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    kept = Outbox(tmp_path / "file" / "outbox", 64 << 20)
+    with pytest.raises(OSError, match="file"):
+        await StoredUploads(kept).put_upload(UPLOAD)
+    assert kept.error
+    assert kept.refusals == 1
+    await kept.close()
+
+
+def test_every_state_has_its_word_in_the_schema() -> None:
+    assert set(STATES) == set(State)
+    assert set(STATES.values()) == set(RecordingCopyState.values())
