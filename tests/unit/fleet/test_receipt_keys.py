@@ -77,7 +77,9 @@ def test_the_files_of_keys(tmp_path: Path) -> None:
         read_signer(public)
 
 
-@pytest.mark.parametrize("content", [b"", b"zz", b"ab" * 31, b"AB" * 32, b"-----BEGIN PUBLIC KEY-----", b"\xff"])
+@pytest.mark.parametrize(
+    "content", [b"", b"zz", b"ab" * 31, b"AB" * 32, b"-----BEGIN PUBLIC KEY-----", b"\xff"]
+)
 def test_files_with_something_else_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "receipts"
     path.write_bytes(content)
