@@ -22,6 +22,7 @@ SERVICES: Final = (
     Service(names.RESULT_SUBJECTS),
     Service(f"$KV.{names.STATES}.*"),
     Service(names.UPLOAD_SUBJECTS, many=True),
+    Service(f"$JS.API.CONSUMER.INFO.{names.COMMANDS}.*"),
     Service(f"$JS.API.CONSUMER.MSG.NEXT.{names.COMMANDS}.*", many=True),
     Service(f"$JS.ACK.{names.COMMANDS}.*.>"),
 )

@@ -7,7 +7,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FROM_PYPROJECT = ["dev", "gateway", "preview", "recorder", "console", "ros-wheels", "preview-image"]
+FROM_PYPROJECT = [
+    "dev",
+    "gateway",
+    "preview",
+    "recorder",
+    "bridge",
+    "hub",
+    "console",
+    "ros-wheels",
+    "preview-image",
+]
 
 
 @pytest.fixture
