@@ -66,10 +66,13 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
 
 FROM rclpy-${ROS} AS built
 COPY pyproject.toml README.md LICENSE ./
+COPY bridge bridge
 COPY common common
 COPY console console
 COPY drive drive
+COPY fleet fleet
 COPY gateway gateway
+COPY hub hub
 COPY practice practice
 COPY preview preview
 COPY recorder recorder

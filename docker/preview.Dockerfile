@@ -31,10 +31,13 @@ RUN --mount=type=secret,id=ca --mount=type=secret,id=index . docker/fetching.sh 
  && .cache/tools/bin/uv pip install --quiet --require-hashes --no-deps --compile-bytecode --python .venv/bin/python \
       -r requirements/preview-image.txt
 COPY pyproject.toml README.md LICENSE ./
+COPY bridge bridge
 COPY common common
 COPY console console
 COPY drive drive
+COPY fleet fleet
 COPY gateway gateway
+COPY hub hub
 COPY practice practice
 COPY preview preview
 COPY recorder recorder

@@ -339,6 +339,14 @@ class Hub:
         """
         return await self._open().api(f"$JS.API.{call}", request, timeout_s)
 
+    async def consumer_info(self, subject: str, timeout_s: float = REQUEST_TIMEOUT_S) -> dict[str, Any]:
+        """Requests JetStream's ConsumerInfo by a subject that the account has it under.
+
+        Raises:
+            HubError: with JetStream's code.
+        """
+        return await self._open().api(subject, None, timeout_s)
+
     async def run(self) -> None:
         """Keeps a connection until it is cancelled."""
         backoff = Backoff(FIRST_PAUSE_S, LONGEST_PAUSE_S)

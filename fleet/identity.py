@@ -125,10 +125,13 @@ class Service:
     Attributes:
         subject: of the requests.
         many: whether a request has several answers.
+        local: the subject in the importing account, with $1 for the first wildcard; empty for the same.
+            Needed where that account serves the same subject itself, as each does with JetStream's API.
     """
 
     subject: str
     many: bool = False
+    local: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +177,13 @@ def account_jwt(operator: Key, public: str, account: Account) -> str:
             for each in account.exports
         ],
         "imports": [
-            {"name": each.subject, "subject": each.subject, "account": exporter, "type": "service"}
+            {
+                "name": each.subject,
+                "subject": each.subject,
+                "account": exporter,
+                "type": "service",
+                **({"local_subject": each.local} if each.local else {}),
+            }
             for exporter, each in account.imports
         ],
         "revocations": dict(account.revoked),

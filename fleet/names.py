@@ -42,6 +42,11 @@ def result_subject(robot: str, command_id: str) -> str:
     return f"fleet.{robot}.res.{command_id}"
 
 
+def time_subject(robot: str) -> str:
+    """Returns the subject of a robot's request for the hub's time: ConsumerInfo of its commands."""
+    return f"fleet.{robot}.time"
+
+
 def upload_subject(robot: str, request: str) -> str:
     """Returns the subject of a request about an upload: "begin_file", for example."""
     return f"fleet.{robot}.up.{request}"

@@ -22,7 +22,8 @@ SERVICES: Final = (
     Service(names.RESULT_SUBJECTS),
     Service(f"$KV.{names.STATES}.*"),
     Service(names.UPLOAD_SUBJECTS, many=True),
-    Service(f"$JS.API.CONSUMER.INFO.{names.COMMANDS}.*"),
+    # Under a name of its own: the robots' account, which stores nothing, answers JetStream's subject itself.
+    Service(f"$JS.API.CONSUMER.INFO.{names.COMMANDS}.*", local="fleet.$1.time"),
     Service(f"$JS.API.CONSUMER.MSG.NEXT.{names.COMMANDS}.*", many=True),
     Service(f"$JS.ACK.{names.COMMANDS}.*.>"),
 )
@@ -46,7 +47,7 @@ def robot(name: str) -> Permissions:
             f"$KV.{names.STATES}.{name}",
             f"$JS.API.CONSUMER.MSG.NEXT.{consumer}",
             # Says what time it is at the hub, from 2.10 on: by it a robot knows how old a command is.
-            f"$JS.API.CONSUMER.INFO.{consumer}",
+            f"fleet.{name}.time",
             f"$JS.ACK.{consumer}.>",
         ),
         subscribe=(f"{names.inbox_prefix(name)}.>",),

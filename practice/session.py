@@ -24,6 +24,7 @@ from drive.values import Command, LeaseEnd
 from practice import wire
 from practice.lane import Lane, LaneTransport, Way
 from practice.network import Network
+from practice.no_recordings import NoRecordings
 from practice.robot import PracticeRobot
 
 ResultT = TypeVar("ResultT")
@@ -34,7 +35,7 @@ _REPORT_EVERY_S: Final = 0.05
 _ANSWER_WITHIN_S: Final = 1.5
 
 
-class PracticeSession:
+class PracticeSession(NoRecordings):
     """Serves one window while its `async with` block lasts.
 
     Args:

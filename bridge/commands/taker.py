@@ -15,7 +15,7 @@ from bridge.values import OutboxError
 from common.token_bucket import TokenBucket
 from fleet.connection import Delivery, Hub
 from fleet.errors import HubError
-from fleet.names import COMMANDS
+from fleet.names import COMMANDS, time_subject
 
 _log = logging.getLogger(__name__)
 
@@ -132,7 +132,7 @@ class CommandTaker:
         fresh = self._time is not None and now_s - self._time.asked_s < _TIME_GOOD_S
         if not fresh or connections != self._time_of:
             try:
-                info = await self._hub.api(f"CONSUMER.INFO.{COMMANDS}.{self._robot}")
+                info = await self._hub.consumer_info(time_subject(self._robot))
             except HubError as error:
                 _log.warning("the hub does not say what time it is: %s", error)
                 info = None

@@ -30,7 +30,7 @@ class UploadSettings(Section):
     """When, "22:00-06:00" for example, by the local time of the robot's computer. Empty: at all times."""
     only_while_charging: bool = False
     store_hosts: tuple[Annotated[str, Field(pattern=_HOST)], ...] = Field(default=(), max_length=_MOST)
-    """HOST or HOST:PORT of the store, from the robot's enrolment. Recordings are sent nowhere else, whatever
+    """HOST or HOST:PORT of the fleet's store. Recordings are sent nowhere else, whatever
     URL the hub returns. Empty: nothing can be uploaded."""
     ca: Path | None = None
     """Certificate authority of the store. None: those of the system."""

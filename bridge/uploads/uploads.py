@@ -351,7 +351,7 @@ class Uploads:
 
     async def _closed(self) -> str:
         if not self._settings.store_hosts:
-            return "no store is configured: copy uploads.store_hosts from the robot's enrolment"
+            return "no store is configured: set uploads.store_hosts to HOST:PORT of the fleet's store"
         interface = await interface_to(self._settings.store_hosts[0]) if self._settings.interfaces else ""
         now = datetime.now().astimezone().time()
         return gates.closed(self._settings, Conditions(interface, now, self._charging()))

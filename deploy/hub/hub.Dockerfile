@@ -27,6 +27,7 @@ COPY drive drive
 COPY fleet fleet
 COPY gateway gateway
 COPY hub hub
+COPY practice practice
 COPY preview preview
 COPY recorder recorder
 COPY simrobot simrobot

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from fleet.connection import FleetAddress, Hub, connect
+from fleet.names import COMMANDS, time_subject
 from tests.support.event_server import EventServer
 from tests.support.nats_servers import NatsServers, nats_servers
 from tests.support.running_bridge import prepare
@@ -13,7 +14,9 @@ from tests.support.running_bridge import prepare
 
 @pytest.fixture
 def servers(tmp_path: Path) -> Iterator[NatsServers]:
-    with nats_servers(tmp_path / "nats") as running:
+    # As a hub's accounts have it: a robot asks for the time under a name of its own.
+    time = f'mappings = {{"{time_subject("*")}": "$JS.API.CONSUMER.INFO.{COMMANDS}.$1"}}\n'
+    with nats_servers(tmp_path / "nats", config=lambda _node: time) as running:
         yield running
 
 

@@ -228,9 +228,10 @@ def test_a_wal_that_was_cut_is_no_loss(tmp_path: Path) -> None:
         shutil.copytree(tmp_path / "copy", cut)
         (cut / f"{NAME}-wal").write_bytes(wal[:length])
         again = opened(cut)
+        batch = again.next_batch()
+        assert batch is None or (batch.first, batch.last) == (91, 100), "what the hub refuses"
         items = taken(again)
-        assert [each for each in items if isinstance(each, Event)] == []
-        assert all(each.first == 91 and each.last == 100 for each in items), "a batch that may be refused"
+        assert not items or (items[0].first, items[-1].last) == (91, 100)
         assert again.facts.position == Position(RUN, 100)
         again.close()
         shutil.rmtree(cut)

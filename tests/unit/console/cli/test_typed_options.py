@@ -8,7 +8,7 @@ from console.cli.app import COMMANDS
 from console.cli.typed_options import typed_options
 
 LOGIN = "type: robotctl login NAME HOST:PORT FILE"
-FOR_NO_ROBOT = {"login", "robots", "practice"}
+FOR_NO_ROBOT = {"login", "robots", "fleet", "practice"}
 """Or they name it themselves."""
 KNOWN = """
 default = "lab1"
