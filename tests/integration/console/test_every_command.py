@@ -12,17 +12,23 @@ from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import only_line, robotctl
 from tests.support.robotctl_docs import DOCS
 
-RECORDS = ("start", "stop", "snapshot", "list", "show", "pin", "unpin", "delete", "export")
+RECORDS = (
+    *("start", "stop", "snapshot", "list", "show", "pin", "unpin", "delete", "export"),
+    *("upload", "cancel-upload"),
+)
 GROUPS = {"preview": ("on", "off"), "record": RECORDS, "robots": ("add", "remove", "default")}
-# They talk to a file, or show a window, which has no answer to print.
-WITHOUT_A_ROBOT = {"robots", "login", "logout", "fleet"}
+# They talk to a file, a hub or nobody, or show a window, which has no answer to print.
+WITHOUT_A_ROBOT = {"robots", "login", "logout", "fleet", "practice"}
 WINDOW = {"monitor"}
 # Without further words these would not end by themselves.
 WORDS = {
     "reset-stop": ("1",),
     "watch": ("--count", "1"),
     "view": ("--headless", "--frames", "1"),
-    **{f"record {each}": ("ID",) for each in ("show", "pin", "unpin", "delete", "export")},
+    **{
+        f"record {each}": ("ID",)
+        for each in ("show", "pin", "unpin", "delete", "export", "upload", "cancel-upload")
+    },
 }
 
 
