@@ -1,6 +1,7 @@
 """Qt without a screen: one application for all tests of a run, waiting in its event loop, screenshots."""
 
 import os
+import platform
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -41,6 +42,9 @@ def application() -> QApplication:
 def own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A directory of the test's own for settings and pictures."""
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    # GStreamer's registry stays where it is: without it each program examines all plugins anew.
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    monkeypatch.setenv("GST_REGISTRY", str(cache / f"gstreamer-1.0/registry.{platform.machine()}.bin"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path))
     return tmp_path
