@@ -94,7 +94,7 @@ class Batch:
 
     @property
     def first(self) -> int:
-        """Tells it from all other batches of the run: its first sequence.
+        """Its first sequence, which no other batch of the run has.
 
         0, the place before the first event, if an earlier run's events are missing there.
         """

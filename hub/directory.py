@@ -1,4 +1,4 @@
-"""The hub's directory: keys, certificates, and the list of what was issued. Whoever has it, has the fleet.
+"""The hub's directory: keys, certificates, and the list of what was issued. It has power over the fleet.
 
 It stays with the administrator; the servers get `nodes/<n>` alone.
 

@@ -77,7 +77,7 @@ async def upload_progress(robot: Robot, recording_id: str) -> AsyncGenerator[Upl
 
 
 async def _found(robot: Robot, recording_id: str) -> Recording | None:
-    """Returns the recording; None while the robot is not reached, of which the stream tells."""
+    """Returns the recording; None while the robot is not reached, which the stream of the status reports."""
     try:
         return await robot.recording(recording_id)
     except (Unreachable, DeadlineExceeded):

@@ -60,7 +60,7 @@ class Ground:
 
     @property
     def control_socket(self) -> Path:
-        """Where the simulated robot is told to behave otherwise."""
+        """The socket through which the simulated robot changes its behaviour."""
         return self.directory / "robot.sock"
 
     @property

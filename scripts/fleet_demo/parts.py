@@ -148,7 +148,7 @@ class FleetGround:
         return {}
 
     def control_socket(self, robot: str) -> Path:
-        """Returns where a simulated robot is told to behave otherwise."""
+        """Returns the socket through which a simulated robot changes its behaviour."""
         return self.directory / robot / "robot.sock"
 
 

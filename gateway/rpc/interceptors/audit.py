@@ -101,7 +101,7 @@ class Audit(Interceptor[CallContext]):
         answer: str,
         own_id: str,
     ) -> None:
-        """Records what the fleet's hub has requested. Its requests are one caller's, whoever issues them.
+        """Records what the fleet's hub has requested, as of one caller: the names are the hub's to choose.
 
         Args:
             who: by the hub's word.

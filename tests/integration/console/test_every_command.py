@@ -17,7 +17,7 @@ RECORDS = (
     *("upload", "cancel-upload"),
 )
 GROUPS = {"preview": ("on", "off"), "record": RECORDS, "robots": ("add", "remove", "default")}
-# They talk to a file, a hub or nobody, or show a window, which has no answer to print.
+# They ask no robot, or show a window, which has no answer to print.
 WITHOUT_A_ROBOT = {"robots", "login", "logout", "fleet", "practice"}
 WINDOW = {"monitor"}
 # Without further words these would not end by themselves.

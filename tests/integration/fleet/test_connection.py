@@ -152,9 +152,9 @@ async def test_answers_for_another_robot_are_not_given(servers: NatsServers) -> 
     ):
         for each in (receiver, robot):
             await each.connected(10)
-        with pytest.raises(HubError) as nobody:
+        with pytest.raises(HubError) as unserved:
             await robot.request("fleet.r1.up.begin_file", b"")
-        assert nobody.value.reason is HubReason.NO_RESPONDERS
+        assert unserved.value.reason is HubReason.NO_RESPONDERS
         await receiver.serve(names.UPLOAD_SUBJECTS, names.RECEIVERS, answer)
         # In a hub without identities nothing else keeps it from that.
         with pytest.raises(HubError):

@@ -1,4 +1,4 @@
-"""JetStream's answers: the same error code for a repeat and for a full stream, told apart by the sentence."""
+"""JetStream's answers: a repeat and a full stream have one error code; the sentence distinguishes them."""
 
 import pytest
 

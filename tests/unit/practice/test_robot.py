@@ -15,7 +15,7 @@ BEGIN_NS = 1_000_000 * MS
 
 @dataclass
 class Driver:
-    """Drives by a fresh picture until told otherwise."""
+    """Drives by a fresh picture unless a test changes that."""
 
     robot: PracticeRobot = field(default_factory=lambda: PracticeRobot(BEGIN_NS))
     now_ns: int = BEGIN_NS

@@ -65,7 +65,7 @@ class Command(_message.Message):
     UPLOAD_FIELD_NUMBER: _builtins.int
     SNAPSHOT_FIELD_NUMBER: _builtins.int
     command_id: _builtins.str
-    """Made by whoever issues it: letters and digits, at most 32."""
+    """Chosen by the issuer: letters and digits, at most 32."""
     robot: _builtins.str
     """The robot. A command whose robot is not the one in its subject is refused."""
     issued_by: _builtins.str
