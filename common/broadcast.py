@@ -1,7 +1,7 @@
 """Notifies all waiting tasks of a change, without a queue: a slow task reads the newest state anyway."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable
 
 
 class Broadcast:
@@ -29,3 +29,21 @@ class Broadcast:
         except TimeoutError:
             return False
         return True
+
+    async def now_and_on_change(self, heartbeat_s: Callable[[], float]) -> AsyncGenerator[None]:
+        """Yields now, on each notification, and at least every so many seconds, without end.
+
+        Args:
+            heartbeat_s: evaluated before each wait.
+        """
+        changed = True
+
+        def has_changed() -> bool:
+            nonlocal changed
+            before, changed = changed, True
+            return before
+
+        while True:
+            changed = False
+            yield
+            await self.wait_until(has_changed, heartbeat_s())

@@ -6,11 +6,15 @@ SERVICE to HEALTH_SERVICE, and without that to the server as a whole.
 
 import os
 import sys
-from typing import Any, Final
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, NoReturn, Protocol
 
 import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
+
+from common.errors import UserError
 
 _TIMEOUT_S: Final = 3.0
 
@@ -31,14 +35,43 @@ def state_of(target: str, service: str = "") -> str:
     return HealthCheckResponse.ServingStatus.Name(response.status)
 
 
+class SocketSettings(Protocol):
+    """Settings of a program that serves a Unix socket."""
+
+    @property
+    def socket(self) -> Path:
+        """The socket."""
+
+
+def check_program(
+    load_settings: Callable[[Path | None], SocketSettings], variable: str, service: str = ""
+) -> NoReturn:
+    """Checks the program of a configuration, and exits.
+
+    Args:
+        load_settings: reads the file; raises a `UserError`.
+        variable: of the environment; names the file. Unset or empty: there is none.
+        service: as of `state_of`.
+    """
+    named = os.environ.get(variable)
+    try:
+        settings = load_settings(Path(named) if named else None)
+    except UserError as error:
+        raise SystemExit(str(error)) from error
+    _exit(str(settings.socket), state_of(f"unix:{settings.socket}", service))
+
+
 def main() -> None:
     """Runs the check and exits."""
     target = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("HEALTH_TARGET", "")
     if not target:
         raise SystemExit("error: no target. Name one, 127.0.0.1:50051 for example, or set HEALTH_TARGET")
     service = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("HEALTH_SERVICE", "")
-    state = state_of(target, service)
-    print(f"{target}: {state}")
+    _exit(target, state_of(target, service))
+
+
+def _exit(where: str, state: str) -> NoReturn:
+    print(f"{where}: {state}")
     raise SystemExit(0 if state == "SERVING" else 1)
 
 

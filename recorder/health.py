@@ -4,25 +4,16 @@
 unhealthy: a restart would mend nothing.
 """
 
-import os
-from pathlib import Path
+from functools import partial
 
 from common.config import load
-from common.errors import UserError
-from common.healthcheck import state_of
+from common.healthcheck import check_program
 from recorder.config import RecorderSettings
 
 
 def main() -> None:
     """Runs the check and exits."""
-    named = os.environ.get("ROBOT_RECORDER_CONFIG")
-    try:
-        settings = load(RecorderSettings, Path(named) if named else None)
-    except UserError as error:
-        raise SystemExit(str(error)) from error
-    state = state_of(f"unix:{settings.socket}")
-    print(f"{settings.socket}: {state}")
-    raise SystemExit(0 if state == "SERVING" else 1)
+    check_program(partial(load, RecorderSettings), "ROBOT_RECORDER_CONFIG")
 
 
 if __name__ == "__main__":

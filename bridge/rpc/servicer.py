@@ -52,17 +52,8 @@ class BridgeServicer(pb_grpc.BridgeServiceServicer):
         self, _request: pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.WatchStateResponse]:
         """Streams the state, now, on every change and every second; a slow reader skips outdated ones."""
-        changed = True
-
-        def has_changed() -> bool:
-            nonlocal changed
-            before, changed = changed, True
-            return before
-
-        while True:
-            changed = False
+        async for _ in self._status.changes.now_and_on_change(lambda: _HEARTBEAT_S):
             yield self._state()
-            await self._status.changes.wait_until(has_changed, _HEARTBEAT_S)
 
     async def UploadRecording(  # noqa: N802  # the schema names it
         self, request: pb.UploadRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]

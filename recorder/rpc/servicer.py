@@ -65,20 +65,8 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         self, _request: recorder_pb.WatchStateRequest, _context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[recorder_pb.WatchStateResponse]:
         """Streams the state, now and on every change; a slow reader skips outdated states."""
-        changed = True
-
-        def has_changed() -> bool:
-            nonlocal changed
-            before, changed = changed, True
-            return before
-
-        while True:
-            changed = False
+        async for _ in self._readings.changes.now_and_on_change(self._heartbeat_s):
             yield mapping.watch_state(self._readings, self._settings)
-            writes = self._readings.writes
-            await self._readings.changes.wait_until(
-                has_changed, _HEARTBEAT_WRITING_S if writes else _HEARTBEAT_S
-            )
 
     async def StartRecording(  # noqa: N802  # the schema names it
         self, request: pb.StartRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
@@ -220,6 +208,9 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         await self._refuse_bundle(request.recording_id)
         await self._operations.set_copy(request.recording_id, mapping.copy(request.copy))
         return recorder_pb.SetCopyResponse()
+
+    def _heartbeat_s(self) -> float:
+        return _HEARTBEAT_WRITING_S if self._readings.writes else _HEARTBEAT_S
 
     def _recording_of(self, result: Result) -> pb.Recording | None:
         return mapping.recording(self._readings, result.recording) if result.recording else None
