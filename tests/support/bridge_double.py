@@ -9,15 +9,14 @@ import asyncio
 import sys
 import uuid
 from collections.abc import AsyncIterator
-from contextlib import AbstractContextManager, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, AbstractContextManager
+from functools import partial
 from pathlib import Path
 from subprocess import Popen
 from typing import Any, Final
 
-from common.bind import bind_unix
 from common.errors import NotFoundError, PreconditionError, TooMuchError
 from common.reasons import Reason
-from common.rpc import new_server
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.bridge.v1.bridge_service_pb2_grpc import (
     BridgeServiceServicer,
@@ -25,6 +24,7 @@ from omniseer.bridge.v1.bridge_service_pb2_grpc import (
 )
 from omniseer.gateway.v1 import cloud_pb2, recording_pb2
 from tests.support.module_program import module_program
+from tests.support.serving import serving_on
 
 _REPORT_EVERY_S: Final = 0.5
 
@@ -140,17 +140,9 @@ RUNS: Final = PreconditionError("it has not ended", Reason.RECORDING_RUNS)
 FULL: Final = TooMuchError("1000 recordings wait", Reason.TOO_MANY_UPLOADS)
 
 
-@asynccontextmanager
-async def serving_bridge(socket: Path, double: BridgeServiceServicer) -> AsyncIterator[None]:
+def serving_bridge(socket: Path, double: BridgeServiceServicer) -> AbstractAsyncContextManager[None]:
     """Serves the double while the block lasts."""
-    server = new_server()
-    add_BridgeServiceServicer_to_server(double, server)
-    bind_unix(server, socket)
-    await server.start()
-    try:
-        yield
-    finally:
-        await server.stop(0)
+    return serving_on(socket, partial(add_BridgeServiceServicer_to_server, double))
 
 
 def bridge_process(socket: Path) -> AbstractContextManager[Popen[str]]:

@@ -11,15 +11,14 @@ import sys
 import time
 import uuid
 from collections.abc import AsyncIterator
-from contextlib import AbstractContextManager, asynccontextmanager
-from functools import lru_cache
+from contextlib import AbstractAsyncContextManager, AbstractContextManager
+from functools import lru_cache, partial
 from pathlib import Path
 from subprocess import Popen
 from typing import Any, Final
 
 import google_crc32c
 
-from common.bind import bind_unix
 from common.errors import (
     ConflictError,
     DamagedError,
@@ -29,7 +28,6 @@ from common.errors import (
     TooMuchError,
 )
 from common.reasons import Reason
-from common.rpc import new_server
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2
 from omniseer.recorder.v1.recorder_service_pb2_grpc import (
@@ -37,6 +35,7 @@ from omniseer.recorder.v1.recorder_service_pb2_grpc import (
     add_RecorderServiceServicer_to_server,
 )
 from tests.support.module_program import module_program
+from tests.support.serving import serving_on
 
 CHUNK_BYTES: Final = 256 * 1024
 PRESET: Final = "driving"
@@ -354,17 +353,9 @@ class RecorderDouble(RecorderServiceServicer):
         return pb.ExportRecordingResponse(chunk=pb.ExportChunk(offset=offset, data=data, crc32c=crc32c))
 
 
-@asynccontextmanager
-async def serving_recorder(socket: Path, double: RecorderDouble) -> AsyncIterator[None]:
+def serving_recorder(socket: Path, double: RecorderDouble) -> AbstractAsyncContextManager[None]:
     """Serves the double while the block lasts."""
-    server = new_server()
-    add_RecorderServiceServicer_to_server(double, server)
-    bind_unix(server, socket)
-    await server.start()
-    try:
-        yield
-    finally:
-        await server.stop(0)
+    return serving_on(socket, partial(add_RecorderServiceServicer_to_server, double))
 
 
 def recorder_process(socket: Path, megabytes: int = 0) -> AbstractContextManager[Popen[str]]:
