@@ -3,6 +3,7 @@
 import signal
 
 pytest_plugins = [
+    "tests.support.bounds",
     "tests.support.distribution",
     "tests.support.engine",
     "tests.support.leftovers",
