@@ -42,9 +42,9 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     server = rpc.new_server()
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)
-    bind.bind_unix(server, settings.socket)
-    # The tap first: where the server answers, the whole service is up.
+    # The tap first: where the server can be connected to, which is from its binding on, the whole service is up.
     async with _video_tap(settings.video_tap.socket, supervisor):
+        bind.bind_unix(server, settings.socket)
         await server.start()
         srt = settings.srt
         _log.info(
