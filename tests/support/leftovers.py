@@ -8,6 +8,7 @@ starts carries a mark in its environment instead, and so does what that starts.
 
 import gc
 import os
+import re
 import socket
 import sys
 import threading
@@ -58,9 +59,21 @@ def _nothing_left(may_stay: Counter[str]) -> Iterator[None]:
     deadline_s = time.monotonic() + GONE_WITHIN_S
     while left := _belongings() - before - may_stay:
         if time.monotonic() > deadline_s:
-            pytest.fail(f"left behind: {', '.join(sorted(left.elements()))}", pytrace=False)
+            kinds = f"; all unnamed descriptors now: {_unnamed()}" if _UNNAMED in left else ""
+            pytest.fail(f"left behind: {', '.join(sorted(left.elements()))}{kinds}", pytrace=False)
         _collect()
         time.sleep(0.02)
+
+
+def _unnamed() -> str:
+    """Which kinds there are, as the kernel names them."""
+    kinds = Counter[str]()
+    for entry in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):  # That of this very listing.
+            path = entry.readlink()
+            if not path.is_absolute():
+                kinds[re.sub(r":\[\d+\]$", "", path.name)] += 1
+    return ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
 
 
 def _collect() -> None:
