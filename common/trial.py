@@ -54,7 +54,8 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     output = None
     try:
         with suppress(TimeoutError):
-            output = await asyncio.wait_for(_output(child), timeout_s)
+            async with asyncio.timeout(timeout_s):
+                output = await _output(child)
     finally:
         await _kill(child)
     if output is None:
@@ -90,7 +91,8 @@ async def _kill(child: asyncio.subprocess.Process) -> None:
         with suppress(ProcessLookupError):
             child.kill()
         with suppress(TimeoutError):
-            await asyncio.wait_for(child.wait(), _KILL_S)
+            async with asyncio.timeout(_KILL_S):
+                await child.wait()
 
 
 def parse_result(output: bytes, code: int) -> dict[str, Any]:

@@ -242,11 +242,12 @@ class Session:
                     flush_timeout=CONNECT_TIMEOUT_S,
                     **options,
                 )
+                _repeat_cancellation()
                 client.check(encrypted=ca is not None)
                 session = cls(client, server, f"{inbox}.{client._nuid.next().decode()}")
                 sessions.append(session)
                 await client.subscribe(f"{session._inbox}.*", cb=session._on_reply, **_BOUNDS)
-                await client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
+                await _flush(client)
         except Exception as error:
             # The library trips over what is no server of NATS in many ways: a greeting may be anything.
             await _close(client)
@@ -350,7 +351,7 @@ class Session:
         try:
             await self._client.subscribe(subject, queue=queue, cb=on_message, **_BOUNDS)
             # What is published after this, the server passes on.
-            await self._client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
+            await _flush(self._client)
         except nats_errors.Error as error:
             raise UnreachableError(f"the connection to the hub is lost: {_text(error)}") from error
 
@@ -460,6 +461,23 @@ def _connect_error(server: str, error: Exception) -> HubError:
             f"{server} does not accept the credentials ({text}): revoked, expired, or not of this hub"
         )
     return UnreachableError(f"{server} can't be reached: {text}")
+
+
+async def _flush(client: Client) -> None:
+    """Returns when the server has taken all that was sent before."""
+    await client.flush(CONNECT_TIMEOUT_S)  # type: ignore[arg-type]  # any number of seconds
+    _repeat_cancellation()
+
+
+def _repeat_cancellation() -> None:
+    """Raises the cancellation of this task that the library may have lost.
+
+    It uses asyncio.wait_for, which before Python 3.12 loses one that comes together with its result
+    (bpo-42130); the task would go on for ever.
+    """
+    task = asyncio.current_task()
+    if task and task.cancelling():
+        raise asyncio.CancelledError
 
 
 async def _close(client: Client) -> None:

@@ -42,7 +42,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     server = rpc.new_server()
     PreviewServicer(supervisor, prober, encoders.preference).register(server)
     Health(SERVICE).register(server)
-    # The tap first: where the server can be connected to, which is from its binding on, the whole service is up.
+    # The tap first: from its binding on the server can be connected to, and then the whole service is up.
     async with _video_tap(settings.video_tap.socket, supervisor):
         bind.bind_unix(server, settings.socket)
         await server.start()

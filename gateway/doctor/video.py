@@ -17,9 +17,7 @@ _TIMEOUT_S: Final = 3.0
 def video_finding(settings: GatewaySettings) -> Finding:
     """Asks the preview service where its listener is; it must be reachable."""
     try:
-        listener = asyncio.run(
-            asyncio.wait_for(_listener(PreviewConnector(settings.preview.socket)), _TIMEOUT_S)
-        )
+        listener = asyncio.run(_listener(PreviewConnector(settings.preview.socket)))
     except LinkLostError as error:
         reason = error.reason
     except TimeoutError:
@@ -37,7 +35,7 @@ def video_finding(settings: GatewaySettings) -> Finding:
 
 
 async def _listener(connector: PreviewConnector) -> Listener | None:
-    async with connector.connect() as client:
+    async with asyncio.timeout(_TIMEOUT_S), connector.connect() as client:
         async for report in client.reports():
             return report.listener
     return None

@@ -85,7 +85,8 @@ async def _stop(child: asyncio.subprocess.Process) -> None:
         return
     child.terminate()
     try:
-        await asyncio.wait_for(child.wait(), _STOPS_WITHIN_S)
+        async with asyncio.timeout(_STOPS_WITHIN_S):
+            await child.wait()
     except TimeoutError:
         with suppress(ProcessLookupError):
             child.kill()

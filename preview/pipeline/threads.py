@@ -46,4 +46,5 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
         done.set_result(result)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
-    return await asyncio.wait_for(asyncio.wrap_future(done), deadline_s)
+    async with asyncio.timeout(deadline_s):
+        return await asyncio.wrap_future(done)

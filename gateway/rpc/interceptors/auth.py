@@ -171,7 +171,8 @@ class Auth(Interceptor[CallContext]):
         code = STATUS_CODES[NotAuthenticatedError]
         aborting = call.rpc.abort(code, str(error), trailing_metadata=metadata_of(error, code))
         try:
-            await asyncio.wait_for(aborting, _ABORT_WITHIN_S)
+            async with asyncio.timeout(_ABORT_WITHIN_S):
+                await aborting
         except (grpc.aio.BaseError, TimeoutError):
             # Aborted (grpc.aio raises whenever it has); gone already; or the caller does not read.
             pass

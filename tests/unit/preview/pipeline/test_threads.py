@@ -1,5 +1,6 @@
 """Blocking calls in threads: what they return, raise and release."""
 
+import asyncio
 import threading
 import weakref
 from concurrent.futures import Future
@@ -10,6 +11,7 @@ import pytest
 
 from preview.pipeline import threads
 from preview.pipeline.threads import in_thread
+from tests.support.waiting import wait_until
 
 
 class Element:
@@ -49,3 +51,17 @@ async def test_what_a_call_references_is_free_before_its_result_is_seen(
         assert alive() is None
     finally:
         seen.set()
+
+
+async def test_a_cancellation_that_comes_with_the_result_is_not_lost() -> None:
+    returned = threading.Event()
+    task = asyncio.create_task(in_thread(returned.set, 5))
+    await asyncio.sleep(0)
+    # The result is on its way to the loop, which does not run meanwhile.
+    assert returned.wait(5)
+    wait_until(
+        lambda: all(each.name != "blocking-call" for each in threading.enumerate()), "the thread's end", 5
+    )
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task

@@ -1,0 +1,41 @@
+"""A session that is being opened ends when it is cancelled, whatever the NATS library makes of it."""
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from fleet import session
+from fleet.session import Session
+
+
+class _Connecting(session._Client):
+    """Connects when a test says so, and waits as the library does."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.connected = asyncio.get_running_loop().create_future()
+
+    async def connect(self, *_: Any, **__: Any) -> None:
+        await asyncio.wait_for(self.connected, 5)
+
+    async def close(self) -> None:
+        """There is nothing to close."""
+
+    def check(self, *, encrypted: bool) -> None:
+        pytest.fail(f"it went on although it was cancelled (TLS: {encrypted})")
+
+
+async def test_a_cancellation_that_comes_with_the_connection_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    client = _Connecting()
+    monkeypatch.setattr(session, "_Client", lambda: client)
+    opening = asyncio.create_task(
+        Session.open("nats://127.0.0.1:1", credentials=None, ca=None, inbox="_INBOX", name="")
+    )
+    await asyncio.sleep(0)
+    client.connected.set_result(None)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
