@@ -134,5 +134,15 @@ def _descriptors() -> Iterator[str]:
                 yield f"file {path}"
             elif path.name.startswith("pipe:"):
                 yield "pipe"
-            else:
+            elif not (path.name.startswith("socket:") and _belongs_to_fast_dds(int(entry.name))):
                 yield _UNNAMED
+
+
+def _belongs_to_fast_dds(descriptor: int) -> bool:
+    """Whether it is a UDP socket without a port.
+
+    A process with rclpy keeps one to its end for each address of the machine; each network of containers adds
+    addresses.
+    """
+    with socket.socket(fileno=os.dup(descriptor)) as copy:
+        return copy.type == socket.SOCK_DGRAM and copy.getsockname() == ("0.0.0.0", 0)  # noqa: S104  # not bound

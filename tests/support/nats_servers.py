@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from tests.support.free import free_tcp_port
 from tests.support.waiting import wait_until
 
@@ -83,7 +85,12 @@ class NatsServers:
 
     def freeze(self, node: int) -> None:
         """Stops a node without ending it: its connections stay open and silent."""
-        self._process(node).send_signal(signal.SIGSTOP)
+        process = psutil.Process(self._process(node).pid)
+        process.suspend()
+        # Its threads end what they are at.
+        wait_until(
+            lambda: process.status() == psutil.STATUS_STOPPED, f"node {node} stands still", UP_WITHIN_S
+        )
 
     def thaw(self, node: int) -> None:
         """Lets a frozen node go on."""

@@ -232,9 +232,9 @@ async def streamed(monkeypatch: pytest.MonkeyPatch, begins_ns: int, seconds: flo
         assert await (await runner.stop())
 
 
-def steps(values: list[int]) -> set[int]:
+def steps(values: list[int]) -> list[int]:
     """The distances between neighbours, as a clock of 33 bits has them."""
-    return {(later - earlier) % WRAP_TICKS for earlier, later in pairwise(values)}
+    return [(later - earlier) % WRAP_TICKS for earlier, later in pairwise(values)]
 
 
 def unwrapped_by_ffprobe(recording: Path) -> list[int]:
@@ -276,7 +276,8 @@ async def test_the_stream_goes_on_when_pts_wraps(
     stream = analyse(data)
     stamped = [unit.pts for unit in stream.access_units]
     assert (stamped != sorted(stamped)) is wraps
-    assert steps(stamped) == {3000}
+    # A live source skips frames where it waits for a processor.
+    assert set(steps(stamped)) <= {3000 * frames for frames in range(1, 6)}
     assert stream.counter_gaps == []
     clock = [later - earlier for earlier, later in pairwise(stream.clock_times_ms)]
     assert max(each % (WRAP_TICKS / 90) for each in clock) <= CLOCK_LIMIT_MS
@@ -287,10 +288,12 @@ async def test_the_stream_goes_on_when_pts_wraps(
     frames = decoded_frames(recording)
     assert frames >= len(stamped) - 1
     by_ffprobe = unwrapped_by_ffprobe(recording)
-    assert {later - earlier for earlier, later in pairwise(by_ffprobe)} == {3000}
+    assert by_ffprobe == [by_ffprobe[0] + sum(steps(stamped)[:place]) for place in range(len(by_ffprobe))]
     by_gstreamer = unwrapped_by_gstreamer(recording)
     assert len(by_gstreamer) >= frames - 1
-    assert all(30 < (later - earlier) / 1e6 < 37 for earlier, later in pairwise(by_gstreamer))
+    between_ms = [(later - earlier) / 1e6 for earlier, later in pairwise(by_gstreamer)]
+    expected_ms = [each / 90 for each in steps(stamped)]
+    assert between_ms == pytest.approx(expected_ms[: len(between_ms)], abs=3.5)
 
 
 @pytest.mark.parametrize("days", [0, 1, 2, 400])
