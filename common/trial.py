@@ -11,6 +11,8 @@ import sys
 from contextlib import suppress
 from typing import Any, Final
 
+from common.deadline import within
+
 _KILL_S: Final = 1.0
 """For the end of a killed child; a driver may keep it in the kernel for longer."""
 _MAX_OUTPUT_BYTES: Final = 64 * 1024
@@ -54,8 +56,7 @@ async def run(timeout_s: float, module: str, *arguments: str) -> dict[str, Any]:
     output = None
     try:
         with suppress(TimeoutError):
-            async with asyncio.timeout(timeout_s):
-                output = await _output(child)
+            output = await within(timeout_s, _output(child))
     finally:
         await _kill(child)
     if output is None:
@@ -91,8 +92,7 @@ async def _kill(child: asyncio.subprocess.Process) -> None:
         with suppress(ProcessLookupError):
             child.kill()
         with suppress(TimeoutError):
-            async with asyncio.timeout(_KILL_S):
-                await child.wait()
+            await within(_KILL_S, child.wait())
 
 
 def parse_result(output: bytes, code: int) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from nats.aio.msg import Msg
 from nats.aio.transport import TcpTransport
 from nats.protocol.parser import PERMISSIONS_ERR, Parser
 
+from common.deadline import within
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error
 from fleet.identity import Credentials
 
@@ -482,8 +483,7 @@ def _repeat_cancellation() -> None:
 
 async def _close(client: Client) -> None:
     try:
-        async with asyncio.timeout(CONNECT_TIMEOUT_S):
-            await client.close()
+        await within(CONNECT_TIMEOUT_S, client.close())
     except (TimeoutError, OSError, nats_errors.Error):
         # It is gone in any case.
         return

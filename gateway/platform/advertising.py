@@ -12,6 +12,7 @@ from typing import Final
 
 from common.advertisement import Advertisement
 from common.backoff import Backoff
+from common.deadline import within
 
 _log = logging.getLogger(__name__)
 
@@ -85,8 +86,7 @@ async def _stop(child: asyncio.subprocess.Process) -> None:
         return
     child.terminate()
     try:
-        async with asyncio.timeout(_STOPS_WITHIN_S):
-            await child.wait()
+        await within(_STOPS_WITHIN_S, child.wait())
     except TimeoutError:
         with suppress(ProcessLookupError):
             child.kill()

@@ -11,6 +11,8 @@ from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any, TypeVar
 
+from common.deadline import within
+
 T = TypeVar("T")
 
 
@@ -46,5 +48,4 @@ async def in_thread(work: Callable[[], T], deadline_s: float) -> T:
         done.set_result(result)
 
     threading.Thread(target=run, name="blocking-call", daemon=True).start()
-    async with asyncio.timeout(deadline_s):
-        return await asyncio.wrap_future(done)
+    return await within(deadline_s, asyncio.wrap_future(done))
