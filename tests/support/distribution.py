@@ -77,6 +77,28 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 
 
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    def remove_node(self, node: Any) -> str | None:
+        """Returns the test in which a worker has crashed.
+
+        The scheduler above would hand out all that the worker had: that test once more, and files that were
+        done, for whose end it then waited for ever.
+        """
+        units: dict[str, dict[str, bool]] = self.assigned_work[node]
+        begun = next((unit for unit in units.values() if not all(unit.values())), None)
+        crashed = next(test for test, done in begun.items() if not done) if begun else None
+        if begun and crashed:
+            begun[crashed] = True
+        for scope in [scope for scope, unit in units.items() if all(unit.values())]:
+            del units[scope]
+        super().remove_node(node)
+        return crashed
+
+    def schedule(self) -> None:
+        """Gives a worker that replaces another two files: it begins a test only when it knows the next."""
+        super().schedule()
+        for node in self.nodes:
+            self._reschedule(node)
+
     def _split_scope(self, nodeid: str) -> str:
         file = _file_of(nodeid)
         if file in _SHARING:

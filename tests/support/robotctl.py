@@ -8,7 +8,9 @@ import io
 import os
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest import mock
 
@@ -16,6 +18,8 @@ from console.cli.run import exit_code
 
 ROBOTCTL = Path(sys.executable).parent / "robotctl"
 ENDS_WITHIN_S = 60.0
+_in_use = threading.Lock()
+"""Of this process's command line, environment and output."""
 
 
 def environment(**extra: str) -> dict[str, str]:
@@ -26,9 +30,14 @@ def environment(**extra: str) -> dict[str, str]:
 
 
 def robotctl(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":
-    """Runs the command line to its end, output captured; `extra` goes into its environment."""
+    """Runs the command line to its end, output captured; `extra` goes into its environment.
+
+    Raises:
+        RuntimeError: another thread does: one of them has to be a process.
+    """
     out, err = _pipe(), _pipe()
     with (
+        _alone(),
         mock.patch.object(sys, "argv", [str(ROBOTCTL), *words]),
         mock.patch.dict(os.environ, environment(**extra), clear=True),
         redirect_stdout(out),
@@ -36,6 +45,16 @@ def robotctl(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":
     ):
         code = exit_code()
     return subprocess.CompletedProcess([ROBOTCTL, *words], code, _text(out), _text(err))
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    if not _in_use.acquire(blocking=False):
+        raise RuntimeError("robotctl runs in this process already: use robotctl_process")
+    try:
+        yield
+    finally:
+        _in_use.release()
 
 
 def robotctl_process(*words: str, **extra: str) -> "subprocess.CompletedProcess[str]":

@@ -19,7 +19,7 @@ from tests.support.guarded_gateway import guarded_gateway, new_robot
 from tests.support.recorder_double import RecorderDouble, serving_recorder
 from tests.support.recording_gateway import recording_robot
 from tests.support.refusals import refused
-from tests.support.robotctl import only_line, robotctl
+from tests.support.robotctl import only_line, robotctl, robotctl_process
 
 QUEUED, UPLOADING = pb.RECORDING_COPY_STATE_QUEUED, pb.RECORDING_COPY_STATE_UPLOADING
 VERIFIED, NONE = pb.RECORDING_COPY_STATE_VERIFIED, pb.RECORDING_COPY_STATE_UNSPECIFIED
@@ -165,7 +165,8 @@ async def test_what_a_user_types_and_reads(tmp_path: Path) -> None:
         double = robot.bridge
         ran = await typed(robot, "record", "upload", "one")
         assert (ran.returncode, ran.stdout) == (0, "one waits to be copied to the fleet's store\n")
-        waiting = asyncio.create_task(typed(robot, "record", "upload", "one", "--wait", "--json"))
+        wait = ("--target", f"127.0.0.1:{robot.port}", "record", "upload", "one", "--wait", "--json")
+        waiting = asyncio.create_task(asyncio.to_thread(robotctl_process, *wait))
         copy = double.copies("one")
         copy.state, copy.bytes_done = UPLOADING, 340
         status = double.report.status
@@ -175,8 +176,10 @@ async def test_what_a_user_types_and_reads(tmp_path: Path) -> None:
         await recorder_has(robot, UPLOADING)
         listed = await typed(robot, "record", "list")
         assert "uploading 34 %" in listed.stdout
-        shown = await typed(robot, "status")
-        assert "CONNECTED  lab-1, fleet lab, 1 recording to copy, one uploading 34 %" in shown.stdout
+        line = "CONNECTED  lab-1, fleet lab, 1 recording to copy, one uploading 34 %"
+        await eventually(
+            lambda: typed(robot, "status"), lambda shown: line in shown.stdout, "the status has it, too"
+        )
         assert not waiting.done()
         status.uploading_id = ""
         status.ClearField("uploading")
