@@ -19,6 +19,7 @@ WIDTH_PX = 1280
 HEIGHT_PX = 720
 FRAME_BYTES = WIDTH_PX * HEIGHT_PX * 3 // 2
 _FRAMES = 45
+_END_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,7 @@ def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
             yield made
         finally:
             process.terminate()
+            _wait_for(process)
 
 
 def caps(fps: int) -> str:
@@ -77,6 +79,14 @@ def caps(fps: int) -> str:
         f"video/x-raw,format=NV12,width={WIDTH_PX},height={HEIGHT_PX},framerate={fps}/1"
         ",pixel-aspect-ratio=1/1,interlace-mode=progressive,colorimetry=bt709"
     )
+
+
+def _wait_for(process: subprocess.Popen[str]) -> None:
+    try:
+        process.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        raise RuntimeError(f"the camera did not end within {_END_S:.0f} s of SIGTERM") from None
 
 
 def _make(footage: Path) -> None:

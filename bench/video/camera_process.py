@@ -4,19 +4,24 @@ import argparse
 import mmap
 import signal
 import struct
-import threading
 import time
 from collections.abc import Iterator
 from itertools import chain, count
 from pathlib import Path
+from typing import Final
 
 from bench.video import stamp
 from bench.video.camera import FRAME_BYTES, WIDTH_PX, caps
 from common.gst import GLib, Gst
 
+_ENDINGS: Final = (signal.SIGINT, signal.SIGTERM)
+
 
 def serve(footage: Path, socket: Path, journal: Path, fps: int) -> None:
     """Offers frames until SIGTERM; prints "ready" as soon as readers may connect."""
+    # Waited for, not handled: an event that a handler sets in the midst of its own wait is locked for ever.
+    # Blocked before there is another thread, so that no thread takes them.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDINGS)
     pipeline = Gst.parse_launch(
         "appsrc name=in is-live=true format=time max-bytes=0"
         f" caps={caps(fps)}"
@@ -24,17 +29,14 @@ def serve(footage: Path, socket: Path, journal: Path, fps: int) -> None:
     )
     way_in = pipeline.get_by_name("in")
     pipeline.set_state(Gst.State.PLAYING)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     print("ready", flush=True)
-    for frame in _frames(footage, journal, fps, stop):
+    for frame in _frames(footage, journal, fps):
         way_in.emit("push-buffer", Gst.Buffer.new_wrapped_bytes(GLib.Bytes.new(frame)))
     pipeline.set_state(Gst.State.NULL)
 
 
-def _frames(footage: Path, journal: Path, fps: int, stop: threading.Event) -> Iterator[bytes]:
-    """Yields stamped frames at their time; forth and back, so that the content never jumps."""
+def _frames(footage: Path, journal: Path, fps: int) -> Iterator[bytes]:
+    """Yields stamped frames at their time until a signal; forth and back, so that the content never jumps."""
     with (
         footage.open("rb") as file,
         mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
@@ -45,7 +47,7 @@ def _frames(footage: Path, journal: Path, fps: int, stop: threading.Event) -> It
         begun_s = time.monotonic()
         for number, index in zip(count(), chain.from_iterable(order for _ in count()), strict=False):
             due_s = begun_s + number / fps
-            if stop.wait(max(0.0, due_s - time.monotonic())):
+            if signal.sigtimedwait(_ENDINGS, max(0.0, due_s - time.monotonic())):
                 return
             frame = bytearray(content[index * FRAME_BYTES : (index + 1) * FRAME_BYTES])
             captured.write(struct.pack("d", stamp.draw(frame, WIDTH_PX, time.monotonic())))

@@ -32,15 +32,21 @@ def until_stopped(cut_off: Callable[[], None]) -> Iterator[Stopped]:
     """Has SIGINT and SIGTERM call `cut_off` instead of ending the program, while the block lasts.
 
     Args:
-        cut_off: Ends the wait of the block. Called in a thread of its own, because a signal handler may run
-            while the block holds the same lock.
+        cut_off: Ends the wait of the block. Called in a thread of its own, as the event is set there, because
+            a signal handler may run while the block, or the handler of the signal before, holds their locks.
     """
     stopped = Stopped()
+    ending = False
+
+    def stop() -> None:
+        stopped.event.set()
+        cut_off()
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:
-        if not stopped.event.is_set():
-            stopped.event.set()
-            threading.Thread(target=cut_off, name="stop").start()
+        nonlocal ending
+        if not ending:
+            ending = True
+            threading.Thread(target=stop, name="stop").start()
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
