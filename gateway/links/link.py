@@ -15,7 +15,7 @@ from gateway.links.watch import (
     Reporter,
     ServiceWatch,
     WatchConnector,
-    within,
+    reply_within,
 )
 
 _log = logging.getLogger(__name__)
@@ -125,7 +125,7 @@ class ServiceLink(ServiceWatch[ServiceClient[SpecT, ReportT], ReportT], Generic[
 
     async def _apply(self, client: ServiceClient[SpecT, ReportT], desired: Desired[SpecT]) -> None:
         try:
-            report = await within(self._apply_deadline_s, client.apply(desired))
+            report = await reply_within(self._apply_deadline_s, client.apply(desired))
         except RefusedError as error:
             _log.error("%s refuses revision %d: %s", self._name, desired.revision, error)
             self._reconciler.take_refusal(desired, str(error))

@@ -162,7 +162,7 @@ class ServiceWatch(Generic[ClientT, ReportT]):
         reports = client.reports()
         while True:
             try:
-                report = await within(self._silence_s, anext(reports))
+                report = await reply_within(self._silence_s, anext(reports))
             except StopAsyncIteration:
                 raise LinkLostError("it has closed its stream of reports") from None
             if report is None:
@@ -170,7 +170,7 @@ class ServiceWatch(Generic[ClientT, ReportT]):
             self._take_report(report)
 
 
-async def within(timeout_s: float, step: Awaitable[ResultT]) -> ResultT | None:
+async def reply_within(timeout_s: float, step: Awaitable[ResultT]) -> ResultT | None:
     """Returns None on a timeout, whose exception would form a cycle of task, frames and call."""
     try:
         async with asyncio.timeout(timeout_s):
