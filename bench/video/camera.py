@@ -19,7 +19,6 @@ WIDTH_PX = 1280
 HEIGHT_PX = 720
 FRAME_BYTES = WIDTH_PX * HEIGHT_PX * 3 // 2
 _FRAMES = 45
-_END_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +53,7 @@ def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
     """Runs a camera in a process of its own until the block ends.
 
     Raises:
-        RuntimeError: it did not begin.
+        RuntimeError: it did not begin, or did not end when it was asked to.
     """
     footage = workdir / "footage.nv12"
     if not footage.exists():
@@ -69,8 +68,9 @@ def camera(workdir: Path, fps: int = 30) -> Iterator[Camera]:
                 raise RuntimeError("the camera did not begin")
             yield made
         finally:
-            process.terminate()
-            _wait_for(process)
+            foreign.end(process)
+    if process.returncode:
+        raise RuntimeError(f"the camera ended with exit code {process.returncode}")
 
 
 def caps(fps: int) -> str:
@@ -79,14 +79,6 @@ def caps(fps: int) -> str:
         f"video/x-raw,format=NV12,width={WIDTH_PX},height={HEIGHT_PX},framerate={fps}/1"
         ",pixel-aspect-ratio=1/1,interlace-mode=progressive,colorimetry=bt709"
     )
-
-
-def _wait_for(process: subprocess.Popen[str]) -> None:
-    try:
-        process.wait(_END_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        raise RuntimeError(f"the camera did not end within {_END_S:.0f} s of SIGTERM") from None
 
 
 def _make(footage: Path) -> None:
