@@ -1,15 +1,19 @@
 """The hub's streams and buckets: one table, and how it is made so."""
 
+import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from common.backoff import Backoff
 from fleet import names
 from fleet.connection import Hub
 from fleet.errors import HubError, HubReason
 
 _DAY_NS: Final = 86_400 * 1_000_000_000
 _MIB: Final = 1024 * 1024
+JOINING_S: Final = 30.0
+"""How long the nodes of a cluster that has just started may take to find each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,22 +53,31 @@ def stream_configs(replicas: int, limits: StreamLimits = StreamLimits()) -> dict
 async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits()) -> list[str]:
     """Makes the streams and buckets that are missing; changes none that exists.
 
+    Waits for nodes of a cluster that are still joining, JOINING_S in all.
+
     Returns:
         What differs in existing ones, as "fleet_events: max_bytes is 1, expected 2".
 
     Raises:
         HubError: the hub does not do it.
     """
+    backoff = Backoff(first_s=0.1, longest_s=2.0)
+    clock = asyncio.get_running_loop().time
+    deadline_s = clock() + JOINING_S
     differences: list[str] = []
-    for name, config in stream_configs(replicas, limits).items():
+    missing = stream_configs(replicas, limits)
+    while missing:
+        name, config = next(iter(missing.items()))
         try:
-            info = await hub.api(f"STREAM.INFO.{name}")
+            differences += await _make(hub, name, config)
         except HubError as error:
-            if error.reason is not HubReason.MISSING:
+            pause_s = backoff.next_s()
+            if error.reason is not HubReason.NO_QUORUM or clock() + pause_s > deadline_s:
                 raise
-            await hub.api(f"STREAM.CREATE.{name}", config)
+            await asyncio.sleep(pause_s)
         else:
-            differences += _differences(name, config, info.get("config", {}))
+            backoff.reset()
+            del missing[name]
     return differences
 
 
@@ -86,6 +99,18 @@ async def add_command_consumer(hub: Hub, robot: str) -> None:
     }
     call = f"CONSUMER.CREATE.{names.COMMANDS}.{robot}.{subjects}"
     await hub.api(call, {"stream_name": names.COMMANDS, "config": config})
+
+
+async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
+    """Creates a stream if it is missing; returns what differs if it is not."""
+    try:
+        info = await hub.api(f"STREAM.INFO.{name}")
+    except HubError as error:
+        if error.reason is not HubReason.MISSING:
+            raise
+        await hub.api(f"STREAM.CREATE.{name}", config)
+        return []
+    return _differences(name, config, info.get("config", {}))
 
 
 def _stream(subjects: str, max_bytes: int, max_age_ns: int, more: Mapping[str, Any]) -> dict[str, Any]:
