@@ -32,6 +32,9 @@ PATIENCE_S = 20
 FRAMES = 90
 FRAME_S = 1 / 30
 CLOSED_WITHIN_S = 1.0
+AFTERWARDS = 15
+NO_FRAME = bytes([0x47, 0x1F, 0xFF, 0x10]) + bytes(184)
+"""A null packet (ISO/IEC 13818-1 2.4.3.3): the stream goes on without a frame."""
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +83,8 @@ def watched(
         receiver(link.port, **options) as viewer,
     ):
         assert sender.viewer_joined.wait(PATIENCE_S)
-        play(sender, pieces)
+        # SRT repeats a packet when a later one shows that it was lost: after a stream's last one none would.
+        play(sender, [*pieces, *[NO_FRAME] * AFTERWARDS])
         frames = everything(viewer)
         return viewer.delivery, frames
 
