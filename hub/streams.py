@@ -61,23 +61,10 @@ async def set_up(hub: Hub, replicas: int, limits: StreamLimits = StreamLimits())
     Raises:
         HubError: the hub does not do it.
     """
-    backoff = Backoff(first_s=0.1, longest_s=2.0)
-    clock = asyncio.get_running_loop().time
-    deadline_s = clock() + JOINING_S
+    deadline_s = asyncio.get_running_loop().time() + JOINING_S
     differences: list[str] = []
-    missing = stream_configs(replicas, limits)
-    while missing:
-        name, config = next(iter(missing.items()))
-        try:
-            differences += await _make(hub, name, config)
-        except HubError as error:
-            pause_s = backoff.next_s()
-            if error.reason is not HubReason.NO_QUORUM or clock() + pause_s > deadline_s:
-                raise
-            await asyncio.sleep(pause_s)
-        else:
-            backoff.reset()
-            del missing[name]
+    for name, config in stream_configs(replicas, limits).items():
+        differences += await _make_with_quorum(hub, name, config, deadline_s)
     return differences
 
 
@@ -99,6 +86,20 @@ async def add_command_consumer(hub: Hub, robot: str) -> None:
     }
     call = f"CONSUMER.CREATE.{names.COMMANDS}.{robot}.{subjects}"
     await hub.api(call, {"stream_name": names.COMMANDS, "config": config})
+
+
+async def _make_with_quorum(hub: Hub, name: str, config: dict[str, Any], deadline_s: float) -> list[str]:
+    """As `_make`, again and again for as long as nodes are missing, up to a time of the event loop."""
+    backoff = Backoff(first_s=0.1, longest_s=2.0)
+    while True:
+        try:
+            return await _make(hub, name, config)
+        except HubError as error:
+            pause_s = backoff.next_s()
+            late = asyncio.get_running_loop().time() + pause_s > deadline_s
+            if error.reason is not HubReason.NO_QUORUM or late:
+                raise
+        await asyncio.sleep(pause_s)
 
 
 async def _make(hub: Hub, name: str, config: dict[str, Any]) -> list[str]:
