@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from rich.console import Console
 from typer.main import get_command
 
 from bridge.config import BridgeSettings
@@ -14,7 +13,7 @@ from common import config, logs, program
 from common.check_options import PrintOption, SchemaOption, check_settings
 from common.command_line import read_plainly
 from common.errors import ExitCode, UserError
-from common.findings import exit_code, print_findings
+from common.findings import end_with_findings
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -61,9 +60,7 @@ def doctor(config_file: _Config = None, as_json: _AsJson = False) -> None:
     """Finds out what keeps this robot from its fleet; exits 1 if something is wrong."""
     from bridge.doctor.examination import examine  # noqa: PLC0415
 
-    findings = list(examine(config_file))
-    print_findings(findings, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
-    raise typer.Exit(int(exit_code(findings)))
+    end_with_findings(examine(config_file), as_json=as_json)
 
 
 @app.command(context_settings=_PASSED_ON)

@@ -4,14 +4,17 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
-from typing import Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import typer
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from common.errors import ExitCode
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+# rich is imported late: programs that serve pass findings on, and print none.
 
 
 class Verdict(Enum):
@@ -70,11 +73,13 @@ def findings_json(findings: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def print_findings(findings: Sequence[Finding], *, as_json: bool, out: Console) -> None:
+def print_findings(findings: Sequence[Finding], *, as_json: bool, out: "Console") -> None:
     """Prints a JSON document, or a row per finding with consequence and remedy below it."""
     if as_json:
         print(json.dumps(findings_json(findings), indent=2, ensure_ascii=False), file=out.file)
         return
+    from rich.text import Text  # noqa: PLC0415
+
     out.print(_table(findings))
     count = sum(each.verdict is Verdict.WRONG for each in findings)
     out.print(Text("nothing is wrong" if count == 0 else f"{count} to fix", style="bold"))
@@ -82,6 +87,8 @@ def print_findings(findings: Sequence[Finding], *, as_json: bool, out: Console) 
 
 def end_with_findings(findings: Iterable[Finding], *, as_json: bool) -> NoReturn:
     """Prints what a doctor has found on standard output, and ends the command with the exit code."""
+    from rich.console import Console  # noqa: PLC0415
+
     found = list(findings)
     print_findings(found, as_json=as_json, out=Console(highlight=False, markup=False, emoji=False))
     raise typer.Exit(int(exit_code(found)))
@@ -90,7 +97,10 @@ def end_with_findings(findings: Iterable[Finding], *, as_json: bool) -> NoReturn
 _STYLES: Final = {Verdict.GOOD: "green", Verdict.NOTE: "yellow", Verdict.WRONG: "bold red"}
 
 
-def _table(findings: Sequence[Finding]) -> Table:
+def _table(findings: Sequence[Finding]) -> "Table":
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
     table = Table.grid(padding=(0, 2))
     table.add_column(no_wrap=True)
     table.add_column(no_wrap=True)

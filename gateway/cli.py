@@ -10,16 +10,14 @@ from common import logs
 from common.check_options import PrintOption, SchemaOption
 from common.config import SettingsConflictError, as_yaml, json_schema
 from common.errors import UserError
-from common.findings import end_with_findings
 from common.program import bound_arenas, run, run_command_line
-from gateway.access.reloader import load_access
-from gateway.app import serve as serve_until
 from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
 from gateway.credentials_cli import app as credentials_app
-from gateway.doctor.examination import examine
 
 app = typer.Typer(help="The robot's side of the door: ROS 2 in, gRPC out.", no_args_is_help=True)
 app.add_typer(credentials_app, name="credentials")
+
+# gRPC and the checks are imported late: checking the configuration needs neither.
 
 Config = Annotated[
     Path | None,
@@ -37,6 +35,8 @@ def serve(config: Config = None) -> None:
     os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
     settings = load_settings(config)
     logs.configure(settings.log_level, settings.log_format)
+    from gateway.app import serve as serve_until  # noqa: PLC0415
+
     bound_arenas()
     run(lambda stop: serve_until(settings, stop))
 
@@ -52,6 +52,8 @@ def check(config: Config = None, in_effect: PrintOption = False, schema: SchemaO
         return
     settings = load_settings(config, _check_readers)
     if access_files := settings.security.access_files():
+        from gateway.access.reloader import load_access  # noqa: PLC0415
+
         load_access(*access_files)
     if in_effect:
         typer.echo(as_yaml(settings), nl=False)
@@ -81,6 +83,9 @@ def doctor(
 
     Ends 0 when nothing is wrong, 1 when something is.
     """
+    from common.findings import end_with_findings  # noqa: PLC0415
+    from gateway.doctor.examination import examine  # noqa: PLC0415
+
     end_with_findings(examine(config), as_json=as_json)
 
 

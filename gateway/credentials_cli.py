@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any, Final, TypeAlias
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from common.errors import ExitCode, UserError
 from common.private_files import write_private
@@ -99,6 +97,10 @@ def list_all(config: Config = None, directory: Directory = None, as_json: AsJson
     if as_json:
         typer.echo(json.dumps([_as_json(each, now_s) for each in credentials], indent=2))
         return
+    # Late: the other commands print no table.
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
     table = Table.grid(padding=(0, 2))
     table.add_row("id", "name", "role", "kind", "made", "ends", "state")
     for each in credentials:
