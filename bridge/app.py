@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -23,11 +22,14 @@ from bridge.status import Status
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from common import bind, rpc
 from common.health import Health
+from common.tasks import first_to_end
 from console.client import AsyncGatewayClient
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Coroutine
+
     from bridge.uploads.uploads import Uploads
 
 _log = logging.getLogger(__name__)
@@ -79,7 +81,8 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         await server.start()
         _log.info("serving on %s; robot %s of fleet %s", settings.socket, robot, settings.hub.fleet)
         try:
-            await _run(parts, stop)
+            # A defect in one of them ends the program, which is then restarted.
+            await first_to_end(stop.wait(), *(part() for part in parts))
         finally:
             await server.stop(rpc.STOP_GRACE_S)
             settings.socket.unlink(missing_ok=True)
@@ -118,17 +121,3 @@ def _address(settings: BridgeSettings) -> FleetAddress:
         inbox=inbox_prefix(hub.robot),
         name=f"robot-bridge {hub.robot}",
     )
-
-
-async def _run(parts: list[Callable[[], Coroutine[Any, Any, None]]], stop: asyncio.Event) -> None:
-    """Runs the parts until `stop`; a defect in one of them ends the program, which is then restarted."""
-    tasks = [asyncio.create_task(part()) for part in parts]
-    stopping = asyncio.create_task(stop.wait())
-    try:
-        done, _ = await asyncio.wait([*tasks, stopping], return_when=asyncio.FIRST_COMPLETED)
-        for task in done:
-            task.result()
-    finally:
-        for task in (*tasks, stopping):
-            task.cancel()
-        await asyncio.gather(*tasks, stopping, return_exceptions=True)

@@ -65,6 +65,19 @@ class DomainError(Exception):
     """Seconds after which a retry may succeed; None if unknown."""
 
 
+class SpecificError(DomainError):
+    """An error with one of several reasons, which its constructor is given; only its subclasses are raised.
+
+    Args:
+        text: for people: what, and what to do.
+        reason: the same for programs.
+    """
+
+    def __init__(self, text: str, reason: Reason) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
 class InvalidRequestError(DomainError):
     """The request is invalid and will remain so. Nothing was changed."""
 
@@ -87,7 +100,7 @@ class UnknownServiceError(DomainError):
     reason = Reason.UNKNOWN_SERVICE
 
 
-class TooMuchError(DomainError):
+class TooMuchError(SpecificError):
     """The caller exceeds a limit, or a resource is exhausted.
 
     Args:
@@ -97,8 +110,7 @@ class TooMuchError(DomainError):
     """
 
     def __init__(self, text: str, reason: Reason, retry_after_s: float | None = None) -> None:
-        super().__init__(text)
-        self.reason = reason
+        super().__init__(text, reason)
         self.retry_after_s = retry_after_s
 
 
@@ -108,7 +120,7 @@ class NotRunningError(DomainError):
     reason = Reason.PREVIEW_NOT_RUNNING
 
 
-class PreconditionError(DomainError):
+class PreconditionError(SpecificError):
     """The robot's state does not permit the request.
 
     Args:
@@ -116,22 +128,14 @@ class PreconditionError(DomainError):
         reason: why, for programs.
     """
 
-    def __init__(self, text: str, reason: Reason) -> None:
-        super().__init__(text)
-        self.reason = reason
 
-
-class ConflictError(DomainError):
+class ConflictError(SpecificError):
     """Another caller has what the request needs.
 
     Args:
         text: who, and what to do.
         reason: why, for programs.
     """
-
-    def __init__(self, text: str, reason: Reason) -> None:
-        super().__init__(text)
-        self.reason = reason
 
 
 class DriveUnreachableError(DomainError):
@@ -140,17 +144,13 @@ class DriveUnreachableError(DomainError):
     reason = Reason.DRIVE_UNREACHABLE
 
 
-class NotFoundError(DomainError):
+class NotFoundError(SpecificError):
     """What the request names does not exist.
 
     Args:
         text: what, and what to do.
         reason: what, for programs.
     """
-
-    def __init__(self, text: str, reason: Reason) -> None:
-        super().__init__(text)
-        self.reason = reason
 
 
 class DamagedError(DomainError):
@@ -171,17 +171,13 @@ class BridgeUnreachableError(DomainError):
     reason = Reason.BRIDGE_UNREACHABLE
 
 
-class NotAuthenticatedError(DomainError):
+class NotAuthenticatedError(SpecificError):
     """The caller is not authenticated: no credential, or one that is not valid.
 
     Args:
         text: why, and what to do.
         reason: why, for programs.
     """
-
-    def __init__(self, text: str, reason: Reason) -> None:
-        super().__init__(text)
-        self.reason = reason
 
 
 class NotAllowedError(DomainError):

@@ -117,6 +117,9 @@ class Chain(grpc.aio.ServerInterceptor):
         interceptors: outermost first.
         method_type: describes a method by path, `request_streaming` and `response_streaming`.
         call_type: stands for one call; made of its method and gRPC's context.
+
+    Attributes:
+        interceptors: in their order.
     """
 
     def __init__(
@@ -125,7 +128,7 @@ class Chain(grpc.aio.ServerInterceptor):
         method_type: Callable[..., Any] = Method,
         call_type: Callable[[Any, RpcContext], Any] = Call,
     ) -> None:
-        self._interceptors: Final = tuple(interceptors)
+        self.interceptors: Final = tuple(interceptors)
         self._method_type = method_type
         self._call_type = call_type
         self._wrapped: dict[str, Handler] = {}
@@ -187,7 +190,7 @@ class Chain(grpc.aio.ServerInterceptor):
         method = self._method_type(
             path, request_streaming=request_streaming, response_streaming=response_streaming
         )
-        passage = _Passage([each for each in self._interceptors if each.applies_to(method)])
+        passage = _Passage([each for each in self.interceptors if each.applies_to(method)])
         received = passage.each_received if request_streaming else passage.received
         new_call = self._call_type
 

@@ -24,6 +24,7 @@ from typing import Any, Final
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
+from common.tasks import cancel
 from fleet import consuming, names
 from fleet.consuming import Delivery, Start
 from fleet.errors import HubError, HubReason, RefusedError, UnreachableError, api_error, is_repeat
@@ -369,9 +370,7 @@ class Hub:
 
     async def close(self) -> None:
         """Ends the requests in hand."""
-        for task in self._calls:
-            task.cancel()
-        await asyncio.gather(*self._calls, return_exceptions=True)
+        await cancel(self._calls)
 
     async def _try_servers(self) -> Session | None:
         """Tries every server once, in random order."""
@@ -464,8 +463,7 @@ async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
     try:
         yield hub
     finally:
-        supervisor.cancel()
-        await asyncio.gather(supervisor, return_exceptions=True)
+        await cancel([supervisor])
         await hub.close()
 
 

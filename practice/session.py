@@ -6,6 +6,7 @@ from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from dataclasses import replace
 from typing import Final, Never, Self, TypeVar
 
+from common.tasks import cancel
 from console.client import (
     Clock,
     DesiredPreview,
@@ -59,8 +60,7 @@ class PracticeSession(NoRecordings):
 
     async def __aexit__(self, *_: object) -> None:
         if self._cycles:
-            self._cycles.cancel()
-            await asyncio.gather(self._cycles, return_exceptions=True)
+            await cancel([self._cycles])
 
     # --- the client ---
 

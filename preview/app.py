@@ -10,6 +10,7 @@ from typing import Final, NoReturn
 
 from common import bind, rpc
 from common.health import Health
+from common.tasks import cancel
 from preview.config import PreviewSettings
 from preview.encoders import trial
 from preview.encoders.crash_marker import CrashMarkerFile
@@ -60,8 +61,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
             _end_process(error)
         finally:
             await server.stop(rpc.STOP_GRACE_S)
-            trials.cancel()
-            await asyncio.gather(trials, return_exceptions=True)
+            await cancel([trials])
             await prober.close()
             settings.socket.unlink(missing_ok=True)
 

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, Final, NoReturn, cast
 
 from common import bind
+from common.tasks import cancel
 from common.video_tap import Header, Kind, encode_object
 from preview.pipeline.events import AccessUnit
 from preview.supervisor import Supervisor
@@ -67,8 +68,7 @@ class VideoTap:
         try:
             yield
         finally:
-            informing.cancel()
-            await asyncio.gather(informing, return_exceptions=True)
+            await cancel([informing])
             server.close()
             self._end(path)
 

@@ -2,6 +2,8 @@
 
 import signal
 
+from hypothesis import settings
+
 pytest_plugins = [
     "tests.support.bounds",
     "tests.support.distribution",
@@ -12,7 +14,11 @@ pytest_plugins = [
 
 
 def pytest_configure() -> None:
-    """A run in the background inherits ignored signals and would pass them on to the programs under test."""
+    """Sets what holds for every test of the process."""
+    # A run in the background inherits ignored signals and would pass them on to the programs under test.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_DFL)
+    # How long an example takes depends on what else the machine does; pytest's timeout bounds each test.
+    settings.register_profile("no deadline", deadline=None)
+    settings.load_profile("no deadline")

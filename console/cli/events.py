@@ -1,13 +1,14 @@
 """robotctl events: past events of the robot and, with --follow, new ones."""
 
 from collections.abc import Iterator
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 import typer
 from rich.text import Text
 
 from common.errors import ExitCode, UserError
 from console.cli.error_report import error_as_json
+from console.cli.options import ClientsOption, FollowOption, SeverityOption
 from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.cli.tables import STYLES
@@ -25,20 +26,13 @@ _CLOCK_FORM: Final = "%Y-%m-%d %H:%M:%S %Z"
 def events(
     session: Session,
     *,
-    follow: Annotated[
-        bool, typer.Option("--follow", help="Continue with new events until Ctrl-C.", show_default=False)
-    ] = False,
+    follow: FollowOption = False,
     since: Annotated[
         str | None,
         typer.Option("--since", metavar="RUN:SEQUENCE", help="Resume after this event.", show_default=False),
     ] = None,
-    severity: Annotated[
-        Literal["info", "warning", "error"],
-        typer.Option("--severity", help="Leave out events of lower severity."),
-    ] = "info",
-    clients: Annotated[
-        bool, typer.Option("--clients", help="Show who joins and leaves, too.", show_default=False)
-    ] = False,
+    severity: SeverityOption = "info",
+    clients: ClientsOption = False,
 ) -> None:
     """Show past events of the robot, as far back as the gateway keeps them.
 

@@ -3,7 +3,7 @@
 import asyncio
 import re
 from datetime import UTC, datetime, timedelta
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 import typer
 
@@ -11,6 +11,7 @@ from common.errors import ExitCode, UserError
 from console.cli.fleet_session import FleetSession, with_fleet
 from console.cli.fleet_tables import item_line
 from console.cli.loop_signals import ENDING, handled
+from console.cli.options import ClientsOption, FollowOption, SeverityOption
 from console.cli.session import print_json
 from console.client.results import FaultSeverity
 from console.fleet.values import EventsDropped, FleetItem, RobotEvent, Unreadable
@@ -28,22 +29,15 @@ def events(
     robot: Annotated[
         str, typer.Argument(metavar="[ROBOT]", help="One robot.", show_default="all robots")
     ] = "",
-    follow: Annotated[
-        bool, typer.Option("--follow", help="Continue with new events until Ctrl-C.", show_default=False)
-    ] = False,
+    follow: FollowOption = False,
     since: Annotated[
         str,
         typer.Option(
             "--since", metavar="TIME", help="30m, 6h or 2d ago, or a time in UTC: 2026-11-22T09:30."
         ),
     ] = "1d",
-    severity: Annotated[
-        Literal["info", "warning", "error"],
-        typer.Option("--severity", help="Leave out events of lower severity."),
-    ] = "info",
-    clients: Annotated[
-        bool, typer.Option("--clients", help="Show who joins and leaves, too.", show_default=False)
-    ] = False,
+    severity: SeverityOption = "info",
+    clients: ClientsOption = False,
 ) -> None:
     """Show past events of all robots or one, as the hub has them; gaps are shown as what they are.
 

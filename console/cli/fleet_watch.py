@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
 from rich.console import Group
 from rich.text import Text
 
@@ -15,6 +14,7 @@ from console.cli.fleet_session import FleetSession, with_fleet
 from console.cli.fleet_tables import rows_table
 from console.cli.live_screen import Fitted, Screen
 from console.cli.loop_signals import ENDING, handled
+from console.cli.options import CountOption, interval_option
 from console.cli.session import print_json
 from console.fleet.columns import COLUMNS, summary_line
 from console.fleet.model import summary
@@ -33,16 +33,8 @@ _CLOCK_AGAIN_AFTER_S: Final = 60.0
 def watch(
     session: FleetSession,
     *,
-    interval_s: Annotated[
-        float,
-        typer.Option(
-            "--interval", min=0.25, max=3600, metavar="SECONDS", help="Shortest time between updates."
-        ),
-    ] = 1.0,
-    count: Annotated[
-        int | None,
-        typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
-    ] = None,
+    interval_s: Annotated[float, interval_option(0.25)] = 1.0,
+    count: CountOption = None,
 ) -> None:
     """Show the fleet whenever it changes, until Ctrl-C.
 

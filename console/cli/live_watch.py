@@ -10,6 +10,7 @@ from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final
 
+from common.tasks import cancel
 from console.cli.keyboard import Key, Keyboard, has_keyboard, keys_in
 from console.cli.live_screen import Fitted, Screen, live_view
 from console.cli.loop_signals import ENDING, handled
@@ -80,9 +81,7 @@ class _LiveWatch:
             try:
                 await self._ending.wait()
             finally:
-                for task in self._tasks:
-                    task.cancel()
-                ended = await asyncio.gather(*self._tasks, return_exceptions=True)
+                ended = await cancel(self._tasks)
         for outcome in ended:
             if isinstance(outcome, Exception):
                 raise outcome

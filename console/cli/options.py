@@ -1,7 +1,7 @@
-"""The options that every command has, before or after its name."""
+"""The options that several commands have; the first three before or after the command's name."""
 
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
 
@@ -42,6 +42,27 @@ RobotOption: TypeAlias = Annotated[
 JsonOption: TypeAlias = Annotated[
     bool, typer.Option("--json", help="Print JSON (docs/robotctl.md lists the keys).", show_default=False)
 ]
+CountOption: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
+]
+FollowOption: TypeAlias = Annotated[
+    bool, typer.Option("--follow", help="Continue with new events until Ctrl-C.", show_default=False)
+]
+SeverityOption: TypeAlias = Annotated[
+    Literal["info", "warning", "error"],
+    typer.Option("--severity", help="Leave out events of lower severity."),
+]
+ClientsOption: TypeAlias = Annotated[
+    bool, typer.Option("--clients", help="Show who joins and leaves, too.", show_default=False)
+]
+
+
+def interval_option(least_s: float) -> Any:
+    """Returns the option for the shortest time between updates, in seconds."""
+    return typer.Option(
+        "--interval", min=least_s, max=3600, metavar="SECONDS", help="Shortest time between updates."
+    )
 
 
 @dataclass(frozen=True, slots=True)

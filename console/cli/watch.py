@@ -3,10 +3,9 @@
 from datetime import UTC, datetime
 from typing import Annotated
 
-import typer
-
 from console.cli.error_report import error_as_json
 from console.cli.live_watch import watch_on_a_terminal
+from console.cli.options import CountOption, interval_option
 from console.cli.session import Session, print_json, with_session
 from console.cli.stopping import until_stopped
 from console.client import Outage, WatchedStatus
@@ -18,16 +17,8 @@ from console.presentation.status_line import status_line
 def watch(
     session: Session,
     *,
-    interval_s: Annotated[
-        float,
-        typer.Option(
-            "--interval", min=0.1, max=3600, metavar="SECONDS", help="Shortest time between updates."
-        ),
-    ] = 1.0,
-    count: Annotated[
-        int | None,
-        typer.Option("--count", min=1, help="End after so many updates.", show_default="until Ctrl-C"),
-    ] = None,
+    interval_s: Annotated[float, interval_option(0.1)] = 1.0,
+    count: CountOption = None,
 ) -> None:
     """Show the status whenever it changes, until Ctrl-C.
 

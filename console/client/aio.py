@@ -6,6 +6,7 @@ from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import Self, TypeVar
 
+from common.tasks import cancel
 from console.client import results
 from console.client.clock import Clock, Offset
 from console.client.driving import DriveOptions, DriveSession
@@ -475,6 +476,4 @@ async def _first_answer(attempts: "list[asyncio.Task[results.RobotStopped]]") ->
                 if error is None or not waiting or not isinstance(error, Unreachable | DeadlineExceeded):
                     return each.result()
     finally:
-        for each in attempts:
-            each.cancel()
-        await asyncio.gather(*attempts, return_exceptions=True)
+        await cancel(attempts)

@@ -17,6 +17,7 @@ from typing import Final, Protocol, Self, TypeAlias
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
+from common.tasks import cancel
 from common.version import project_version
 from console.client.errors import GatewayError, GatewayFailed, Refused, Unreachable
 from console.client.mapping.driving import DriveCommand, command_request, join_request, open_request
@@ -440,8 +441,7 @@ class DriveSession:
                     self._take(item)
         finally:
             self._open_lanes -= 1
-            writer.cancel()
-            await asyncio.gather(writer, return_exceptions=True)
+            await cancel([writer])
             lane.cancel()
             await transport.close()
             self._changes.notify_all()
@@ -477,9 +477,7 @@ class DriveSession:
         self._changes.notify_all()
 
     async def _close(self) -> None:
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await cancel(self._tasks)
 
 
 class OnTheirWay:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final, NoReturn, Protocol
 
 from common.backoff import Backoff
+from common.tasks import first_to_end
 from console.client import (
     Clock,
     DesiredPreview,
@@ -21,7 +22,6 @@ from console.client import (
 )
 from console.monitor.driver import DriveClient
 from console.monitor.event_log import EventLine, line_of
-from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState
 from console.monitor.recordings import RecordingClient

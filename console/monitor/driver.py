@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, NoReturn, Protocol
 
+from common.tasks import first_to_end
 from console.client import (
     DriveOptions,
     DriveSession,
@@ -19,7 +20,6 @@ from console.client import (
 )
 from console.client.results import DriveLimits, RobotStopped, StopReset, TeleopAnswer
 from console.monitor.calls import Calls
-from console.monitor.first_to_end import first_to_end
 from console.monitor.notes import Notes
 from console.presentation.preview_switch import Note
 from console.presentation.severity_style import SeverityStyle

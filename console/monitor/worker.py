@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeAlias
 
+from common.tasks import first_to_end
 from console.client import (
     Backoff,
     ClientOptions,
@@ -22,7 +23,6 @@ from console.client import (
 from console.monitor.conversation import Conversation, RetryBackoff, RobotSession
 from console.monitor.credential_refresh import LoadCredentials, RefreshingClient
 from console.monitor.driver import Driver
-from console.monitor.first_to_end import first_to_end
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import LatestState, MonitorState, PreviewRequest
 from console.monitor.recordings import Pictures, Recordings

@@ -8,6 +8,7 @@ from typing import Any, Final, Generic, NoReturn, Protocol, TypeVar
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
+from common.tasks import cancel
 
 _log = logging.getLogger(__name__)
 ResultT = TypeVar("ResultT")
@@ -190,9 +191,7 @@ async def _first_loss(*jobs: Coroutine[Any, Any, None]) -> LinkLostError:
         ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         error = ended.pop().exception()
     finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await cancel(tasks)
     if isinstance(error, LinkLostError):
         return error
     raise error or AssertionError("an endless job returned")

@@ -5,13 +5,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily as CounterFamily
 from prometheus_client.core import GaugeMetricFamily as Gauge
 from prometheus_client.core import HistogramMetricFamily as HistogramFamily
 from prometheus_client.core import Metric
-from prometheus_client.registry import Collector
 
+from common.collector import InstantCollector
 from gateway.links.bridge.copies import Copies
 from gateway.links.bridge.link import BridgeLink
 from gateway.links.drive.state import DriveLink
@@ -59,7 +58,7 @@ class BridgeMetrics:
 
 
 @dataclass(eq=False)
-class GatewayCollector(Collector):
+class GatewayCollector(InstantCollector):
     """Collects all metrics at one instant.
 
     Attributes:
@@ -85,16 +84,6 @@ class GatewayCollector(Collector):
     drive_link: DriveLink | None = None
     recorder: RecorderMetrics | None = None
     bridge: BridgeMetrics | None = None
-
-    def text(self) -> bytes:
-        """Returns them in Prometheus' text format."""
-        registry = CollectorRegistry()
-        registry.register(self)
-        return generate_latest(registry)
-
-    def describe(self) -> list[Metric]:
-        """Returns nothing: without this method, registering would collect."""
-        return []
 
     def collect(self) -> Iterator[Metric]:
         """Yields every family."""

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager, suppress
 from typing import Final
 
 from common.metrics_endpoint import serving_metrics
+from common.tasks import cancel
 from fleet.clock import HubClock, read_clock
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.errors import HubError
@@ -81,8 +82,7 @@ async def exporting(address: FleetAddress, host: str, port: int) -> AsyncIterato
             async with serving_metrics(exporter.collector.text, host, port) as bound:
                 yield bound
         finally:
-            following.cancel()
-            await asyncio.gather(following, return_exceptions=True)
+            await cancel([following])
 
 
 async def export_until_stopped(address: FleetAddress, host: str, port: int) -> None:

@@ -5,12 +5,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily as CounterFamily
 from prometheus_client.core import GaugeMetricFamily as Gauge
 from prometheus_client.core import Metric
-from prometheus_client.registry import Collector
 
+from common.collector import InstantCollector
 from fleet.enrolment import is_revoked
 from fleet.names import ROBOT_NAME
 from fleet.reading import NotReadableError, robot_state
@@ -60,7 +59,7 @@ class RobotSample:
 
 
 @dataclass(eq=False)
-class FleetCollector(Collector):
+class FleetCollector(InstantCollector):
     """Keeps what the hub has about enrolled robots, and collects all metrics at one instant.
 
     Attributes:
@@ -86,16 +85,6 @@ class FleetCollector(Collector):
             self._states.pop(name, None)
         elif name in self._states or len(self._states) < MOST_ROBOTS:
             self._states[name] = SeenState(_state(name, value), received_unix_ms)
-
-    def text(self) -> bytes:
-        """Returns the metrics in Prometheus' text format."""
-        registry = CollectorRegistry()
-        registry.register(self)
-        return generate_latest(registry)
-
-    def describe(self) -> list[Metric]:
-        """Returns nothing: without this method, registering would collect."""
-        return []
 
     def collect(self) -> Iterator[Metric]:
         """Yields every family."""

@@ -11,6 +11,7 @@ from typing import Final
 from common import bind, rpc
 from common.health import Health
 from common.metrics_endpoint import serving_metrics
+from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Handler, Hub, Request, connect
 from fleet.errors import HubError
 from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
@@ -52,7 +53,6 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
         health.register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()
-        tasks: tuple[asyncio.Task[None], ...] = ()
         port = settings.metrics.port
         page = nullcontext() if port is None else serving_metrics(metrics.text, settings.metrics.host, port)
         try:
@@ -61,28 +61,14 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
                     UPLOAD_SUBJECTS, RECEIVERS, _handler(service, metrics), at_once=AT_ONCE, busy=busy()
                 )
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
-                tasks = (
-                    asyncio.create_task(_report_health(hub, health), name="health"),
-                    asyncio.create_task(_sweep_for_ever(settings, store, threads, metrics), name="sweep"),
+                await first_to_end(
+                    stop.wait(),
+                    _report_health(hub, health),
+                    _sweep_for_ever(settings, store, threads, metrics),
                 )
-                await _first_of(stop, tasks)
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
             await server.stop(rpc.STOP_GRACE_S)
             settings.socket.unlink(missing_ok=True)
-
-
-async def _first_of(stop: asyncio.Event, tasks: "tuple[asyncio.Task[None], ...]") -> None:
-    """Waits for `stop`; a task that ends before raises what it has ended with."""
-    waiter = asyncio.ensure_future(stop.wait())
-    try:
-        done, _ = await asyncio.wait({waiter, *tasks}, return_when=asyncio.FIRST_COMPLETED)
-        for each in done:
-            each.result()
-    finally:
-        waiter.cancel()
 
 
 @asynccontextmanager

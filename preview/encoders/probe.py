@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.backoff import Backoff
+from common.tasks import cancel
 from common.trial import TrialError
 from preview.encoders.catalogue import Encoder
 
@@ -77,10 +78,7 @@ class TrialProber:
 
     async def close(self) -> None:
         """Cancels the trials, which kills their processes."""
-        pending = [*self._tasks.values(), *self._first.values()]
-        for each in pending:
-            each.cancel()
-        await asyncio.gather(*pending, return_exceptions=True)
+        await cancel([*self._tasks.values(), *self._first.values()])
 
     async def _try(self, encoder: Encoder) -> None:
         """Tries an encoder until the result is final."""

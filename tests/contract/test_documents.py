@@ -1,9 +1,14 @@
 """The documents' links, file names and numbering are valid."""
 
 import re
+from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+
+from gateway.rpc.server import Interceptors
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted(
@@ -43,6 +48,31 @@ def test_the_contributors_guide_names_files_that_exist() -> None:
     )
     assert named
     assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
+
+
+def drawn() -> list[tuple[str, str]]:
+    """The way of a call in docs/architecture.md: the file of each line, and what follows its name."""
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    section = page.partition("## One call, top to bottom")[2].partition("\n## ")[0]
+    return re.findall(r"^[ │├─▶]+([\w/]+\.py) +(.+)$", section.split("```")[1], re.MULTILINE)
+
+
+def test_the_way_of_a_call_is_drawn_through_files_that_exist() -> None:
+    files = {file for file, _ in drawn()}
+    assert len(files) > 20
+    assert [
+        file for file in sorted(files) if not ((ROOT / file).exists() or (ROOT / "gateway" / file).exists())
+    ] == []
+
+
+def test_the_way_of_a_call_passes_the_interceptors_in_their_order() -> None:
+    names = [field.name for field in fields(Interceptors)]
+    parts: dict[str, Any] = {name: SimpleNamespace(name=name) for name in names}
+    chain = Interceptors(**parts).chain()
+    order = [getattr(each, "name", type(each).__name__) for each in chain.interceptors]
+    known = {"errors": "ErrorInterceptor", "audit start": "AuditStart"}
+    columns = (re.split(r"  +", text)[0] for _, text in drawn())
+    assert [known.get(column, column) for column in columns if known.get(column, column) in order] == order
 
 
 def test_decisions_are_numbered_and_listed_in_order() -> None:

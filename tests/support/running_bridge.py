@@ -1,11 +1,9 @@
 """The real bridge as a process of its own, beside a hub and a gateway, and what the hub has of it."""
 
-import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -19,9 +17,9 @@ from hub.streams import add_command_consumer, set_up
 from omniseer.bridge.v1 import bridge_service_pb2 as pb
 from omniseer.fleet.v1.event_pb2 import DROP_REASON_OUTBOX_LOST, EventBatch
 from omniseer.gateway.v1 import cloud_pb2
+from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
-_ROOT: Final = Path(__file__).parents[2]
 _UP_WITHIN_S: Final = 30.0
 ROBOT: Final = "lab2"
 
@@ -92,12 +90,15 @@ async def prepare(servers: tuple[str, ...]) -> None:
 
 
 @dataclass
-class BridgeProgram:
-    """A bridge, which may be killed and started again.
+class BridgeProgram(RestartableProgram):
+    """A bridge.
 
     Attributes:
         settings: keys of its configuration besides those of every test.
     """
+
+    name = "bridge"
+    end_within_s = 10
 
     directory: Path
     gateway_port: int
@@ -111,14 +112,6 @@ class BridgeProgram:
         return Path(self.settings.get("root", self.directory / "outbox"))
 
     @property
-    def socket(self) -> Path:
-        return self.directory / "bridge.sock"
-
-    @property
-    def log(self) -> Path:
-        return self.directory / "bridge.log"
-
-    @property
     def state(self) -> pb.WatchStateResponse:
         return newest_state(self.socket)
 
@@ -128,7 +121,6 @@ class BridgeProgram:
 
     def start(self, *, wait: bool = True) -> None:
         """Starts it; it serves when this returns, unless not waited for."""
-        config = self.directory / "bridge.yaml"
         values = {
             "socket": str(self.socket),
             "root": str(self.root),
@@ -136,32 +128,12 @@ class BridgeProgram:
             "hub": {"servers": list(self.servers), "robot": ROBOT},
             **self.settings,
         }
-        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-        command = [sys.executable, "-m", "bridge.cli", "serve", "--config", str(config)]
-        with self.log.open("ab") as log:
-            self.process = subprocess.Popen(command, cwd=_ROOT, env=os.environ | self.environment, stderr=log)
+        self.spawn((sys.executable, "-m", "bridge.cli"), values, self.environment)
         if wait:
             wait_until(self._serves, "the bridge serves", _UP_WITHIN_S)
 
-    def kill(self) -> None:
-        """Ends it with SIGKILL."""
-        assert self.process
-        self.process.kill()
-        self.process.wait()
-
-    def stop(self) -> int:
-        """Ends it as an operator would; returns its exit code."""
-        assert self.process
-        self.process.terminate()
-        try:
-            return self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise
-
     def _serves(self) -> bool:
-        assert self.process
-        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+        self.assert_alive()
         try:
             return bool(self.state.instance_id)
         except grpc.RpcError:
@@ -179,6 +151,4 @@ def bridge_program(
         yield program
     finally:
         if program.process:
-            with suppress(ProcessLookupError):
-                program.process.kill()
-            program.process.wait()
+            program.kill()

@@ -1,30 +1,33 @@
 """The real recorder as a process of its own, and its calls."""
 
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import grpc
 
+from bench.video.foreign import end
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.client import newest_state
+from tests.support.restartable_program import RestartableProgram
 from tests.support.waiting import wait_until
 
-_ROOT: Final = Path(__file__).parents[2]
 _UP_WITHIN_S: Final = 60.0
 """rclpy takes seconds to import and to join the graph, many on a machine with other things to do."""
 
 
 @dataclass
-class RecorderProgram:
-    """A recorder in the ROS domain of the environment, which may be killed and started again."""
+class RecorderProgram(RestartableProgram):
+    """A recorder in the ROS domain of the environment."""
+
+    name = "recorder"
+    end_within_s = 20
 
     directory: Path
     settings: dict[str, Any]
@@ -34,17 +37,8 @@ class RecorderProgram:
     def root(self) -> Path:
         return self.directory / "recordings-root"
 
-    @property
-    def socket(self) -> Path:
-        return self.directory / "recorder.sock"
-
-    @property
-    def log(self) -> Path:
-        return self.directory / "recorder.log"
-
     def start(self) -> None:
         """Starts it; it serves when this returns."""
-        config = self.directory / "recorder.yaml"
         values = {
             "socket": str(self.socket),
             "root": str(self.root),
@@ -52,29 +46,9 @@ class RecorderProgram:
             "presets": {"all": {"topics": ["*"], "exclude": ["/rosout", "/parameter_events"]}},
             **self.settings,
         }
-        config.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
         self.socket.unlink(missing_ok=True)
-        code = "from recorder.cli import main; main()"
-        command = [sys.executable, "-c", code, "serve", "--config", str(config)]
-        with self.log.open("ab") as output:
-            self.process = subprocess.Popen(command, cwd=_ROOT, stderr=output)
+        self.spawn((sys.executable, "-c", "from recorder.cli import main; main()"), values)
         wait_until(self._serves, "the recorder serves", _UP_WITHIN_S)
-
-    def kill(self) -> None:
-        """Ends it without warning."""
-        assert self.process
-        self.process.kill()
-        self.process.wait()
-
-    def stop(self) -> int:
-        """Ends it in order; returns its exit code."""
-        assert self.process
-        self.process.terminate()
-        try:
-            return self.process.wait(20)
-        except subprocess.TimeoutExpired:
-            self.kill()
-            raise
 
     def call(self, method: str, request: Any) -> Any:
         """Calls a method and returns its response."""
@@ -92,8 +66,7 @@ class RecorderProgram:
         return found
 
     def _serves(self) -> bool:
-        assert self.process
-        assert self.process.poll() is None, self.log.read_text(encoding="utf-8")[-2000:]
+        self.assert_alive()
         try:
             return self.state.status.state not in (0, pb.RECORDER_STATE_RECOVERING)
         except grpc.RpcError:
@@ -109,7 +82,4 @@ def recorder_program(directory: Path, **settings: Any) -> Iterator[RecorderProgr
         yield program
     finally:
         if program.process:
-            program.process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                program.process.wait(10)
-            program.kill()
+            end(program.process)

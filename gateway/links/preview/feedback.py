@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from typing import Final, NoReturn, Protocol, TypeAlias
 
 from common.errors import NotRunningError
+from common.tasks import cancel
 from gateway.links.link import RefusedError, ServiceClient
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.watch import LinkLostError, SharingConnector, WatchConnector
@@ -57,8 +58,7 @@ class Feedback(SharingConnector[PreviewServiceClient]):
             try:
                 yield client
             finally:
-                passing_on.cancel()
-                await asyncio.gather(passing_on, return_exceptions=True)
+                await cancel([passing_on])
 
     async def request_key_frame(self, preview: PreviewView, newest_pts: int | None) -> bool:
         """Requests a key frame for a viewer that lost a picture.

@@ -338,7 +338,7 @@ def _no_faster(after: Velocity | None, before: Velocity | None) -> bool:
 
 
 TestDriving = Driving.TestCase
-TestDriving.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)
+TestDriving.settings = settings(max_examples=150, stateful_step_count=60)
 
 
 @given(velocities)

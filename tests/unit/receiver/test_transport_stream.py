@@ -1,7 +1,7 @@
 """Access units out of a transport stream: whole ones, and after damage none before the next key frame."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from console.receiver.transport_stream import AccessUnit, TransportStream, UnknownVideoError
@@ -146,7 +146,6 @@ def test_a_unit_that_never_ends_is_dropped() -> None:
     assert reader.torn
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=400), st.integers(0, 7))
 def test_no_bytes_break_it(noise: bytes, whole: int) -> None:
     """Whatever comes in between, later frames are read, and none that was damaged."""
@@ -163,7 +162,6 @@ def test_no_bytes_break_it(noise: bytes, whole: int) -> None:
     assert {unit.data for unit in units if unit.pts_ticks is not None and len(unit.data) > 300} <= sent
 
 
-@settings(deadline=None)
 @given(st.sets(st.integers(0, 60)), st.booleans(), st.booleans())
 def test_any_loss_leaves_only_decodable_units(lost: set[int], noted: bool, sized: bool) -> None:
     """Each frame that is shown has arrived whole, and so has each one since the key frame before it."""

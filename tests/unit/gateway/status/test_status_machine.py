@@ -166,5 +166,5 @@ class Life(RuleBasedStateMachine):
         assert self.raised - self.cleared == len(active)
 
 
-Life.TestCase.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)
+Life.TestCase.settings = settings(max_examples=60, stateful_step_count=25)
 TestLife = Life.TestCase

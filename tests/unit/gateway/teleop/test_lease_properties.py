@@ -109,4 +109,4 @@ class Driving(RuleBasedStateMachine):
 
 
 TestDriving = Driving.TestCase
-TestDriving.settings = settings(max_examples=150, stateful_step_count=40, deadline=None)
+TestDriving.settings = settings(max_examples=150, stateful_step_count=40)

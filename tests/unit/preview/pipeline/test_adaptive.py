@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from common.units import bit_rate
@@ -319,7 +319,6 @@ def test_random_loss_on_a_wide_link_costs_nothing() -> None:
 _capacities = st.floats(FLOOR * 1.2, TARGET * 2)
 
 
-@settings(deadline=None)  # 240 s of windows each, on a machine that may be busy
 @given(_capacities, st.sampled_from([50.0, 200.0, 1000.0, None]), st.floats(0, 0.1))
 def test_it_comes_back_to_the_profile_when_the_congestion_ends(
     capacity: float, queue_ms: float | None, loss: float

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from recorder.intake.loss import LossCounter
@@ -112,7 +112,6 @@ DROPPED = st.lists(st.booleans(), max_size=200)
 ORDER = st.randoms(use_true_random=False)
 
 
-@settings(deadline=None)
 @given(dropped=DROPPED, apart=st.permutations([1, 1_000, 20_000]), count=st.integers(1, 3), order=ORDER)
 def test_taken_and_lost_are_what_was_published(
     dropped: list[bool], apart: list[int], count: int, order: Random
@@ -121,7 +120,6 @@ def test_taken_and_lost_are_what_was_published(
     assert counted == missing
 
 
-@settings(deadline=None)
 @given(sent=st.integers(0, 200), beginnings=st.lists(st.integers(1, 20), min_size=1, max_size=4), order=ORDER)
 def test_where_nothing_was_lost_nothing_is_counted(sent: int, beginnings: list[int], order: Random) -> None:
     assert counted_and_lost(beginnings, [False] * sent, order) == (0, 0)

@@ -191,7 +191,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert summary.messages == 9
 
 
-@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_damage_leaves_a_readable_file(tmp_path: Path, unfinished: bytes, data: st.DataObject) -> None:
     damaged = bytearray(unfinished)
@@ -209,7 +209,7 @@ def test_any_damage_leaves_a_readable_file(tmp_path: Path, unfinished: bytes, da
 
 
 @given(content=st.binary(max_size=2000))
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_file_that_is_no_segment_is_left_alone(tmp_path: Path, content: bytes) -> None:
     assert recovered(tmp_path, content) is None
     assert (tmp_path / "0.mcap.part").read_bytes() == content

@@ -1,7 +1,7 @@
 """CompressedVideo, judged by rosbags' own decoder."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -13,7 +13,6 @@ TYPES.register(get_types_from_msg(OWN, message.TYPE))
 
 
 # The first call has rosbags write its own decoder.
-@settings(deadline=None)
 @given(
     st.integers(0, message.MAX_TIME_NS - 1),
     st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=20),
