@@ -41,6 +41,10 @@ NAMES: Final = (
     "export_request",
     "hubs_command",
     "gateways_event",
+    "gateways_packets",
+    "drives_report",
+    "recorders_report",
+    "bridges_report",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

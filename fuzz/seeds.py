@@ -8,9 +8,13 @@ from rclpy.serialization import serialize_message
 from common.ca import new_ca
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
+from fuzz.programs import NOW_NS
 from fuzz.robot import SOURCES, type_of
+from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
+from omniseer.drive.v1 import drive_pb2
 from omniseer.fleet.v1 import command_pb2
 from omniseer.gateway.v1 import (
+    cloud_pb2,
     event_pb2,
     overlay_pb2,
     preview_pb2,
@@ -20,6 +24,7 @@ from omniseer.gateway.v1 import (
     system_status_pb2,
 )
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
+from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
 from recorder.mcap.records import bytes_of
 from tests.support.mpegts_writer import PACKET_BYTES, Writer, coded_frame
 
@@ -87,6 +92,47 @@ def _chunk_content() -> bytes:
     )
 
 
+def _drive_packets() -> bytes:
+    """A lease, a command, a stop and its reset, in the form of the target."""
+    packets = (
+        drive_pb2.ToDrive(grant=drive_pb2.GrantLease(session_id="s1", holder="anna", streaming=True)),
+        drive_pb2.ToDrive(
+            command=drive_pb2.Command(
+                session_id="s1",
+                sequence=1,
+                held=True,
+                vx_mps=0.2,
+                valid_until_ns=2 * NOW_NS,
+                echo_ns=NOW_NS,
+                picture_ns=NOW_NS,
+            )
+        ),
+        drive_pb2.ToDrive(stop=drive_pb2.Stop(by="ben", reason="a person")),
+        drive_pb2.ToDrive(reset=drive_pb2.Reset(stop_id=1)),
+        drive_pb2.ToDrive(end=drive_pb2.EndLease(session_id="s1", why=drive_pb2.LEASE_END_CLOSED)),
+    )
+    contents = [each.SerializeToString() for each in packets]
+    return b"".join(bytes((20, len(each))) + each for each in contents)
+
+
+def _drive_report() -> bytes:
+    """One message has either a welcome or a state; what fails to decode is left to the fuzzer."""
+    actual = drive_pb2.ActualState(
+        monotonic_ns=NOW_NS,
+        applied_revision=3,
+        phase=drive_pb2.PHASE_STOPPED,
+        inhibits=[drive_pb2.INHIBIT_PICTURE_STALE],
+        session_id="s1",
+        vx_mps=0.2,
+        stop=drive_pb2.Latch(stop_id=1, by="ben", reason="a person", since_ns=NOW_NS - 1),
+        episode=drive_pb2.Episode(
+            episode_id=1, holder="anna", started_ns=1, ended_ns=1 << 62, distance_m=2.0, ended_by="released"
+        ),
+        problems=["no odometry"],
+    )
+    return drive_pb2.FromDrive(actual=actual).SerializeToString()
+
+
 _SEEDS: Final = {
     "operators_request": [
         robot_gateway_pb2.SetPreviewModeRequest(
@@ -151,6 +197,24 @@ _SEEDS: Final = {
         recording_pb2.ExportRecordingRequest(
             recording_id=recording.RECORDING, file="../manifest.json", expected_sha256=bytes(32)
         ).SerializeToString(),
+    ],
+    "gateways_packets": [_drive_packets()],
+    "drives_report": [_drive_report()],
+    "recorders_report": [
+        recorder_pb.WatchStateResponse(
+            instance_id="a1",
+            status=recording_pb2.RecordingStatus(state=recording_pb2.RECORDER_STATE_RECORDING),
+            newest=recording_pb2.Recording(id=recording.RECORDING, label="door"),
+        ).SerializeToString()
+    ],
+    "bridges_report": [
+        bridge_pb.WatchStateResponse(
+            instance_id="a1",
+            status=cloud_pb2.CloudStatus(
+                state=cloud_pb2.CLOUD_STATE_CONNECTED, robot="lab2", last_error="why"
+            ),
+            requests=[bridge_pb.HubRequest(request_id="c1", issued_by="anna", remaining_ms=5000)],
+        ).SerializeToString()
     ],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }

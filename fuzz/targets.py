@@ -31,6 +31,7 @@ from console.receiver.transport_stream import PACKET_BYTES, TransportStream, Unk
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
+from fuzz.programs import bridges_report, drives_report, gateways_packets, recorders_report
 from fuzz.recording import export_request, segment, video_tap
 from fuzz.robot import robots_message
 from gateway.access.audit import line_of
@@ -211,7 +212,7 @@ def hubs_command(data: bytes) -> None:
     if isinstance(judgement, Handed):
         assert isinstance(judgement.action, Snapshot)
         assert 0 < judgement.remaining_s <= LONGEST_EXPIRY_S - 5
-        _must_be_one_line(judgement.issued_by + judgement.action.label)
+        assert not _OBEYED & set(judgement.issued_by + judgement.action.label)
 
 
 def gateways_event(data: bytes) -> None:
@@ -254,6 +255,10 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             export_request,
             hubs_command,
             gateways_event,
+            gateways_packets,
+            drives_report,
+            recorders_report,
+            bridges_report,
         )
     }
 )

@@ -1,5 +1,6 @@
 """A short run over every parser, and the proof that a defect would be found."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 import fuzz.__main__ as program
 from fuzz import OUTPUT
+from fuzz.worker import OURS
 
 ROOT = Path(__file__).parents[3]
 LONG_S = 300
@@ -36,6 +38,17 @@ def test_nothing_is_found_in_a_short_run() -> None:
 def test_every_target_is_tried() -> None:
     said = run("fuzz.worker", "--list")
     assert said.stdout.split() == list(program.NAMES)
+
+
+def test_the_lines_of_every_package_that_a_target_imports_guide_the_fuzzer() -> None:
+    ours = {each.parent.name for each in ROOT.glob("*/__init__.py")} - {"bench", "fuzz", "tests"}
+    imported = {
+        node.module.partition(".")[0]
+        for file in (ROOT / "fuzz").glob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.module
+    }
+    assert imported & ours <= set(OURS)
 
 
 def test_a_defect_is_found_and_can_be_tried_again(tmp_path: Path) -> None:
