@@ -1,10 +1,19 @@
 #!/usr/bin/env bash
-# Makes debian:bookworm-slim from the distribution's own packages where no image registry can be reached. Every
-# Dockerfile that says FROM debian:bookworm-slim then builds. Does nothing when the image is there; --force makes
-# it anew. Uses the package mirrors this machine uses, or the one named in DEBIAN_MIRROR.
+# Makes debian:bookworm-slim, or another suite's image, from the distribution's own packages where no image registry can
+# be reached. Every Dockerfile that says FROM debian:SUITE-slim then builds. Does nothing when the image is there.
+#   docker/base-image.sh [--force] [SUITE]     --force makes it anew; SUITE: bookworm (default), trixie
+# Uses the package mirrors this machine uses, or the one named in DEBIAN_MIRROR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+force=no
 suite=bookworm
+for argument; do
+  case "$argument" in
+    --force) force=yes ;;
+    bookworm | trixie) suite=$argument ;;
+    *) echo "usage: docker/base-image.sh [--force] [bookworm | trixie]" >&2; exit 2 ;;
+  esac
+done
 image=debian:$suite-slim
 
 fail() { echo "base-image: $1" >&2; exit 1; }
@@ -21,13 +30,13 @@ sources() {
   else
     # shellcheck disable=SC2016  # apt expands these, not the shell
     apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
-      awk -v suite=$suite '$2 ~ "^" suite "(-updates|-security)?$" && $3 == "main"' | sort -u
+      awk -v suite="$suite" '$2 ~ "^" suite "(-updates|-security)?$" && $3 == "main"' | sort -u
   fi
 }
 
-[ "${1:-}" = --force ] || ! docker image inspect "$image" > /dev/null 2>&1 || exit 0
+[ $force = yes ] || ! docker image inspect "$image" > /dev/null 2>&1 || exit 0
 command -v debootstrap > /dev/null || fail "debootstrap is missing. Type: sudo apt install debootstrap"
-mirror=$(sources | awk -v suite=$suite '$2 == suite { print $1; exit }')
+mirror=$(sources | awk -v suite="$suite" '$2 == suite { print $1; exit }')
 [ -n "$mirror" ] || fail "this machine has no package source for Debian $suite. Name one: DEBIAN_MIRROR=http://... $0"
 
 mkdir -p .cache
@@ -35,8 +44,8 @@ root=$(mktemp -d .cache/base-image.XXXXXX)
 trap 'as_root rm -rf "$root"' EXIT
 started=$SECONDS
 say "making $image from packages"
-as_root debootstrap --variant=minbase "$suite" "$root/system" "$mirror" > .cache/base-image.log 2>&1 ||
-  { tail -n 10 .cache/base-image.log >&2; fail "debootstrap failed; the lines above say why"; }
+as_root debootstrap --variant=minbase "$suite" "$root/system" "$mirror" > ".cache/base-image-$suite.log" 2>&1 ||
+  { tail -n 10 ".cache/base-image-$suite.log" >&2; fail "debootstrap failed; the lines above say why"; }
 sources | sed 's/^/deb /' | as_root tee "$root/system/etc/apt/sources.list" > /dev/null
 # The official slim image leaves these out as well: a container needs no manual pages.
 as_root rm -rf "$root/system/var/cache/apt/archives" "$root/system"/usr/share/{doc,man,info,locale}/* \
