@@ -123,6 +123,11 @@ class _Client(Client):
             self._pongs[0] = asyncio.get_running_loop().create_future()
         await super()._process_pong()
 
+    async def _send_ping(self, future: asyncio.Future[bool] | None = None) -> None:
+        # The library writes PING past what still waits for its flusher; the PONG would not prove that.
+        await self._flush_pending(force_flush=True)
+        await super()._send_ping(future)
+
     async def _process_err(self, err_msg: str) -> None:
         if PERMISSIONS_ERR not in err_msg:
             self.farewell = self.farewell or err_msg.strip("'")
