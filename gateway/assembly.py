@@ -50,6 +50,7 @@ from gateway.rpc.interceptors.audit import Audit
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
+from gateway.rpc.interceptors.turns import Turns
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.responses.event_stream import EventStream
 from gateway.rpc.responses.export_stream import ExportStream
@@ -174,6 +175,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     )
     interceptors = Interceptors(
         stats=stats,
+        turns=Turns(admission),
         rate_limit=RateLimit(admission, refusals, admits=access.auth is None),
         audit=access.audit,
         auth=access.auth,

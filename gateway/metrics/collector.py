@@ -146,6 +146,8 @@ class GatewayCollector(InstantCollector):
         yield _counter("connections_throttled", throttled, guard.throttled)
         muted = "Connections muted because they sent too much without an admitted call."
         yield _counter("connections_muted", muted, guard.muted)
+        blocked = "Addresses from which no connection is accepted at present."
+        yield _gauge("addresses_blocked", blocked, guard.blocked)
 
 
 def _gauge(name: str, what: str, value: float) -> Metric:

@@ -24,6 +24,7 @@ from gateway.rpc.interceptors.auth import Auth
 from gateway.rpc.interceptors.presence import Presence
 from gateway.rpc.interceptors.rate_limit import RateLimit
 from gateway.rpc.interceptors.stats import Stats
+from gateway.rpc.interceptors.turns import TurnEnd, Turns
 from gateway.rpc.interceptors.validation import Validation
 from gateway.rpc.services.events import EventsService
 from gateway.rpc.services.info import InfoService
@@ -84,6 +85,7 @@ class Interceptors:
     """What every call passes; `auth` is None where callers are not authenticated."""
 
     stats: Stats
+    turns: Turns
     rate_limit: RateLimit
     audit: Audit
     auth: Auth | None
@@ -96,9 +98,11 @@ class Interceptors:
             [
                 ErrorInterceptor(),  # turns what any of the others raises into a status
                 self.stats,  # counts what the others refuse, too
-                self.rate_limit,  # before a call costs anything
+                self.turns,  # before a stranger's call costs anything
+                self.rate_limit,  # before any call costs anything
                 self.audit,  # records what auth and validation refuse
                 *([self.auth] if self.auth else []),
+                TurnEnd(self.turns),  # once it is known who calls
                 self.validation,
                 AuditStart(self.audit),  # records valid requests alone
                 self.presence,  # sees admitted calls alone

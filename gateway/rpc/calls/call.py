@@ -56,12 +56,23 @@ class CallContext(Call):
         principal: who makes it; None until `Auth` has found out, and where callers are not authenticated.
         refusal: why `Auth` refuses the call, while the refusal is delayed and after, or why it has ended it;
             None otherwise.
+        examined: whether it has one of its connection's turns (`Turns`).
+        waited_s: how long it waited for that; 0 if it did not have to.
         request: the first message of the caller; None before it.
         responded: whether a message has left for the caller.
         response: the newest message to the caller, of control actions alone; serialised or not.
     """
 
-    __slots__ = ("peer", "principal", "refusal", "request", "responded", "response")
+    __slots__ = (
+        "examined",
+        "peer",
+        "principal",
+        "refusal",
+        "request",
+        "responded",
+        "response",
+        "waited_s",
+    )
 
     method: Method
     principal: Principal | None
@@ -74,6 +85,8 @@ class CallContext(Call):
         self.peer = peer_of(rpc.peer())
         self.principal = None
         self.refusal = None
+        self.examined = False
+        self.waited_s = 0.0
         self.request = None
         self.responded = False
         self.response = None

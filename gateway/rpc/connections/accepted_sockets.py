@@ -3,14 +3,16 @@
 gRPC's Python API neither reports connections nor closes one: a peer that makes no call is invisible there.
 """
 
-import ctypes
 import os
 import socket
 import stat
 import struct
+from collections.abc import Collection
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
+
+from gateway.rpc.connections import packet_filter
 
 _DESCRIPTORS: Final = Path("/proc/self/fd")
 _FAMILIES: Final = frozenset({socket.AF_INET, socket.AF_INET6})
@@ -18,20 +20,17 @@ _NONE: Final = -1
 """No descriptor."""
 _BYTES_RECEIVED: Final = struct.Struct("128xQ")
 """tcpi_bytes_received in struct tcp_info (linux/tcp.h, since 4.1)."""
-_SO_ATTACH_FILTER: Final = 26
-"""asm-generic/socket.h; Python's socket module does not have it."""
 _SO_MAX_PACING_RATE: Final = 47
-"""asm-generic/socket.h, since 3.13; TCP paces by itself since 4.13, whatever the queueing discipline."""
+"""asm-generic/socket.h, since 3.13; Python's socket module does not have it. TCP paces by itself since 4.13,
+whatever the queueing discipline."""
 UNLIMITED: Final = 0xFFFF_FFFF
 """The rate of a connection that is not throttled."""
-_DROP_ALL: Final = ctypes.create_string_buffer(struct.pack("=HBBI", 0x06, 0, 0, 0))
-"""One instruction of classic BPF, `ret 0`: the kernel keeps no byte of any packet."""
-_FILTER: Final = struct.pack("@HP", 1, ctypes.addressof(_DROP_ALL))
-"""struct sock_fprog (linux/filter.h)."""
+_LISTENS: Final = "listens"
+"""In place of an address, of the socket that accepts the connections."""
 
 
 class AcceptedSockets:
-    """Finds and closes connections.
+    """Finds and closes connections, and keeps addresses from making any.
 
     Args:
         port: the local port.
@@ -42,6 +41,7 @@ class AcceptedSockets:
         self._addresses: dict[int, str] = {}
         """By inode, which is the socket's own as long as it lives; empty for those that are none of ours."""
         self._descriptors: dict[str, int] = {}
+        self._listening: list[int] = []
 
     def scan(self) -> list[str]:
         """Returns the addresses of the peers, as `Peer.address` spells them.
@@ -51,7 +51,7 @@ class AcceptedSockets:
         """
         with os.scandir(_DESCRIPTORS) as entries:
             descriptors = [int(each.name) for each in entries]
-        known, self._addresses, self._descriptors = self._addresses, {}, {}
+        known, self._addresses, self._descriptors, self._listening = self._addresses, {}, {}, []
         for descriptor in descriptors:
             # Any descriptor may be closed meanwhile, that of this listing certainly is.
             with suppress(OSError):
@@ -62,7 +62,9 @@ class AcceptedSockets:
                 if address is None:
                     address = self._peer_address(descriptor)
                 self._addresses[status.st_ino] = address
-                if address:
+                if address == _LISTENS:
+                    self._listening.append(descriptor)
+                elif address:
                     self._descriptors[address] = descriptor
         return list(self._descriptors)
 
@@ -93,9 +95,31 @@ class AcceptedSockets:
         the connection when a keepalive ping stays unanswered. Some kernels permit it to root alone.
         """
         with suppress(OSError), self._connection(address) as connection:
-            connection.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, _FILTER)
+            packet_filter.attach(connection, packet_filter.DROP_ALL)
             return True
         return False
+
+    def block(self, prefixes: Collection[str]) -> bool:
+        """Has the kernel drop every attempt to connect from these addresses, and from no others.
+
+        Whoever is connected stays connected. A caller notices nothing but that nobody answers.
+
+        Args:
+            prefixes: of addresses (`gateway.access.address_prefix`).
+
+        Returns:
+            Whether it does. Some kernels permit it to root alone.
+        """
+        program = packet_filter.drop_from(prefixes)
+        try:
+            for descriptor in self._listening:
+                with _duplicate(descriptor) as listening:
+                    if not _listens(listening):
+                        continue  # the number belongs to another socket by now
+                    packet_filter.attach(listening, program)
+        except OSError:
+            return False
+        return bool(self._listening)
 
     def received_bytes(self, address: str) -> int:
         """Returns how much this peer has sent since it connected; 0 where that is not known."""
@@ -125,15 +149,16 @@ class AcceptedSockets:
                 return ""
             if ours.getsockname()[1] != self._port:
                 return ""
-            try:
-                return _address_of(ours)
-            except OSError:
-                return ""  # it listens
+            return _LISTENS if _listens(ours) else _address_of(ours)
 
 
 def _duplicate(descriptor: int) -> socket.socket:
     """Returns another descriptor of the same socket, which stays the same while gRPC closes its own."""
     return socket.socket(fileno=os.dup(descriptor))
+
+
+def _listens(ours: socket.socket) -> bool:
+    return bool(ours.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN))
 
 
 def _address_of(connected: socket.socket) -> str:

@@ -17,6 +17,7 @@ from common.token_bucket import TokenBucket
 from gateway.access.address_prefix import address_prefix
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer
+from gateway.rpc.connections.blocklist import Blocklist
 
 QUIET_AFTER_S: Final = 1.0
 """A connection without streams and without calls for this long gives way when room is needed."""
@@ -46,6 +47,7 @@ class _Connection:
     bucket: TokenBucket
     pending_since_s: float
     admitted: bool = False
+    floods: bool = False
     streams: int = 0
     refused_s: float = -math.inf
     method_buckets: dict[str, TokenBucket] = field(default_factory=dict)
@@ -70,6 +72,7 @@ class Admission:
         self._limits = limits
         self._max_pending = min(MAX_PENDING, max_connections // 4)
         self._clock = clock
+        self._blocklist = Blocklist(clock)
         self._connections: dict[str, _Connection] = {}
         """By `Peer.address`, the one that called last at the end."""
         self._places: Counter[str] = Counter()
@@ -161,11 +164,17 @@ class Admission:
             )
         connection.admitted = True
         self._places[prefix] += 1
+        self._blocklist.note_admitted(prefix)
 
     def has_place(self, peer: Peer) -> bool:
         """Returns whether the connection has a place, or needs none."""
         connection = self._connections.get(peer.address)
         return connection is None or connection.admitted
+
+    def is_pending(self, peer: Peer) -> bool:
+        """Returns whether the connection has no place and needs one; also if it is not known yet."""
+        connection = self._connections.get(peer.address)
+        return peer.ip is not None if connection is None else not connection.admitted
 
     def dismiss(self, peer: Peer) -> None:
         """Takes the connection's place away, after a credential was invalid."""
@@ -184,7 +193,10 @@ class Admission:
         """
         now_s, present = self._clock(), set(present)
         for address in self._connections.keys() - present:
-            self._free_place(self._connections.pop(address))
+            gone = self._connections.pop(address)
+            if not gone.admitted:
+                self._blocklist.note_unused(gone.address_prefix)
+            self._free_place(gone)
         for address in present - self._connections.keys():
             prefix = address_prefix(address.rpartition(":")[0].strip("[]"))
             self._connections[address] = self._new(prefix, now_s)
@@ -207,6 +219,22 @@ class Admission:
     def pending(self) -> list[str]:
         """Returns the addresses of the connections that have no place."""
         return [address for address, each in self._connections.items() if not each.admitted]
+
+    def note_flood(self, peer: Peer) -> None:
+        """Takes down that a pending connection makes more calls than it can expect to be answered."""
+        self._blocklist.note_flood(peer.address_prefix)
+        connection = self._connections.get(peer.address)
+        if connection is not None:
+            connection.floods = True
+
+    def floods(self, address: str) -> bool:
+        """Returns whether `note_flood` was called for the connection of this `Peer.address`."""
+        connection = self._connections.get(address)
+        return connection is not None and connection.floods
+
+    def blocked(self) -> frozenset[str]:
+        """Returns the address prefixes from which no further connection is to be accepted now."""
+        return self._blocklist.blocked()
 
     def _new(self, prefix: str, now_s: float) -> _Connection:
         return _Connection(prefix, TokenBucket(self._limits.burst, now_s), now_s)

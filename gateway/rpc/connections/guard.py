@@ -1,4 +1,4 @@
-"""Closes connections that make no call that is admitted, throttles those that flood, and mutes the worst."""
+"""Closes connections without an admitted call, throttles and mutes those that flood, blocks who persists."""
 
 import asyncio
 import logging
@@ -53,6 +53,7 @@ class ConnectionGuard:
         closed: connections that were closed here since the start.
         throttled: connections that were throttled here since the start.
         muted: connections that were muted here since the start.
+        blocked: addresses from which no connection is accepted at present.
     """
 
     def __init__(self, admission: Admission) -> None:
@@ -61,6 +62,9 @@ class ConnectionGuard:
         self.closed = 0
         self.throttled = 0
         self.muted = 0
+        self.blocked = 0
+        self._applied: frozenset[str] = frozenset()
+        """What the kernel was last told to block."""
         self._watched: dict[str, _Watched] = {}
         """By address."""
         self._logged_s = -math.inf
@@ -81,12 +85,13 @@ class ConnectionGuard:
             self.open = len(present) - closed
             self.closed += closed
             self.restrain(sockets, present)
+            self.block(sockets)
             if self.closed + self.throttled + self.muted > done:
                 self._log(
                     logging.WARNING,
                     f"of connections without an admitted call, {self.closed} were closed since the start, "
                     f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
-                    f"{self.open} are open",
+                    f"{self.open} are open, and {self.blocked} addresses are blocked",
                 )
 
     def restrain(self, sockets: AcceptedSockets, present: list[str]) -> None:
@@ -104,7 +109,7 @@ class ConnectionGuard:
             if state.placed:
                 state = _Watched(before=received)
             sent = received - state.before
-            if sent > PENDING_BYTES and not state.cut_off:
+            if (sent > PENDING_BYTES or self._admission.floods(address)) and not state.cut_off:
                 self._cut_off(sockets, address)
                 state = replace(state, cut_off=True)
             elif sent > UNTHROTTLED_BYTES and not state.throttled:
@@ -113,6 +118,15 @@ class ConnectionGuard:
                 state = replace(state, throttled=True)
             watched[address] = state
         self._watched = watched
+
+    def block(self, sockets: AcceptedSockets) -> None:
+        """Blocks the addresses that are on the list, and no others."""
+        wanted = self._admission.blocked()
+        if wanted == self._applied:
+            return
+        # Where the kernel does not permit it, connections are closed as they come.
+        self.blocked = len(wanted) if sockets.block(wanted) else 0
+        self._applied = wanted
 
     def _cut_off(self, sockets: AcceptedSockets, address: str) -> None:
         """Mutes the connection, or closes it where the kernel does not permit that."""

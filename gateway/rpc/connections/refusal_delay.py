@@ -28,12 +28,17 @@ class RefusalDelay:
         self._last_s = 0.0
         """When the last one of them leaves, by the event loop's clock."""
 
-    async def refuse(self, error: DomainError) -> NoReturn:
-        """Raises the error when it is this refusal's turn."""
+    async def refuse(self, error: DomainError, waited_s: float = 0.0) -> NoReturn:
+        """Raises the error when it is this refusal's turn.
+
+        Args:
+            error: the refusal.
+            waited_s: how long its call has waited already (`Turns`).
+        """
         if self._delayed < _MAX_DELAYED:
             self._delayed += 1
             try:
-                await asyncio.sleep(self.next_delay_s(asyncio.get_running_loop().time()))
+                await asyncio.sleep(self.next_delay_s(asyncio.get_running_loop().time(), waited_s))
             finally:
                 self._delayed -= 1
         try:
@@ -42,8 +47,9 @@ class RefusalDelay:
             # Its traceback has this frame: a reference from here would keep both until the next collection.
             del error
 
-    def next_delay_s(self, now_s: float) -> float:
+    def next_delay_s(self, now_s: float, waited_s: float = 0.0) -> float:
         """Returns how long the next refusal waits: a minimum, and behind those that wait already."""
-        next_s = max(now_s + REFUSAL_DELAY_S, self._last_s + REFUSAL_SPACING_S)
+        minimum_s = max(0.0, REFUSAL_DELAY_S - waited_s)
+        next_s = max(now_s + minimum_s, self._last_s + REFUSAL_SPACING_S)
         self._last_s = min(next_s, now_s + _LONGEST_DELAY_S)
         return self._last_s - now_s

@@ -90,7 +90,7 @@ class Auth(Interceptor[CallContext]):
         except (NotAuthenticatedError, TooMuchError) as error:
             self._dismiss(call)
             call.refusal = error
-            await self._refusals.refuse(error)
+            await self._refusals.refuse(error, call.waited_s)
         _authorize(principal, call.method)
         self._admitted[principal.credential_ids] = principal
         if call.method.streaming:

@@ -46,7 +46,7 @@ class RateLimit(Interceptor[CallContext]):
             if call.method.streaming:
                 self._admission.open_stream(call.peer)
         except TooMuchError as error:
-            return self._refusals.refuse(error)
+            return self._refusals.refuse(error, call.waited_s)
         return None
 
     def on_request(self, call: CallContext, request: Any) -> Any:

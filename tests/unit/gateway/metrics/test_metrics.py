@@ -86,6 +86,7 @@ class World:
     closed = 34
     throttled = 35
     muted = 36
+    blocked = 42
     expired = 37
     sent_bytes = 38
     waiting = 39
@@ -172,6 +173,7 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_connections_closed_total", ""] == 34
     assert shown["robot_gateway_connections_throttled_total", ""] == 35
     assert shown["robot_gateway_connections_muted_total", ""] == 36
+    assert shown["robot_gateway_addresses_blocked", ""] == 42
 
 
 def test_the_robot_and_its_sources() -> None:

@@ -15,6 +15,7 @@ from gateway.rpc.connections.admission import (
     SPARED_S,
     Admission,
 )
+from gateway.rpc.connections.blocklist import UNUSED_BURST
 from tests.support.clock import Clock
 
 PLACES, PER_ADDRESS = 40, 20
@@ -194,6 +195,36 @@ def test_a_pending_connection_has_few_streams(admission: Admission) -> None:
     assert seen.value.reason is Reason.TOO_MANY_STREAMS
     admission.admit(peer)
     admission.open_stream(peer)
+
+
+def test_a_connection_is_pending_until_it_is_admitted(admission: Admission) -> None:
+    peer = peer_of("ipv4:10.0.0.5:1")
+    assert admission.is_pending(peer)
+    admission.take_token(peer)
+    assert admission.is_pending(peer)
+    admission.admit(peer)
+    assert not admission.is_pending(peer)
+    admission.dismiss(peer)
+    assert admission.is_pending(peer)
+    assert not admission.is_pending(peer_of("unix:/run/gateway.sock"))
+
+
+def test_connections_that_end_unused_get_their_address_blocked(admission: Admission) -> None:
+    """Whether the peer closes them or the gateway does."""
+    for port in range(UNUSED_BURST + 1):
+        assert not admission.blocked()
+        admission.surplus([f"10.0.0.5:{port}"])
+    assert not admission.blocked(), "the last one may still call"
+    admission.surplus([])
+    assert admission.blocked() == {"10.0.0.5"}
+
+
+def test_those_with_an_admitted_call_do_not(admission: Admission) -> None:
+    for port in range(2 * UNUSED_BURST):
+        admit(admission, f"10.0.0.5:{port}")
+        admission.surplus([f"10.0.0.5:{port}"])
+    admission.surplus([])
+    assert not admission.blocked()
 
 
 def test_a_unix_socket_is_not_limited(clock: Clock) -> None:

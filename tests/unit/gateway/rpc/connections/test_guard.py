@@ -27,6 +27,7 @@ class Sockets:
         self.throttled: list[tuple[str, int]] = []
         self.muted: list[str] = []
         self.closed: list[str] = []
+        self.blocked: list[frozenset[str]] = []
         self._mutes = mutes
 
     def received_bytes(self, address: str) -> int:
@@ -38,6 +39,10 @@ class Sockets:
     def mute(self, address: str) -> bool:
         if self._mutes:
             self.muted.append(address)
+        return self._mutes
+
+    def block(self, prefixes: frozenset[str]) -> bool:
+        self.blocked.append(prefixes)
         return self._mutes
 
     def close(self, address: str) -> bool:
@@ -64,6 +69,7 @@ class Ground:
         sockets: Any = self.sockets
         self.admission.surplus(present)
         self.guard.restrain(sockets, present)
+        self.guard.block(sockets)
 
 
 @pytest.fixture
@@ -133,3 +139,31 @@ def test_another_connection_of_the_same_address_begins_anew(ground: Ground) -> N
     assert ground.sockets.muted == [STRANGER]
     ground.look(STRANGER=PENDING_BYTES + 1)
     assert ground.sockets.muted == [STRANGER, STRANGER]
+
+
+def test_a_stranger_that_floods_is_muted_and_its_address_blocked(ground: Ground) -> None:
+    ground.look()
+    ground.admission.note_flood(peer(STRANGER))
+    ground.look()
+    ground.look()
+    assert ground.sockets.muted == [STRANGER]
+    assert ground.sockets.blocked == [{"10.0.0.1"}], "the kernel is told once"
+    assert ground.guard.blocked == 1
+
+
+def test_a_block_ends(ground: Ground) -> None:
+    ground.admission.note_flood(peer(STRANGER))
+    ground.look()
+    ground.admit(STRANGER)
+    ground.look()
+    assert ground.sockets.blocked == [{"10.0.0.1"}, frozenset()]
+    assert ground.guard.blocked == 0
+
+
+def test_where_the_kernel_does_not_permit_it_no_address_is_blocked() -> None:
+    ground = Ground(mutes=False)
+    ground.look()
+    ground.admission.note_flood(peer(STRANGER))
+    ground.look()
+    assert ground.sockets.closed == [STRANGER]
+    assert ground.guard.blocked == 0

@@ -168,6 +168,13 @@ def test_delayed_refusals_are_spaced() -> None:
     assert refusals.next_delay_s(160.0) == pytest.approx(REFUSAL_DELAY_S)
 
 
+def test_a_call_that_waited_for_its_turn_is_delayed_by_less() -> None:
+    assert RefusalDelay().next_delay_s(100.0, waited_s=0.2) == pytest.approx(REFUSAL_DELAY_S - 0.2)
+    refusals = RefusalDelay()
+    assert refusals.next_delay_s(100.0, waited_s=60.0) == 0
+    assert refusals.next_delay_s(100.0, waited_s=60.0) == pytest.approx(REFUSAL_SPACING_S), "still spaced"
+
+
 def test_callers_that_leave_at_once_do_not_delay_others_for_ever() -> None:
     refusals = RefusalDelay()
     assert max(refusals.next_delay_s(100.0) for _ in range(100_000)) < 20

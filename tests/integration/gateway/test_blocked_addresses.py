@@ -1,0 +1,146 @@
+"""Addresses that the kernel lets connect no more."""
+
+import asyncio
+import socket
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gateway.access.address_prefix import address_prefix
+from gateway.access.role import Role
+from gateway.rpc.connections.accepted_sockets import AcceptedSockets
+from gateway.rpc.connections.blocklist import MAX_BLOCKED, UNUSED_BURST
+from gateway.rpc.connections.guard import SCAN_EVERY_S
+from gateway.rpc.interceptors.turns import EXAMINED
+from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
+from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
+from tests.support.guarded_gateway import guarded_gateway, new_robot
+
+SOON_S = 0.3
+
+
+def can_connect(server: socket.socket, source: str) -> bool:
+    try:
+        with socket.create_connection(server.getsockname()[:2], timeout=SOON_S, source_address=(source, 0)):
+            return True
+    except TimeoutError:
+        return False
+
+
+def test_a_blocked_address_can_not_connect_and_others_can() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        sockets.scan()
+        assert sockets.block(["127.0.5.1", "127.0.5.2"])
+        assert not can_connect(server, "127.0.5.1")
+        assert not can_connect(server, "127.0.5.2")
+        assert can_connect(server, "127.0.5.3")
+        assert sockets.block(["127.0.5.3"])
+        assert can_connect(server, "127.0.5.1")
+        assert not can_connect(server, "127.0.5.3")
+        assert sockets.block([])
+        assert can_connect(server, "127.0.5.3")
+
+
+def test_who_is_connected_stays_connected() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        with socket.create_connection(server.getsockname(), source_address=("127.0.5.1", 0)) as caller:
+            accepted, _ = server.accept()
+            with accepted:
+                sockets.scan()
+                assert sockets.block(["127.0.5.1"])
+                caller.sendall(b"still here")
+                assert accepted.recv(16) == b"still here"
+
+
+def test_as_many_as_may_be_blocked_of_both_families() -> None:
+    """The program for all of them has more instructions than a conditional jump reaches."""
+    crowd = [f"10.0.0.{number}" for number in range(MAX_BLOCKED // 2)]
+    crowd += [f"2001:db8:0:{number:x}::" for number in range(MAX_BLOCKED // 2)]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        sockets.scan()
+        assert sockets.block([*crowd, "127.0.5.1"])
+        assert not can_connect(server, "127.0.5.1")
+        assert can_connect(server, "127.0.5.2")
+        many = [f"2001:db8:0:{number:x}::" for number in range(MAX_BLOCKED)]
+        assert sockets.block(many)
+        assert can_connect(server, "127.0.5.1")
+
+
+@pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="this machine has no IPv6")
+def test_a_listener_for_both_families_blocks_both() -> None:
+    with socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True) as server:
+        port = server.getsockname()[1]
+        sockets = AcceptedSockets(port)
+        sockets.scan()
+
+        def connects(host: str) -> bool:
+            try:
+                with socket.create_connection((host, port), timeout=SOON_S):
+                    return True
+            except TimeoutError:
+                return False
+
+        assert sockets.block([address_prefix("::1")])
+        assert (connects("::1"), connects("127.0.0.1")) == (False, True)
+        assert sockets.block(["127.0.0.1"])
+        assert (connects("::1"), connects("127.0.0.1")) == (True, False)
+        assert sockets.block(["2001:db8::", "0.0.0.1"])
+        assert (connects("::1"), connects("127.0.0.1")) == (True, True)
+
+
+async def test_an_address_that_connects_again_and_again_is_blocked_and_an_operator_is_not(
+    tmp_path: Path,
+) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+
+        def connect_again_and_again() -> int:
+            """Returns how many connections there were until one was not accepted any more."""
+            for number in range(10):
+                with ExitStack() as stack:
+                    for _ in range(UNUSED_BURST // 2):
+                        try:
+                            stack.enter_context(
+                                socket.create_connection(
+                                    ("127.0.0.1", robot.port), SOON_S, source_address=("127.0.6.1", 0)
+                                )
+                            )
+                        except TimeoutError:
+                            return number * UNUSED_BURST // 2
+                    time.sleep(3 * SCAN_EVERY_S)  # until they have been seen
+            pytest.fail("the address was not blocked")
+
+        assert await asyncio.to_thread(connect_again_and_again) >= UNUSED_BURST
+        stub = RobotGatewayStub(robot.channel())
+        status: Any = await stub.GetSystemStatus(
+            GetSystemStatusRequest(), metadata=login.metadata(), timeout=5
+        )
+        assert status.gateway_name
+        # TCP tries again after one second, and after two more (RFC 6298): the first block has ended by then.
+        again = await asyncio.to_thread(
+            socket.create_connection, ("127.0.0.1", robot.port), 10, ("127.0.6.1", 0)
+        )
+        again.close()
+
+
+async def test_the_calls_of_an_operator_go_on_when_the_first_is_admitted(tmp_path: Path) -> None:
+    robot = new_robot(tmp_path)
+    _, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        stub = RobotGatewayStub(robot.channel())
+        answers: list[Any] = await asyncio.gather(
+            *(
+                stub.GetSystemStatus(
+                    GetSystemStatusRequest(), metadata=login.metadata(), timeout=10, wait_for_ready=True
+                )
+                for _ in range(4 * EXAMINED)
+            )
+        )
+        assert all(each.gateway_name for each in answers)
