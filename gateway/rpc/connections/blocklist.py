@@ -8,9 +8,9 @@ from typing import Final
 
 from common.token_bucket import TokenBucket
 
-UNUSED_BURST: Final = 64
+UNUSED_BURST: Final = 32
 """Connections without an admitted call that an address may have had before it is blocked."""
-UNUSED_PER_S: Final = 4.0
+UNUSED_PER_S: Final = 1.0
 """And so many a second: probes of an orchestrator, or a client that retries without success."""
 FIRST_BLOCK_S: Final = 1.0
 BLOCK_FACTOR: Final = 4
