@@ -116,6 +116,19 @@ def test_a_topic_with_another_type_is_another_channel(talker: Talker, taken: Tak
     assert [each.type for each in taken.channels("/value")] == ["std_msgs/msg/String", "std_msgs/msg/Int32"]
 
 
+def test_a_topic_that_vanishes_is_recorded_again_when_it_is_back(talker: Talker, taken: Taken) -> None:
+    """As when the program that publishes it is started again."""
+    for number in range(3):
+        publisher = talker.publisher("/value", Int32)
+        subscribed(publisher)
+        publisher.publish(Int32(data=number))
+        wait_until(lambda: len(taken.samples("/value")) == number + 1, "one message more")  # noqa: B023  # waited for
+        talker.fall_silent("/value", Int32)
+    assert len(taken.channels("/value")) == 1
+    assert taken.lost("/value") == 0
+    assert not taken.intake.problems
+
+
 def test_of_two_types_at_a_time_one_is_recorded(talker: Talker, taken: Taken) -> None:
     text = talker.publisher("/value", String)
     subscribed(text)
