@@ -22,8 +22,7 @@ ADDRESSES = re.compile(r"\b(?:ROBOT:50051|lab1\.local|lab2\.local:50051|10\.0\.0
 """The robots of the documents."""
 ENDLESS = re.compile(r"\brobotctl (?=watch|view --headless --record)")
 """What a reader ends with Ctrl-C."""
-FOR_S = 15
-"""Longer than a busy machine takes to start Python: what is interrupted before that ends with an error."""
+INTERRUPTED = f"{sys.executable} {ROOT}/tests/support/interrupted.py robotctl "
 ENDS_WITHIN_S = 120
 
 pytestmark = [pytest.mark.gst, pytest.mark.timeout(300)]
@@ -40,7 +39,7 @@ class Reader:
 
     def types(self, block: Block) -> None:
         text = ADDRESSES.sub(self.target, block.text)
-        text = ENDLESS.sub(f"timeout --preserve-status --signal INT {FOR_S} robotctl ", text)
+        text = ENDLESS.sub(INTERRUPTED, text)
         own = {
             "HOME": str(self.home),
             "XDG_CONFIG_HOME": str(self.home / ".config"),
