@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import secrets
+from contextlib import aclosing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,8 @@ from bridge.commands.taker import CommandTaker
 from bridge.config import BridgeSettings
 from bridge.outbox.outbox import Outbox, outbox
 from bridge.outbox.uploads import StoredUploads
+from bridge.robot.calls import GatewayCalls
 from bridge.robot.events import EventReader
-from bridge.robot.gateway import credentials
 from bridge.robot.status import StatusReader
 from bridge.rpc.servicer import SERVICE, BridgeServicer
 from bridge.sender import Sender
@@ -23,7 +24,6 @@ from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
 from common import bind, rpc
 from common.health import Health
 from common.tasks import first_to_end
-from console.client import AsyncGatewayClient
 from fleet.connection import FleetAddress, Hub, connect
 from fleet.names import inbox_prefix
 
@@ -41,19 +41,27 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
     """Connects the robot with its fleet, and serves the gateway, until `stop`.
 
     Raises:
-        UserError: the socket can't be used, or a file of the robot's credentials or enrolment can't be read.
+        UserError: the socket can't be used, or a file of the robot's enrolment can't be read.
     """
     robot, run_id = settings.hub.robot, secrets.token_hex(_RUN_ID_BYTES)
     async with (
         outbox(settings.root, settings.outbox.max_bytes) as kept,
         connect(_address(settings)) as hub,
-        AsyncGatewayClient(settings.gateway.target, credentials=credentials(settings.gateway)) as gateway,
+        aclosing(GatewayCalls(settings.gateway)) as gateway,
     ):
         robot_status = StatusReader(settings.gateway)
         queue = _queue(settings, kept, hub, gateway, robot_status)
         uploads: Uploading = QueuedUploads(queue) if queue else NoUploads()
         sender = Sender(robot, kept, hub)
-        status = Status(robot, settings.hub.fleet, outbox=kept, hub=hub, sender=sender, uploads=uploads)
+        status = Status(
+            robot,
+            settings.hub.fleet,
+            outbox=kept,
+            hub=hub,
+            sender=sender,
+            uploads=uploads,
+            gateway=lambda: robot_status.error,
+        )
         desk = Desk(robot, kept, status.changes.notify_all)
         states = StateSender(
             robot,
@@ -89,7 +97,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
 
 
 def _queue(
-    settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: AsyncGatewayClient, status: StatusReader
+    settings: BridgeSettings, kept: Outbox, hub: Hub, gateway: GatewayCalls, status: StatusReader
 ) -> "Uploads | None":
     """Returns the uploads; None for a robot that has no receivers' keys."""
     if settings.hub.receipts is None:

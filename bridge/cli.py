@@ -51,7 +51,12 @@ def serve(config_file: _Config = None) -> None:
 
 @app.command()
 def check(config_file: _Config = None, in_effect: PrintOption = False, schema: SchemaOption = False) -> None:
-    """Checks the configuration and exits."""
+    """Checks the configuration and the files that it names, and exits."""
+    if not schema:
+        # Late: the other commands need none of this.
+        from bridge.files import check_files  # noqa: PLC0415
+
+        check_files(config.load(BridgeSettings, config_file))
     check_settings(BridgeSettings, config_file, in_effect=in_effect, schema=schema)
 
 

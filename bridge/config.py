@@ -19,10 +19,12 @@ Server = Annotated[str, Field(pattern=r"^(tls|nats)://[^\s/@]+$", max_length=255
 
 
 class GatewaySettings(Section):
-    """The robot's gateway, and a viewer's credential for it, in files as `robotctl login` makes them."""
+    """The robot's gateway, and a viewer's credential for it. Its files are read anew at each connection."""
 
     target: str = DEFAULT_TARGET
     """HOST or HOST:PORT."""
+    login: Path | None = None
+    """A login as `robot-gateway credentials add` prints it: all of the following in one file."""
     ca_certificate_file: Path | None = None
     """Of the authority that signed the gateway's certificate; with it the connection is encrypted."""
     client_certificate_file: Path | None = None
@@ -36,6 +38,13 @@ class GatewaySettings(Section):
             return parse_target(target)
         except UserError as error:
             raise ValueError(error.what) from error
+
+    @model_validator(mode="after")
+    def _has_one_credential(self) -> Self:
+        files = ("ca_certificate_file", "client_certificate_file", "client_key_file", "token_file")
+        if self.login and (named := [name for name in files if getattr(self, name)]):
+            raise ValueError(f"login has all that a connection needs: leave out {', '.join(named)}")
+        return self
 
 
 class HubSettings(Section):

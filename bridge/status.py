@@ -33,6 +33,7 @@ class Status:
         robot: its name in the fleet.
         fleet: the name of the fleet.
         outbox, hub, sender, uploads: what it is made of.
+        gateway: returns why the gateway's status does not come; empty while it does.
         clock: monotonic seconds.
     """
 
@@ -45,10 +46,12 @@ class Status:
         hub: Hub,
         sender: Sender,
         uploads: Uploading,
+        gateway: Callable[[], str],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._robot, self._fleet = robot, fleet
         self._outbox, self._hub, self._sender, self._uploads = outbox, hub, sender, uploads
+        self._gateway = gateway
         self._clock = clock
         self._phase = Phase(State.OFFLINE, clock())
         self.changes = Broadcast()
@@ -93,5 +96,5 @@ class Status:
             case State.OFFLINE:
                 return link.text or "the hub has not been reached yet"
             case State.CONNECTED:
-                # The connection stands, and yet nothing is taken: no stream, no room, no quorum.
-                return self._sender.error
+                # It stands, and yet nothing is taken (no stream, no room, no quorum), or nothing comes.
+                return self._sender.error or self._gateway()

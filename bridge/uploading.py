@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Protocol
 
 from bridge.pauses import Pauses
+from bridge.robot.calls import GatewayCalls
 from bridge.uploads.queue import State, Upload
 from common.errors import DomainError, NotFoundError, PreconditionError, RecorderUnreachableError
 from common.reasons import Reason
-from console.client import AsyncGatewayClient, GatewayError
+from console.client import GatewayError
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
 from omniseer.gateway.v1 import cloud_pb2
@@ -134,7 +135,7 @@ class QueuedUploads:
         return _copy(await self._uploads.cancel(recording_id))
 
 
-async def apply_rule(uploads: "Uploads", gateway: AsyncGatewayClient) -> None:
+async def apply_rule(uploads: "Uploads", gateway: GatewayCalls) -> None:
     """Has the rule look at the robot's recordings every 30 s, until cancelled."""
     pauses = Pauses()
     while True:

@@ -9,7 +9,7 @@ import grpc
 
 from bridge.config import BridgeSettings
 from bridge.doctor.judgement import folder_findings, program_findings, settings_findings
-from bridge.robot.gateway import credentials
+from bridge.robot.gateway import credentials, remedy
 from bridge.rpc.client import newest_state
 from common.config import load
 from common.errors import UserError
@@ -68,6 +68,6 @@ def _gateway(settings: BridgeSettings) -> Iterator[Finding]:
         with GatewayClient(target, credentials=credentials(settings.gateway)) as gateway:
             name = gateway.status().gateway_name
     except UserError as error:
-        yield wrong("gateway", error.what, "The fleet sees neither its state nor its events", error.remedy)
+        yield wrong("gateway", error.what, "The fleet sees neither its state nor its events", remedy(error))
     else:
         yield good("gateway", f"{name} answers at {target}")

@@ -9,6 +9,9 @@ from omniseer.gateway.v1 import cloud_pb2 as pb
 
 _MIB: Final = 1024 * 1024
 _FULL_PERCENT: Final = 80
+_REMEDIES: Final = {
+    pb.CLOUD_STATE_OFFLINE: "Compare hub.servers with the hub's addresses, and look at the network",
+}
 
 
 def folder_findings(settings: BridgeSettings, free_bytes: int, *, writable: bool) -> Iterator[Finding]:
@@ -70,7 +73,7 @@ def program_findings(status: pb.CloudStatus) -> Iterator[Finding]:
             "bridge",
             f"robot-bridge is {name}: {status.last_error}",
             f"{status.outbox_events} events wait; the fleet sees this robot as it was",
-            "Compare hub.servers with the hub's addresses, and look at the network",
+            _REMEDIES.get(status.state, "Do as the line says"),
         )
     if status.outbox_bytes * 100 > status.outbox_max_bytes * _FULL_PERCENT:
         yield note(

@@ -12,7 +12,7 @@ from bridge.outbox.database import MOST_BYTES, MOST_ITEMS, MOST_PROBES
 from bridge.outbox.outbox import Outbox
 from bridge.pauses import Pauses
 from bridge.robot.feed import Feed, FeedError
-from bridge.robot.gateway import EVENTS_SILENT_S, events
+from bridge.robot.gateway import EVENTS_SILENT_S, events, explained
 from bridge.values import DropReason, Event, Item, OutboxError
 from common.errors import UserError
 from console.client.errors import DeadlineExceeded, GatewayError
@@ -47,9 +47,11 @@ class EventReader:
                 await self._read(pauses)
             except OutboxError:
                 self._disk_failed = True
-            except (UserError, FeedError) as error:
+            except UserError as error:
                 level = logging.INFO if isinstance(error, GatewayError) else logging.ERROR
-                _log.log(level, "no events from the gateway: %s", error)
+                _log.log(level, "no events from the gateway: %s", explained(error))
+            except FeedError as error:
+                _log.error("no events from the gateway: %s", error)
             self.reconnects += 1
             await pauses.wait()
 

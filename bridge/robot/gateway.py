@@ -7,16 +7,21 @@ messages.
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any, Final
 
 from bridge.config import GatewaySettings
 from bridge.values import Position
+from common.errors import UserError
+from common.reasons import Reason
+from console.client.errors import NotAllowed, NotTrusted
 from console.client.mapping.methods import Method, events_request, watch_request
 from console.client.options import ClientOptions
 from console.client.results import EventPosition, FaultSeverity
 from console.client.transport import GrpcTransport, Responses
 from console.credentials import Credentials
-from console.robots.credentials import read_credentials
+from console.robots.credentials import read_credentials, read_private
+from console.robots.login import parse_login
 from console.robots.robots_file import Robot
 from console.target import parse_target
 
@@ -27,14 +32,30 @@ EVENTS_SILENT_S: Final = 7.0
 STATUS_SILENT_S: Final = 3.0
 """The same for a status every second."""
 _STATUS_INTERVAL_S: Final = 1.0
+NEW_LOGIN: Final = (
+    "Put a new login into gateway.login of the bridge's configuration; on the robot "
+    "'robot-gateway credentials rotate NAME' prints one (docs/fleet.md), and no restart is needed"
+)
+
+_LOGIN_HELPS: Final = frozenset(
+    {
+        Reason.CREDENTIAL_MISSING,
+        Reason.CREDENTIAL_UNKNOWN,
+        Reason.CREDENTIAL_REVOKED,
+        Reason.CREDENTIAL_EXPIRED,
+        Reason.CREDENTIAL_NOT_YET_VALID,
+    }
+)
 
 
 def credentials(settings: GatewaySettings) -> Credentials:
     """Returns the credentials, read now: they may have been replaced.
 
     Raises:
-        UserError: a file is missing or open to others.
+        UserError: a file is missing or open to others, or the login is none.
     """
+    if settings.login:
+        return _login(settings.login)
     return read_credentials(
         Robot(
             target=settings.target,
@@ -44,6 +65,34 @@ def credentials(settings: GatewaySettings) -> Credentials:
             token_file=settings.token_file,
         )
     )
+
+
+def remedy(error: UserError) -> str:
+    """Returns what to do here about an error of the gateway.
+
+    The client's own advice is for an operator's computer, where `robotctl login` stores a login.
+    """
+    login_helps = isinstance(error, NotTrusted) or (
+        isinstance(error, NotAllowed) and error.reason in _LOGIN_HELPS
+    )
+    return NEW_LOGIN if login_helps else error.remedy
+
+
+def explained(error: UserError) -> str:
+    """Returns an error of the gateway as one line: what happened, and what to do here."""
+    return str(UserError(error.what, remedy(error)))
+
+
+def _login(path: Path) -> Credentials:
+    """Returns the credentials of a login; raises as `credentials`."""
+    try:
+        text = read_private(path, "login")
+        return parse_login(text.decode("utf-8", errors="replace")).credentials
+    except UserError as error:
+        # What is to be done on an operator's laptop is not what is to be done here.
+        remedy = error.remedy if error.remedy.startswith("Type: chmod") else NEW_LOGIN
+        what = error.what if str(path) in error.what else f"{path}: {error.what}"
+        raise UserError(what, remedy, exit_code=error.exit_code) from error
 
 
 @asynccontextmanager

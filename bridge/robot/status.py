@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from bridge.config import GatewaySettings
 from bridge.pauses import Pauses
-from bridge.robot.gateway import STATUS_SILENT_S, statuses
+from bridge.robot.gateway import STATUS_SILENT_S, explained, statuses
 from common.broadcast import Broadcast
 from common.errors import UserError
 from omniseer.gateway.v1.system_status_pb2 import SystemStatus  # noqa: TC001
@@ -24,7 +24,7 @@ class StatusReader:
     Attributes:
         newest: the last one that was received; None before the first.
         reachable: whether it still comes.
-        error: why not, for people.
+        error: why not, for people; empty before the first attempt has ended.
         changes: notified after each status, and of `reachable`.
     """
 
@@ -32,7 +32,7 @@ class StatusReader:
         self._settings = settings
         self.newest: SystemStatus | None = None
         self.reachable = False
-        self.error = "the gateway has not answered yet"
+        self.error = ""
         self.changes = Broadcast()
 
     async def run(self) -> None:
@@ -45,9 +45,10 @@ class StatusReader:
                         self._take(await responses.read(STATUS_SILENT_S))
                         pauses.reset()
             except UserError as error:
-                if self.reachable or not pauses.failures:
-                    _log.warning("no status from the gateway: %s", error)
-                self.reachable, self.error = False, str(error)
+                line = explained(error)
+                if self.reachable or not pauses.failures or line != self.error:
+                    _log.warning("no status from the gateway: %s", line)
+                self.reachable, self.error = False, line
                 self.changes.notify_all()
             await pauses.wait()
 

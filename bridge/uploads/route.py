@@ -1,20 +1,37 @@
-"""Through which network interface the store is reached; IPv4 and IPv6, on Linux."""
+"""Through which network interface the store is reached; IPv4 and IPv6, on Linux.
+
+The kernel is asked for its route (rtnetlink(7), RTM_GETROUTE). The address that a socket would send from does
+not name the interface: one may have several addresses, and several may have the same.
+"""
 
 import asyncio
-import fcntl
 import ipaddress
 import socket
 import struct
+import sys
 from contextlib import suppress
-from pathlib import Path
 from typing import Final
 
-_SIOCGIFADDR: Final = 0x8915
-"""netdevice(7)."""
-_IF_INET6: Final = Path("/proc/net/if_inet6")
-_DISCARD_PORT: Final = 9
-"""RFC 863; no packet is sent."""
 _RESOLVE_S: Final = 5.0
+_ANSWER_S: Final = 1.0
+"""The kernel answers at once."""
+_LONGEST_ANSWER: Final = 8192
+
+# linux/netlink.h and linux/rtnetlink.h.
+_HEADER: Final = struct.Struct("=IHHII")
+"""nlmsghdr: length, type, flags, sequence, port."""
+_ROUTE: Final = struct.Struct("=BBBBBBBBI")
+"""rtmsg: family, length of the destination in bits, what a request leaves at 0. The eighth: type."""
+_ATTRIBUTE: Final = struct.Struct("=HH")
+"""rtattr: length with this header, type."""
+_NLM_F_REQUEST: Final = 1
+_RTM_NEWROUTE: Final = 24
+_RTM_GETROUTE: Final = 26
+_RTA_DST: Final = 1
+_RTA_OIF: Final = 4
+_NETLINK_ROUTE: Final = 0
+_USABLE: Final = frozenset({1, 2})
+"""RTN_UNICAST and RTN_LOCAL. For IPv6, an unreachable route is an answer, too."""
 
 
 async def interface_to(host: str) -> str:
@@ -26,27 +43,50 @@ async def interface_to(host: str) -> str:
     name = host.partition(":")[0]
     try:
         async with asyncio.timeout(_RESOLVE_S):
-            found = await asyncio.get_running_loop().getaddrinfo(name, _DISCARD_PORT, type=socket.SOCK_DGRAM)
-    except (OSError, TimeoutError):
+            found = await asyncio.get_running_loop().getaddrinfo(name, None, type=socket.SOCK_STREAM)
+    except (OSError, TimeoutError, UnicodeError):
         return ""
-    for family, kind, protocol, _, address in found:
-        with suppress(OSError), socket.socket(family, kind, protocol) as probe:
-            # Of a datagram socket, this only chooses the route (connect(2)).
-            probe.connect(address)
-            return _interface_of(str(probe.getsockname()[0]))
+    for *_, address in found:
+        # The one that is connected to first; one without a route is passed over.
+        with suppress(OSError):
+            return _interface(str(address[0]))
     return ""
 
 
-def _interface_of(address: str) -> str:
-    """Returns the interface that has an address."""
-    wanted = ipaddress.ip_address(address.partition("%")[0])
-    if wanted.version == 6:
-        rows = (row.split() for row in _IF_INET6.read_text(encoding="ascii").splitlines())
-        return next((row[-1] for row in rows if int(row[0], 16) == int(wanted)), "")
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
-        for _, name in socket.if_nameindex():
-            with suppress(OSError):  # It has no IPv4 address.
-                answer = fcntl.ioctl(any_socket, _SIOCGIFADDR, struct.pack("256s", name.encode()))
-                if ipaddress.ip_address(answer[20:24]) == wanted:
-                    return name
-    return ""
+def _interface(address: str) -> str:
+    """Returns the interface of the route to an address.
+
+    Raises:
+        OSError: There is none.
+    """
+    to = ipaddress.ip_address(address.partition("%")[0])
+    family = socket.AF_INET6 if to.version == 6 else socket.AF_INET
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW | socket.SOCK_CLOEXEC, _NETLINK_ROUTE) as kernel:
+        kernel.settimeout(_ANSWER_S)
+        kernel.sendto(_request(family, to.packed), (0, 0))
+        index = _index(kernel.recv(_LONGEST_ANSWER))
+    if index is None:
+        raise OSError(f"no route to {to}")
+    return socket.if_indextoname(index)
+
+
+def _request(family: int, destination: bytes) -> bytes:
+    """Returns the question for the route to an address."""
+    attribute = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(destination), _RTA_DST) + destination
+    body = _ROUTE.pack(family, len(destination) * 8, 0, 0, 0, 0, 0, 0, 0) + attribute
+    return _HEADER.pack(_HEADER.size + len(body), _RTM_GETROUTE, _NLM_F_REQUEST, 1, 0) + body
+
+
+def _index(answer: bytes) -> int | None:
+    """Returns the number of the interface that the kernel's answer names; None if it is an error."""
+    length, kind, *_ = _HEADER.unpack_from(answer)
+    if kind != _RTM_NEWROUTE or _ROUTE.unpack_from(answer, _HEADER.size)[7] not in _USABLE:
+        return None
+    offset = _HEADER.size + _ROUTE.size
+    while offset + _ATTRIBUTE.size <= min(length, len(answer)):
+        size, name = _ATTRIBUTE.unpack_from(answer, offset)
+        if name == _RTA_OIF:
+            return int.from_bytes(answer[offset + _ATTRIBUTE.size : offset + size], sys.byteorder)
+        # Attributes begin at multiples of 4.
+        offset += max(_ATTRIBUTE.size, size + 3 & ~3)
+    return None

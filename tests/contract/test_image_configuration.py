@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridge.cli import app as bridge_app
 from drive.cli import app as drive_app
 from gateway.cli import app as gateway_app
 from preview.cli import app as preview_app
@@ -14,9 +15,9 @@ from recorder.cli import app as recorder_app
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder"])
+@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder", "bridge"])
 def test_the_images_name_the_file_once(program: str) -> None:
-    file = "preview" if program == "preview" else "gateway"
+    file = program if program in ("preview", "bridge") else "gateway"
     dockerfile = (ROOT / f"docker/{file}.Dockerfile").read_text(encoding="utf-8")
     served = re.search(rf'"robot-{program}", "serve", "--config", "([^"]+)"', dockerfile)
     named = re.search(rf"ROBOT_{program.upper()}_CONFIG=(\S+)", dockerfile)
@@ -33,6 +34,7 @@ def test_the_variables_name_the_file(tmp_path: Path) -> None:
         (preview_app, "ROBOT_PREVIEW_CONFIG"),
         (drive_app, "ROBOT_DRIVE_CONFIG"),
         (recorder_app, "ROBOT_RECORDER_CONFIG"),
+        (bridge_app, "ROBOT_BRIDGE_CONFIG"),
     ):
         shown = CliRunner().invoke(app, ["check", "--print"], env={variable: str(file)})
         assert shown.exit_code == 0, shown.output

@@ -17,7 +17,7 @@ _SHARING: Final = tuple(
 )
 LONGEST: Final = (
     *_SHARING,
-    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
+    *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "bridge", "on_the_robot", "bad_ground")),
     "tests/integration/drive/test_doubt.py",
     "tests/integration/preview/test_fallback.py",
     "tests/e2e/test_demo.py",

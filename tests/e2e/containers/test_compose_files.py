@@ -39,7 +39,7 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert "no-new-privileges:true" in service["security_opt"], name
         assert not service.get("privileged"), name
         assert "cap_add" not in service, name
-    for name in ("gateway", "preview", "drive", "recorder"):
+    for name in ("gateway", "preview", "drive", "recorder", "bridge"):
         assert services[name]["restart"] == "unless-stopped"
         assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
         assert int(services[name]["mem_limit"]) <= 512 << 20
@@ -65,6 +65,26 @@ def test_recording_is_off_unless_its_profile_is_asked_for_and_yields_to_the_miss
     assert recorder["cpu_shares"] < 1024
     assert recorder["oom_score_adj"] > 0
     assert (recorder["network_mode"], recorder["ipc"]) == ("host", "host")
+
+
+def test_the_fleet_is_off_unless_its_profile_is_asked_for_and_yields_to_the_mission() -> None:
+    assert not {"bridge", "bridge-config"} & config()["services"].keys()
+    bridge = config(profile="bridge")["services"]["bridge"]
+    assert bridge["cpu_shares"] < 1024
+    assert bridge["oom_score_adj"] > 0
+    assert bridge["network_mode"] == "host", "the gateway's loopback, and the robot's own interfaces"
+    assert not {"ports", "devices", "ipc", "privileged"} & bridge.keys()
+
+
+def test_the_bridge_can_not_change_who_it_is() -> None:
+    services = config("guarded", profile="bridge")["services"]
+    for name in ("bridge", "bridge-config"):
+        mounts = {each["target"]: each for each in services[name]["volumes"]}
+        assert mounts["/etc/robot-bridge"]["read_only"]
+        assert mounts["/etc/robot-gateway/bridge.yaml"]["read_only"]
+        assert not mounts["/etc/robot-bridge"]["bind"].get("create_host_path")
+        environment = services[name]["environment"]
+        assert environment["BRIDGE__GATEWAY__LOGIN"] == "/etc/robot-bridge/gateway.login"
 
 
 @pytest.mark.parametrize("overlay", [each for each in OVERLAYS if each != "demo"])

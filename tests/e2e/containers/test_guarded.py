@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from console.credentials import Credentials
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from console.robots.login import parse_login
+from tests.e2e.containers.credentials import ADD, added, knows, typed
 from tests.e2e.containers.deployment import Deployment, demo_overlay, deployed, docker, mounts, writable
 from tests.support.engine import ROOT
 from tests.support.receiver import Receiver
@@ -34,19 +34,11 @@ SECRET = re.compile(r"rgt-[0-9a-f]{12}\.[A-Za-z0-9_-]{43}|PRIVATE KEY")
 
 UP = "docker compose up -d"
 INIT = "docker compose run --rm -T credentials init"
-ADD = "docker compose run --rm -T credentials add anna --role operator"
 REVOKE = "docker compose run --rm -T credentials revoke anna"
 LIST = "docker compose run --rm -T credentials list"
 READ_AUDIT = f"docker compose exec gateway cat {AUDIT}/audit.jsonl"
 READ_REFUSED = f"docker compose exec gateway cat {AUDIT}/audit-refused.jsonl"
 HEALTH = "docker compose exec gateway python -m common.healthcheck unix:/tmp/health.sock preview"
-
-
-def typed(deployment: Deployment, command: str) -> Any:
-    """What a command does that people type, on this project; whether it works is for the caller to see."""
-    words = shlex.split(command)
-    assert words[:2] == ["docker", "compose"], command
-    return deployment.run(*words[2:], check=False)
 
 
 @dataclass(frozen=True)
@@ -77,13 +69,6 @@ class Guarded:
         return [record for record in map(json.loads, lines) if record["who"] == who]
 
 
-def added(deployment: Deployment, name: str, role: str) -> Credentials:
-    """A new credential, as its owner's laptop has it."""
-    done = typed(deployment, ADD.replace("anna", name).replace("operator", role))
-    assert done.returncode == 0, done.stderr
-    return parse_login(done.stdout).credentials
-
-
 @pytest.fixture(scope="module")
 def guarded(
     tmp_path_factory: pytest.TempPathFactory,
@@ -105,15 +90,6 @@ def guarded(
             wait_until(lambda: knows(robot), "the gateway knows its new credentials")
             deployment.wait_for_status(robot)
         yield Guarded(deployment, refused, told, gateways_then, begun, anna, ben)
-
-
-def knows(robot: Any) -> bool:
-    """Whether the gateway has taken over the client's credential."""
-    try:
-        robot.status()
-    except GatewayError:
-        return False
-    return True
 
 
 def reason(deployment: Deployment, shown: Credentials | None) -> str:

@@ -11,7 +11,7 @@ from tests.support.engine import ROOT, TAG
 
 pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
 
-IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder")
+IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder", "robot-bridge")
 CARRIED = "e2e-carried"
 
 
