@@ -21,7 +21,7 @@ from bridge.state import is_charging
 from bridge.state_sender import StateSender
 from bridge.status import Status
 from bridge.uploading import NoUploads, QueuedUploads, Uploading, apply_rule
-from common import bind, rpc
+from common import bind, heartbeat, rpc
 from common.health import Health
 from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Hub, connect
@@ -87,6 +87,7 @@ async def serve(settings: BridgeSettings, stop: asyncio.Event) -> None:
         Health(SERVICE).register(server)
         bind.bind_unix(server, settings.socket)
         await server.start()
+        heartbeat.own().ready()
         _log.info("serving on %s; robot %s of fleet %s", settings.socket, robot, settings.hub.fleet)
         try:
             # A defect in one of them ends the program, which is then restarted.

@@ -64,7 +64,8 @@ def end_with(error: UserError) -> NoReturn:
 def run(main: Callable[[asyncio.Event], Coroutine[Any, Any, None]]) -> None:
     """Runs `main(stop)` on a new uvloop; the first SIGINT or SIGTERM sets `stop`, a second cancels `main`.
 
-    `main` is expected to return soon after `stop` is set. Sends heartbeats to a supervisor that wants them.
+    `main` is expected to return soon after `stop` is set. Sends heartbeats to a supervisor that wants them,
+    and notifies it of the first signal.
     """
     _raise_descriptor_limit()
     uvloop.run(_with_signals(main))
@@ -97,6 +98,8 @@ async def _with_signals(main: Callable[[asyncio.Event], Awaitable[None]]) -> Non
     def on_signal() -> None:
         if stop.is_set():
             task.cancel()
+        else:
+            heartbeat.own().stopping()
         stop.set()
 
     loop = asyncio.get_running_loop()

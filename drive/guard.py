@@ -17,9 +17,9 @@ from typing import Final, Protocol
 
 from google.protobuf.message import DecodeError
 
+from common import heartbeat
 from common.backoff import Backoff
 from common.errors import ExitCode
-from common.heartbeat import Heartbeats
 from drive.machine import OnLoss
 from drive.real_time import delayed_by
 from drive.stop_file import StopFile, Stops
@@ -89,7 +89,7 @@ class Guard:
         self._stop_file = stop_file
         self._stops = stops
         self._backoff = Backoff(_FIRST_PAUSE_S, _LONGEST_PAUSE_S)
-        self._heartbeats = Heartbeats()
+        self._heartbeats = heartbeat.own()
         self._zeros_until_ns = 0
         self._kills = 0
         self._served = False
@@ -102,6 +102,7 @@ class Guard:
         """Ends the worker, and then `run`. May be called by a signal handler, any number of times."""
         if self._end_by_ns is None:
             self._end_by_ns = time.monotonic_ns() + _END_NS
+            self._heartbeats.stopping()
         if self._worker:
             self._worker.terminate()
         with suppress(BlockingIOError):
@@ -194,6 +195,8 @@ class Guard:
     def _take_beat(self, beat: bytes, watch: Watch) -> None:
         actual = pb.ActualState.FromString(beat)
         if not watch.began:
+            if not self._served:
+                self._heartbeats.ready()
             self._served = True
             self._backoff.reset()
             self._zeros_until_ns = 0

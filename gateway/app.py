@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
@@ -9,6 +10,7 @@ from typing import Final
 
 import grpc
 
+from common import heartbeat
 from common.advertisement import Advertisement
 from common.findings import Verdict
 from common.metrics_endpoint import serving_metrics
@@ -18,6 +20,7 @@ from gateway.links.preview.control import PreviewLink
 from gateway.links.preview.exposure import video_exposure
 from gateway.platform.advertising import advertise
 from gateway.rpc.server import SERVICE, serving
+from gateway.status.board import Board
 from gateway.status.preview import Listener
 from gateway.status.snapshot import Snapshot
 
@@ -33,6 +36,8 @@ BRIDGE_HEALTH: Final = "bridge"
 """The bridge's name there, where the robot is set up for a fleet."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often faults and events are looked for; a change of the preview causes a look at once."""
+ROS_HUNG_AFTER_S: Final = 30.0
+"""Without a pass of the ROS sampler: no load explains it, and only another process reads ROS again."""
 
 
 async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
@@ -43,6 +48,7 @@ async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
     """
     _warn_of_exposure(settings.security)
     async with running(build(settings, ThisRobot(settings))):
+        heartbeat.own().ready()
         await stop.wait()
     _log.info("stopped")
 
@@ -148,12 +154,21 @@ async def _observe(gateway: Gateway) -> None:
             health.set_serving(BRIDGE_HEALTH, serving=seen.cloud.reachable)
             if gateway.cloud.copies:
                 gateway.cloud.copies.take(seen.cloud, seen.recorder)
+        heartbeat.own().withheld = hung_part(gateway.state.board, time.monotonic())
         gateway.interceptors.presence.report_joined()
         gateway.interceptors.audit.record_due()
         if seen.preview.listener and seen.preview.listener != listener:
             listener = seen.preview.listener
             _log_exposure(gateway.settings, listener)
         await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
+
+
+def hung_part(board: Board, now_s: float) -> str:
+    """Returns which part of this process hangs so that only a restart mends it, for the log; else ""."""
+    passed_s = board.ros_passed_s
+    if passed_s is None or now_s - passed_s <= ROS_HUNG_AFTER_S:
+        return ""
+    return f"ROS has not been read for {now_s - passed_s:.0f} s"
 
 
 def _has_changed(link: PreviewLink, seen: Snapshot) -> bool:

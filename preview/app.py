@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final, NoReturn
 
-from common import bind, rpc
+from common import bind, heartbeat, rpc
 from common.health import Health
 from common.tasks import cancel
 from preview.config import PreviewSettings
@@ -47,6 +47,7 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
     async with _video_tap(settings.video_tap.socket, supervisor):
         bind.bind_unix(server, settings.socket)
         await server.start()
+        heartbeat.own().ready()
         srt = settings.srt
         _log.info(
             "serving on %s; viewers reach the listener at %s, UDP port %d",

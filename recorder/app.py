@@ -4,7 +4,7 @@ import asyncio
 import logging
 import secrets
 
-from common import bind, rpc
+from common import bind, heartbeat, rpc
 from common.boot import boot_id
 from common.health import Health
 from recorder.config import RecorderSettings
@@ -52,6 +52,7 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
             Health(SERVICE).register(server)
             bind.bind_unix(server, settings.socket)
             await server.start()
+            heartbeat.own().ready()
             _log.info("serving on %s; recordings are in %s", settings.socket, settings.root)
             try:
                 await recorder.run(stop)

@@ -10,7 +10,7 @@ import grpc
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from gateway.app import running
+from gateway.app import ROS_HUNG_AFTER_S, hung_part, running
 from gateway.assembly import ThisRobot, build
 from gateway.config import GatewaySettings
 from gateway.links.preview.feedback import PreviewServiceConnector
@@ -64,3 +64,11 @@ async def test_a_sampler_that_hangs_is_a_fault_and_not_serving_until_it_goes_on(
         await eventually(serving, HealthCheckResponse.NOT_SERVING.__eq__, "NOT_SERVING")
         await eventually(is_stalled, bool, "the fault")
         await eventually(serving_after_a_pass, HealthCheckResponse.SERVING.__eq__, "SERVING")
+
+
+def test_only_a_sampler_that_hangs_for_long_withholds_the_heartbeats() -> None:
+    board = Board()
+    assert hung_part(board, 1000.0) == ""  # No sampler, or no pass yet: the first one may take its time.
+    board.ros_passed_s = 1000.0
+    assert hung_part(board, 1000.0 + ROS_HUNG_AFTER_S) == ""
+    assert hung_part(board, 1001.0 + ROS_HUNG_AFTER_S) == "ROS has not been read for 31 s"
