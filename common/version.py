@@ -6,21 +6,24 @@ revision names the exact commit (docs/decisions/0010-version-in-pyproject.md).
 
 import os
 import re
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
 REVISION_VARIABLE: Final = "ROBOT_GATEWAY_REVISION"
 """Environment variable that holds the revision; set in container images, which contain no repository."""
+_DISTRIBUTIONS: Final = ("robot-gateway", "robot-gateway-client")
+"""Those that have this module: the whole project, and the client library, which robotctl's own builds on."""
 _REVISION: Final = re.compile(r"[0-9a-f]{40}")
 
 
 def project_version() -> str:
     """Returns MAJOR.MINOR.PATCH of the installed distribution; "0.0.0" if there is none."""
-    try:
-        return version("robot-gateway")
-    except PackageNotFoundError:
-        return "0.0.0"
+    for distribution in _DISTRIBUTIONS:
+        with suppress(PackageNotFoundError):
+            return version(distribution)
+    return "0.0.0"
 
 
 def project_revision(repository: Path = Path(__file__).parents[1] / ".git") -> str:

@@ -1,8 +1,9 @@
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
 
-from common.version import REVISION_VARIABLE, project_revision
+from common.version import REVISION_VARIABLE, project_revision, project_version
 
 REVISION = "0123456789abcdef" * 2 + "01234567"
 
@@ -41,3 +42,25 @@ def test_an_unknown_revision_is_empty(repository: Path, head: str) -> None:
     (repository / "HEAD").write_text(head, encoding="ascii")
     assert project_revision(repository) == ""
     assert project_revision(repository / "nowhere") == ""
+
+
+@pytest.mark.parametrize(
+    ("installed", "expected"),
+    [
+        ({"robot-gateway": "1.2.0"}, "1.2.0"),
+        ({"robot-gateway-client": "1.3.0"}, "1.3.0"),
+        ({"robot-gateway": "1.2.0", "robot-gateway-client": "1.3.0"}, "1.2.0"),
+        ({}, "0.0.0"),
+    ],
+)
+def test_the_version_is_that_of_whichever_distribution_is_installed(
+    installed: dict[str, str], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def version(name: str) -> str:
+        try:
+            return installed[name]
+        except KeyError:
+            raise PackageNotFoundError(name) from None
+
+    monkeypatch.setattr("common.version.version", version)
+    assert project_version() == expected

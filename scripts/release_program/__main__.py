@@ -1,0 +1,113 @@
+"""The command line of scripts/release."""
+
+import argparse
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Final
+
+from common.errors import UserError
+from release_program import git
+from release_program.changelog import section
+from release_program.distributions import DISTRIBUTIONS
+from release_program.environments import install
+from release_program.packages import build
+from release_program.preconditions import Facts, refusals
+from release_program.sums import write_sums
+from release_program.wheelhouse import download
+
+_ROOT: Final = Path(__file__).parents[2]
+_PYTHONS: Final = ("3.11", "3.12", "3.13")
+"""Of Debian 12, Ubuntu 24.04 and Debian 13."""
+
+
+def main() -> int:
+    """Makes the release and returns 0; prints one line and returns 1 where that is refused or fails."""
+    parser = argparse.ArgumentParser(prog="scripts/release", description="Makes a release from the commit.")
+    parser.add_argument("version", metavar="VERSION", help="the version of pyproject.toml")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="build/robot-gateway-VERSION by default")
+    parser.add_argument(
+        "--python",
+        action="append",
+        choices=_PYTHONS,
+        help="that of the computers which install it without a registry; may be repeated; by default all",
+    )
+    wishes = parser.parse_args()
+    output = (wishes.output or _ROOT / f"build/robot-gateway-{wishes.version}").absolute()
+    try:
+        commit = _permitted(wishes.version)
+        _make(wishes.version, commit, output, tuple(wishes.python or _PYTHONS))
+    except UserError as error:
+        print(f"release: {error}", file=sys.stderr)
+        return int(error.exit_code)
+    except OSError as error:
+        print(f"release: {error.filename or output}: {error.strerror}. Nothing was made", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("release: interrupted; nothing was made", file=sys.stderr)
+        return 1
+    print(f"release: {output}", file=sys.stderr)
+    return 0
+
+
+def _permitted(version: str) -> git.Commit:
+    """Returns the commit to release, or raises a UserError with all that speaks against it."""
+    commit = git.head(_ROOT)
+    facts = Facts(
+        project_version=_project_version(),
+        changelog=(_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
+        changed_files=git.changed_files(_ROOT),
+        has_frozen_schema=(_ROOT / f"proto/locked/{version}.binpb").is_file(),
+        revision=commit.revision,
+        tagged_revision=git.tagged(_ROOT, f"v{version}"),
+    )
+    if found := refusals(version, facts):
+        raise UserError(f"{version} can't be released: {'; '.join(found)}")
+    return commit
+
+
+def _project_version() -> str:
+    project = tomllib.loads((_ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return str(project["version"])
+
+
+def _make(version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...]) -> None:
+    """Makes all parts beside `output`, which appears when all of them are complete."""
+    if output.exists():
+        raise UserError(f"{output} exists", f"Type: rm -r {output}, or name another one with --output")
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".release-", dir=output.parent) as scratch:
+        made, work = Path(scratch) / "made", Path(scratch) / "work"
+        for folder in ("wheels", "sdists"):
+            (made / folder).mkdir(parents=True)
+        archived = made / f"robot-gateway-{version}.tar.gz"
+        git.archive(_ROOT, commit, archived.name.removesuffix(".tar.gz"), archived)
+        tree = git.export(archived, work / "tree")
+        _say("building wheels and sdists")
+        for distribution in DISTRIBUTIONS:
+            build(distribution, tree, made / "sdists", made / "wheels", commit.epoch_s)
+        _say(f"downloading what they need on Python {', '.join(pythons)}")
+        download(tree / "requirements/console.txt", pythons, made / "wheels", commit.epoch_s)
+        _say("installing them without a registry")
+        for distribution in DISTRIBUTIONS:
+            install(distribution, version, made / "wheels", work / distribution.name)
+        _write_texts(made, tree, version, commit)
+        write_sums(made)
+        made.rename(output)
+
+
+def _write_texts(made: Path, tree: Path, version: str, commit: git.Commit) -> None:
+    changes = section((tree / "CHANGELOG.md").read_text(encoding="utf-8"), version) or ("", "")
+    (made / "CHANGES.md").write_text(f"# {version} - {changes[0]}\n\n{changes[1]}\n", encoding="utf-8")
+    (made / "RELEASE").write_text(f"VERSION={version}\nREVISION={commit.revision}\n", encoding="utf-8")
+    template = (tree / "scripts/release_program/INSTALL.md").read_text(encoding="utf-8")
+    (made / "INSTALL.md").write_text(template.replace("VERSION", version), encoding="utf-8")
+
+
+def _say(text: str) -> None:
+    print(f"release: {text}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

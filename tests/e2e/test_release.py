@@ -1,0 +1,202 @@
+"""scripts/release: the same bytes from the same commit, installed where no network is."""
+
+import json
+import os
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.support.release import ROOT, VERSION, alone, commit, git, release, released_repository
+
+pytestmark = pytest.mark.timeout(600)
+
+PYTHON = "3.11"
+WHEELS = tuple(f"robot_gateway_{name}-{VERSION}-py3-none-any.whl" for name in ("client", "console"))
+IMPORT_ALL = """
+import importlib, importlib.util, json, sys
+for name in json.loads(sys.argv[1]):
+    importlib.import_module(name)
+    assert sys.modules[name].__file__.startswith(sys.prefix), sys.modules[name].__file__
+for absent in json.loads(sys.argv[2]):
+    assert importlib.util.find_spec(absent) is None, absent
+"""
+
+
+@pytest.fixture(scope="module")
+def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return released_repository(tmp_path_factory.mktemp("first"))
+
+
+@pytest.fixture(scope="module")
+def made(repository: Path) -> Path:
+    """A release, at the path where it is by default."""
+    ended = release(repository, "--python", PYTHON)
+    assert ended.returncode == 0, ended.stderr
+    directory = repository / f"build/robot-gateway-{VERSION}"
+    assert ended.stderr.splitlines()[-1] == f"release: {directory}"
+    return directory
+
+
+def sums(directory: Path) -> dict[str, str]:
+    lines = (directory / "SHA256SUMS").read_text().splitlines()
+    return {path: digest for digest, path in (line.split("  ") for line in lines)}
+
+
+def modules(wheel: Path) -> list[str]:
+    with zipfile.ZipFile(wheel) as file:
+        paths = [name.removesuffix(".py") for name in file.namelist() if name.endswith(".py")]
+    return sorted(path.removesuffix("/__init__").replace("/", ".") for path in paths)
+
+
+def fresh_environment(directory: Path, *options: str) -> Path:
+    subprocess.run(["/usr/bin/python3", "-m", "venv", *options, directory], check=True, timeout=120)
+    return directory / "bin"
+
+
+def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    """From another clone, at another path, hour and place, and with another umask."""
+    other = released_repository(tmp_path / "elsewhere")
+    output = tmp_path / "second"
+    before = os.umask(0o077)
+    try:
+        ended = release(
+            other, "--python", PYTHON, "--output", output, environment={"TZ": "Asia/Tokyo", "LC_ALL": "C"}
+        )
+    finally:
+        os.umask(before)
+    assert ended.returncode == 0, ended.stderr
+    assert sums(output) == sums(made)
+    assert len(sums(made)) > 25
+
+
+def test_every_file_is_in_the_sums(made: Path) -> None:
+    files = {str(path.relative_to(made)) for path in made.rglob("*") if path.is_file()}
+    assert files - {"SHA256SUMS"} == sums(made).keys()
+    checked = subprocess.run(
+        ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"],
+        cwd=made,
+        capture_output=True,
+        check=False,
+    )
+    assert (checked.returncode, checked.stdout) == (0, b"")
+
+
+def test_it_names_its_version_its_commit_and_what_is_new(made: Path, repository: Path) -> None:
+    revision = git(repository, "rev-parse", "HEAD").strip()
+    assert (made / "RELEASE").read_text() == f"VERSION={VERSION}\nREVISION={revision}\n"
+    changes = (made / "CHANGES.md").read_text()
+    assert changes.startswith(f"# {VERSION} - 2026-01-02\n\n### Added\n")
+    assert "[0.1.0]" not in changes
+    assert f"robot-gateway-{VERSION}.tar.gz" in (made / "INSTALL.md").read_text()
+
+
+def test_the_client_installs_and_imports_without_network_gstreamer_and_qt(made: Path, tmp_path: Path) -> None:
+    tools = fresh_environment(tmp_path / "environment")
+    installed = alone(
+        *(tools / "pip", "install", "--no-index", "--find-links", made / "wheels"),
+        f"robot-gateway-client=={VERSION}",
+    )
+    assert installed.returncode == 0, installed.stderr
+    names = modules(made / "wheels" / WHEELS[0])
+    assert {"console.client.blocking", "console.robots", "common.errors"} <= set(names)
+    tried = alone(
+        *(tools / "python", "-c", IMPORT_ALL),
+        *(json.dumps(each) for each in (names, ["gi", "PySide6", "typer", "rich", "nats"])),
+    )
+    assert tried.returncode == 0, tried.stderr
+    assert not (tools / "robotctl").exists()
+
+
+def test_robotctl_installs_and_works_without_network(made: Path, tmp_path: Path) -> None:
+    # GStreamer's Python side is Debian's.
+    tools = fresh_environment(tmp_path / "environment", "--system-site-packages")
+    installed = alone(
+        *(tools / "pip", "install", "--ignore-installed", "--no-index", "--find-links", made / "wheels"),
+        f"robot-gateway-console[video,gamepad]=={VERSION}",
+    )
+    assert installed.returncode == 0, installed.stderr
+    names = modules(made / "wheels" / WHEELS[1])
+    tried = alone(tools / "python", "-c", IMPORT_ALL, json.dumps(names), "[]")
+    assert tried.returncode == 0, tried.stderr
+    assert alone(tools / "robotctl", "--version").stdout.startswith(f"robotctl {VERSION}")
+    shown = alone(tools / "robotctl", "--help")
+    assert "monitor" in shown.stdout
+    refused = alone(tools / "robotctl", "--target", "127.0.0.1:1", "status")
+    assert refused.returncode == 3
+    assert "no robot gateway reached" in refused.stderr
+
+
+def test_install_console_takes_a_release_and_nothing_else(made: Path, tmp_path: Path) -> None:
+    subprocess.run(
+        ["tar", "-xf", made / f"robot-gateway-{VERSION}.tar.gz", "-C", tmp_path], check=True, timeout=60
+    )
+    script = tmp_path / f"robot-gateway-{VERSION}/scripts/install-console"
+    home = tmp_path / "home"
+    home.mkdir()
+    ended = alone(script, "--without-video", "--release", made, HOME=str(home), XDG_DATA_HOME="")
+    assert ended.returncode == 0, ended.stderr
+    link = home / ".local/bin/robotctl"
+    assert alone(link, "--version", HOME=str(home)).stdout.startswith(f"robotctl {VERSION}")
+    assert not list(link.resolve().parents[1].glob("lib/*/site-packages/PySide6*"))
+    again = alone(script, "--release", made, "--without-video", HOME=str(home), XDG_DATA_HOME="")
+    assert "up to date" in again.stderr
+
+
+def test_a_damaged_release_is_not_installed_from(made: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(made, copy)
+    with (copy / "wheels" / WHEELS[0]).open("ab") as file:
+        file.write(b"x")
+    ended = alone(ROOT / "scripts/install-console", "--release", copy, HOME=str(tmp_path), XDG_DATA_HOME="")
+    assert ended.returncode == 1
+    assert "is damaged or incomplete" in ended.stderr
+    assert not (tmp_path / ".local").exists()
+
+
+@pytest.mark.parametrize("directory", ["nowhere", ""])
+def test_what_is_no_release_is_refused(directory: str, tmp_path: Path) -> None:
+    ended = alone(
+        ROOT / "scripts/install-console",
+        "--release",
+        tmp_path / directory,
+        HOME=str(tmp_path),
+        XDG_DATA_HOME="",
+    )
+    assert ended.returncode == 1
+    assert "there is no directory" in ended.stderr or "is no release" in ended.stderr
+
+
+def test_what_is_not_committed_is_refused_and_nothing_is_made(repository: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "changed"
+    subprocess.run(["cp", "-a", repository, changed], check=True, timeout=60)
+    (changed / "README.md").write_text("changed")
+    (changed / "new").write_text("new")
+    # Of the robot that the images are for.
+    (changed / ".env").write_text("TAG=latest\n")
+    ended = release(changed, "--output", tmp_path / "out")
+    assert ended.returncode == 1
+    assert ended.stderr == f"release: {VERSION} can't be released: not committed: README.md, new\n"
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_release_that_exists_is_not_overwritten(made: Path, repository: Path) -> None:
+    before = (made / "SHA256SUMS").stat()
+    ended = release(repository)
+    assert ended.returncode == 1
+    assert f"{made} exists" in ended.stderr
+    assert (made / "SHA256SUMS").stat() == before
+
+
+def test_a_failed_build_names_its_reason_and_leaves_nothing(repository: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    subprocess.run(["cp", "-a", repository, broken], check=True, timeout=60)
+    lock = broken / "requirements/console.txt"
+    lock.write_text("typer==0.29.2\n")
+    commit(broken)
+    ended = release(broken, "--python", PYTHON, "--output", tmp_path / "out/release")
+    assert ended.returncode == 1
+    assert ended.stderr.endswith("release: the lock file has no hash of typer. Type: scripts/lock\n")
+    assert not list((tmp_path / "out").iterdir())
