@@ -20,8 +20,20 @@ MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/Stri
 OTHER_DETECTIONS: Final = SourceSettings(
     kind="detections", topic="/d", type="vision_msgs/msg/Detection2DArray", stale_after_ms=500
 )
-SOURCES: Final = (*DEFAULT_SOURCES, MODE, OTHER_DETECTIONS)
-"""One of each type that has a reader."""
+NUMBERS: Final = (
+    SourceSettings(
+        kind="number", label="cell", topic="/b", type="sensor_msgs/msg/BatteryState", field="cell_voltage[1]"
+    ),
+    SourceSettings(
+        kind="number",
+        label="level",
+        topic="/l",
+        type="diagnostic_msgs/msg/DiagnosticArray",
+        field="status[1].level",
+    ),
+)
+SOURCES: Final = (*DEFAULT_SOURCES, MODE, OTHER_DETECTIONS, *NUMBERS)
+"""One of each type that has a reader, and of the generic kinds."""
 _RULES: Final = Rules(
     {source.spec: SourceRule(source.stale_after_ms, source.required) for source in SOURCES}, 3000
 )

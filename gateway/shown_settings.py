@@ -6,7 +6,18 @@ from typing import Any, Final
 from gateway.config import GatewaySettings
 
 _HIDDEN: Final = frozenset(
-    {"topic", "type", "reliability", "durability", "socket", "disk_path", "credentials", "file", "client_ca"}
+    {
+        "topic",
+        "type",
+        "field",
+        "reliability",
+        "durability",
+        "socket",
+        "disk_path",
+        "credentials",
+        "file",
+        "client_ca",
+    }
 )
 """Where values come from: the contract names no topic, device or path."""
 _SECRET: Final = ("secret", "token", "password", "passphrase", "private", "key", "cert")

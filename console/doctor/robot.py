@@ -105,6 +105,10 @@ _WHY: Final = {
         "The gateway lacks the message type",
         "Type on the robot: robot-gateway doctor",
     ),
+    SourceState.FIELD_MISSING: (
+        "The message type lacks the field that the gateway is configured for",
+        "Type on the robot: robot-gateway doctor",
+    ),
     SourceState.UNDECODABLE: (
         "The robot's message type has other fields than the gateway's",
         "Install the robot's version of this message package beside the gateway",

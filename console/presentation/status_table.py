@@ -27,6 +27,7 @@ from console.presentation.formatting import (
     joined,
     plural,
     quantity,
+    sentence,
     signed,
 )
 from console.presentation.recording import recorder_mark, recording_summary
@@ -44,6 +45,7 @@ from console.presentation.value_style import (
     of_battery,
     of_compute,
     of_network,
+    of_number,
     of_video,
 )
 
@@ -53,6 +55,7 @@ _UNREADABLE: Final = (
     SourceState.QOS_MISMATCH,
     SourceState.WRONG_TYPE,
     SourceState.TYPE_MISSING,
+    SourceState.FIELD_MISSING,
     SourceState.UNDECODABLE,
 )
 
@@ -205,6 +208,13 @@ def _objects(view: View) -> Iterator[Row]:
     # An older gateway does not list its sources.
     if view.detections and (not configured or "detections" in configured):
         yield view.measured("objects", view.detections, plural(view.detections.count, "object"))
+
+
+def _numbers(view: View) -> Iterator[Row]:
+    for each in view.status.numbers:
+        row = view.measured("", each, number_text(each), of_number(each))
+        # Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example.
+        yield replace(row, label=sentence(each.title) if view.compact else each.title)
 
 
 def _access(view: View) -> Iterator[Row]:
@@ -372,6 +382,14 @@ def _preview_summary(preview: results.PreviewStatus) -> str:
     )
 
 
+def number_text(number: results.NumberValue) -> str:
+    """Returns the number as its configuration wants it shown, with its unit."""
+    if number.value is None:
+        return UNKNOWN
+    digits = f"{number.value:.10g}" if number.decimals is None else f"{number.value:.{number.decimals}f}"
+    return f"{digits} {number.unit}".strip()
+
+
 def _unbroken(text: str) -> str:
     """Returns the text with line breaks possible behind commas only, never between a number and its unit."""
     return ", ".join(part.replace(" ", "\u00a0") for part in text.split(", "))
@@ -429,6 +447,7 @@ TABLE: Final[tuple[Rows, ...]] = (
         optional=True,
     ),
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
+    _numbers,
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
     _recording,

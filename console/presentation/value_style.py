@@ -4,12 +4,12 @@ The limits are the defaults of the gateway's fault rules (docs/configuration.md,
 so that a value and its fault agree; beyond `bad` an operator should act at once.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
-from console.client.results import RecorderState
+from console.client.results import NumberLevel, RecorderState
 from console.presentation.severity_style import SeverityStyle
 
 
@@ -61,6 +61,15 @@ LOSS_PERCENT: Final = Limits(2, 10, "LOSSY")
 ROUND_TRIP_MS: Final = Limits(150, 400, "SLOW")
 PICTURE_AGE_MS: Final = Limits(150, 400, "LATE")
 """An older picture hurts driving."""
+NUMBER_LEVELS: Final[Mapping[NumberLevel, Judgement]] = {
+    NumberLevel.UNKNOWN: GOOD,
+    NumberLevel.GOOD: GOOD,
+    NumberLevel.WARNING_LOW: Judgement(SeverityStyle.WARNING, "LOW"),
+    NumberLevel.WARNING_HIGH: Judgement(SeverityStyle.WARNING, "HIGH"),
+    NumberLevel.ERROR_LOW: Judgement(SeverityStyle.BAD, "TOO LOW"),
+    NumberLevel.ERROR_HIGH: Judgement(SeverityStyle.BAD, "TOO HIGH"),
+}
+"""Total. A level from a newer gateway reads UNKNOWN, and is no reason for an alarm."""
 SHORT_ROOM_S: Final = 3600
 """For recordings, at the present rate: less counts as short for the recorder, too. It is never worse than a
 warning, because the recorder may go on for ever by deleting the oldest."""
@@ -99,6 +108,13 @@ def of_network(network: results.Network) -> Judgement:
     if network.connected is False:
         return Judgement(SeverityStyle.BAD, "DOWN")
     return WIFI_DBM.judge(network.wifi_signal_dbm)
+
+
+def of_number(number: results.NumberValue) -> Judgement:
+    """Returns the robot's own judgement, by the limits of its configuration."""
+    if number.value is None:
+        return Judgement(SeverityStyle.WARNING, "UNKNOWN")
+    return NUMBER_LEVELS[number.level]
 
 
 def of_video(measured: results.PreviewMeasurement) -> Judgement:

@@ -6,14 +6,15 @@ from typing import Annotated, Final, Self
 from pydantic import Field, model_validator
 
 from common.config import Section
-from gateway.status.faults.platform import Limit, PlatformLimits
+from gateway.status.faults.platform import PlatformLimits
+from gateway.status.limit import Limit
 
 _FAULT_ID: Final = r"^[a-z0-9_]+(\.[a-z0-9_]+)*$"
 
 
 class _LimitSettings(Section):
-    raise_at: float
-    clear_at: float
+    raise_at: float = Field(allow_inf_nan=False)
+    clear_at: float = Field(allow_inf_nan=False)
     """On the good side of `raise_at` (hysteresis), so that noise at the limit raises no series of faults."""
 
     def limit(self) -> Limit:

@@ -10,6 +10,7 @@ from pydantic_settings import SettingsConfigDict
 from common.config import Section, Settings, SettingsConflictError, load
 from gateway.config.bridge import BridgeSettings
 from gateway.config.faults import FaultSettings
+from gateway.config.generic_sources import MOST_GENERIC
 from gateway.config.recording import RecordingSettings
 from gateway.config.security import SecuritySettings
 from gateway.config.serving import (
@@ -22,6 +23,7 @@ from gateway.config.serving import (
 from gateway.config.sources import DEFAULT_SOURCES, SourceSettings
 from gateway.config.teleop import TeleopSettings
 from gateway.status.snapshot import Rules, SourceRule
+from gateway.status.sources import MUX_INPUTS
 
 CONFIG_VARIABLE: Final = "ROBOT_GATEWAY_CONFIG"
 """Environment variable with the path of the file, where the command line has none."""
@@ -92,7 +94,7 @@ class GatewaySettings(Settings):
 
     def status_rules(self) -> Rules:
         """Returns what the status expects of each source; the mux inputs are shown last."""
-        shown = sorted(self.sources, key=lambda source: source.label is not None)
+        shown = sorted(self.sources, key=lambda source: source.spec in MUX_INPUTS.values())
         rules = {source.spec: SourceRule(source.stale_after_ms, source.required) for source in shown}
         return Rules(rules, self.platform.stale_after_ms, self.faults.ignored_by_health)
 
@@ -166,5 +168,12 @@ def _check_sources(settings: GatewaySettings) -> None:
             raise SettingsConflictError(
                 ("sources", position),
                 f"sources lists '{source.name}' {names.count(source.name)} times",
-                "Keep one topic for each kind, and one for each label of mux_input",
+                "Keep one topic for each kind, and one for each label",
             )
+    generic = [position for position, source in enumerate(settings.sources) if source.is_generic]
+    if len(generic) > MOST_GENERIC:
+        raise SettingsConflictError(
+            ("sources", generic[MOST_GENERIC]),
+            f"sources lists {len(generic)} generic values, of which a gateway takes {MOST_GENERIC}",
+            "Keep those that an operator acts upon",
+        )

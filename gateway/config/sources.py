@@ -6,13 +6,25 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from common.config import Section
-from gateway.status.sources import ROS_SOURCES, SourceSpec
+from gateway.config.faults import LowerLimit, UpperLimit
+from gateway.config.generic_sources import (
+    FieldPath,
+    Remedy,
+    Title,
+    Unit,
+    check_generic_label,
+    check_keys,
+    check_order,
+)
+from gateway.status.meaning import NumberMeaning
+from gateway.status.sources import GENERIC_KINDS, ROS_SOURCES, SourceSpec, number_source
 from gateway.status.values import CommandSource
 
-KINDS: Final = tuple(dict.fromkeys(spec.kind for spec in ROS_SOURCES))
+KINDS: Final = tuple(dict.fromkeys(spec.kind for spec in (*ROS_SOURCES, *GENERIC_KINDS)))
 """The values of `kind`, in the order of the table of sources."""
 _SPECS: Final = {(spec.kind, spec.label): spec for spec in ROS_SOURCES}
-_STALE_AFTER_MS: Final = {spec.kind: spec.stale_after_ms for spec in ROS_SOURCES}
+_GENERIC: Final = frozenset(spec.kind for spec in GENERIC_KINDS)
+_STALE_AFTER_MS: Final = {spec.kind: spec.stale_after_ms for spec in (*ROS_SOURCES, *GENERIC_KINDS)}
 
 
 _TOPIC: Final = re.compile(r"(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
@@ -44,10 +56,14 @@ class SourceSettings(Section):
     """One ROS 2 topic."""
 
     kind: Annotated[str, AfterValidator(_known_kind)]
-    label: CommandSource | None = None
-    """The input of the command mux (required for mux_input, invalid for other kinds)."""
+    label: str | None = None
+    """Tells sources of one kind apart: the input of the command mux, or the name of a generic value."""
+    title: Title = ""
+    """Name of a generic value for operators; by default its label with blanks."""
     topic: Annotated[str, AfterValidator(_topic_name)]
     type: Annotated[str, AfterValidator(_type_name)]
+    field: FieldPath | None = None
+    """The field of the message that a generic value is."""
     reliability: Literal["best_effort", "reliable"] = "best_effort"
     durability: Literal["volatile", "transient_local"] = "volatile"
     stale_after_ms: int = Field(default_factory=lambda validated: _STALE_AFTER_MS[validated["kind"]], gt=0)
@@ -61,22 +77,68 @@ class SourceSettings(Section):
     max_items: int = Field(default=100, ge=1, le=1000)
     """Number of detections of one image that are kept; all are counted."""
 
+    unit: Unit = ""
+    """Of a number, as operators see it; limits are in this unit."""
+    scale: float = Field(default=1.0, allow_inf_nan=False)
+    """Factor from the message's unit to `unit`."""
+    offset: float = Field(default=0.0, allow_inf_nan=False)
+    """Added after scaling: -273.15 from kelvin to °C."""
+    decimals: int | None = Field(default=None, ge=0, le=9)
+    """Digits behind the point: smaller differences are neither shown nor a change of the status."""
+    warning_below: LowerLimit | None = None
+    error_below: LowerLimit | None = None
+    warning_above: UpperLimit | None = None
+    error_above: UpperLimit | None = None
+    remedy: Remedy = ""
+    """What operators should do beyond a limit."""
+
     @property
     def spec(self) -> SourceSpec[Any]:
-        """The entry of the table of sources."""
+        """The entry of the table of sources; of a generic kind the one that belongs to this label."""
+        if self.kind in _GENERIC:
+            return number_source(self.label or "", self.title, self._meaning())
         return _SPECS[self.kind, self.label]
 
     @property
     def name(self) -> str:
-        """Unique, stable name for programs: "odometry", "mux_input.keyboard"."""
+        """Unique, stable name for programs: "odometry", "mux_input.keyboard", "number.motor_temperature"."""
         return self.spec.name
+
+    @property
+    def is_generic(self) -> bool:
+        """Whether it is a field of any message type, instead of a type with a reader of its own."""
+        return self.kind in _GENERIC
 
     @model_validator(mode="after")
     def _check_label(self) -> Self:
-        if (self.kind, self.label) not in _SPECS:
+        if self.kind in _GENERIC:
+            check_generic_label(self.kind, self.label)
+        elif (self.kind, self.label) not in _SPECS:
             labels = ", ".join(source.value for source in CommandSource)
-            raise ValueError(f"a source of kind 'mux_input', and no other, has a label: {labels}")
+            kinds = ", ".join(sorted(_GENERIC))
+            raise ValueError(f"only sources of kind mux_input ({labels}) and {kinds} (any) have a label")
         return self
+
+    @model_validator(mode="after")
+    def _check_generic(self) -> Self:
+        defaults = {name: field.default for name, field in type(self).model_fields.items()}
+        changed = {name: value for name, value in self if value != defaults[name]}
+        check_keys(self.kind, changed)
+        check_order((self.error_below, self.warning_below), (self.error_above, self.warning_above))
+        if not self.scale:
+            raise ValueError("scale must not be 0: every value would be the same")
+        return self
+
+    def _meaning(self) -> NumberMeaning:
+        return NumberMeaning(
+            unit=self.unit,
+            decimals=self.decimals,
+            warning_below=self.warning_below.limit() if self.warning_below else None,
+            error_below=self.error_below.limit() if self.error_below else None,
+            warning_above=self.warning_above.limit() if self.warning_above else None,
+            error_above=self.error_above.limit() if self.error_above else None,
+            remedy=self.remedy,
+        )
 
 
 _TWIST: Final = "geometry_msgs/msg/TwistStamped"

@@ -27,6 +27,7 @@ from gateway.rpc.responses.export_stream import ExportStream
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.cloud import CloudState, CloudView
 from gateway.status.fault import Severity
+from gateway.status.meaning import NumberMeaning
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.recording import RecorderState, RecorderView
 from gateway.status.snapshot import Snapshot
@@ -92,6 +93,7 @@ class GatewayCollector(InstantCollector):
         yield from self._calls()
         yield from self._streams()
         yield from _sources(now)
+        yield _numbers(now)
         yield _faults(now)
         yield from _preview(now.preview)
         failures = self.preview_link.failures
@@ -189,6 +191,22 @@ def _sources(now: Snapshot) -> Iterator[Metric]:
     yield _gauges("source_fresh", "1 while its newest value can be relied on.", "source", fresh)
     ages_s = {name: each.age_ms / 1000 for name, each in freshness.items() if each.available}
     yield _gauges("source_age_seconds", "Age of its newest value; absent before the first.", "source", ages_s)
+
+
+def _numbers(now: Snapshot) -> Metric:
+    """Of the configuration's numbers those that can be relied on."""
+    family = Gauge(
+        f"{_PREFIX}_number",
+        "Numbers that the configuration names, each in its unit; absent while stale or unknown.",
+        labels=("source", "unit"),
+    )
+    for source in now.sources:
+        meaning, sample = source.spec.meaning, now[source.spec]
+        if not isinstance(meaning, NumberMeaning) or sample.value is None or sample.freshness.stale:
+            continue
+        if sample.value.value is not None:
+            family.add_metric((source.spec.name, meaning.unit), sample.value.value)
+    return family
 
 
 def _faults(now: Snapshot) -> Metric:

@@ -10,6 +10,7 @@ from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
 from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node, share_directory
 from gateway.config import SourceSettings
+from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.publishers import publishers_of
 from gateway.ros.readers import reader_for
 
@@ -74,6 +75,7 @@ def _type_finding(source: SourceSettings) -> Finding:
     try:
         reader_for(source)
         installed = message_class(source.type)
+        check_field(installed, source)
     except TypeMissingError as error:
         package = source.type.partition("/")[0].replace("_", "-")
         return wrong(
@@ -81,6 +83,13 @@ def _type_finding(source: SourceSettings) -> Finding:
             str(error),
             f"{source.name} can't be read",
             f"Install the package beside the gateway: apt install ros-$ROS_DISTRO-{package}",
+        )
+    except FieldMissingError as error:
+        return wrong(
+            check,
+            str(error),
+            f"{source.name} can't be read",
+            f"Correct field or type; to list the fields, type: ros2 interface show {source.type}",
         )
     except UserError as error:
         return wrong(check, error.what, f"{source.name} can't be read", error.remedy)

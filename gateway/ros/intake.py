@@ -10,11 +10,12 @@ from typing import Any
 from common.ros_node import TypeMissingError, ros_node
 from common.sampler import SAMPLING_HZ, Sampler
 from gateway.config import SourceSettings
+from gateway.ros.field_types import FieldMissingError
 from gateway.ros.publishers import PublisherMonitor
 from gateway.ros.readers import reader_for
 from gateway.ros.source import Source
 from gateway.ros.subscription import subscribe
-from gateway.status.board import Board
+from gateway.status.board import Board, Unusable
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +34,7 @@ def intake(
 ) -> Iterator[Intake]:
     """Reads the sources onto the board until the block ends; entering and leaving take about 0.1 s each.
 
-    A source whose message type is not installed is recorded in `board.unusable` and left out.
+    A source whose message type is not installed, or lacks its field, is left out; `board.unusable` has it.
 
     Raises:
         UserError: rclpy is missing or can't start, or a configured type has no reader.
@@ -51,8 +52,8 @@ def _open(node: Any, settings: Sequence[SourceSettings], board: Board) -> Iterat
     for source in settings:
         try:
             subscription = subscribe(node, source)
-        except TypeMissingError as error:
-            board.unusable[source.spec] = str(error)
+        except (TypeMissingError, FieldMissingError) as error:
+            board.unusable[source.spec] = Unusable(str(error), isinstance(error, TypeMissingError))
             log.warning("source '%s' is not read: %s", source.name, error)
         else:
             yield source.name, Source(source, subscription, board, created_at_s=time.monotonic())

@@ -10,6 +10,7 @@ from rclpy.serialization import deserialize_message
 
 from common.receive_time import Instant, present_instant, received_at
 from gateway.config import SourceSettings
+from gateway.ros.field_path import steps_of
 from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import is_header_and_list, reader_for
 from gateway.status.board import Board
@@ -138,4 +139,9 @@ def _decoder_of(source: SourceSettings, message_type: Any) -> Callable[[bytes], 
 
 def max_list_items(source: SourceSettings) -> int | None:
     """Returns the length to truncate lists to; None if the message is not a header and a list."""
-    return (source.spec.max_items or source.max_items) if is_header_and_list(source) else None
+    if not is_header_and_list(source):
+        return None
+    if source.field is not None:
+        # One item is read at the most, and those before it must be decoded, too.
+        return (steps_of(source.field)[0].index or 0) + 1
+    return source.spec.max_items or source.max_items

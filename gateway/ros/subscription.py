@@ -6,6 +6,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from common.ros_node import message_class, subscribe_raw
 from gateway.config import SourceSettings
+from gateway.ros.field_types import check_field
 
 
 def subscribe(node: Any, source: SourceSettings) -> Any:
@@ -13,8 +14,11 @@ def subscribe(node: Any, source: SourceSettings) -> Any:
 
     Raises:
         TypeMissingError: see `message_class` and `subscribe_raw`.
+        FieldMissingError: see `check_field`.
     """
-    return subscribe_raw(node, message_class(source.type), source.topic, qos_of(source))
+    message_type = message_class(source.type)
+    check_field(message_type, source)
+    return subscribe_raw(node, message_type, source.topic, qos_of(source))
 
 
 def qos_of(source: SourceSettings) -> Any:

@@ -27,12 +27,25 @@ class Publishers:
     wrong_type: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Unusable:
+    """Why a source is not subscribed.
+
+    Attributes:
+        reason: for the log and the robot's doctor; it may name types.
+        lacks_type: whether the message type is missing; otherwise its field is.
+    """
+
+    reason: str
+    lacks_type: bool = True
+
+
 class Board:
     """The newest value by source. Each source has exactly one writing thread; any thread may read.
 
     Attributes:
         publishers: by source; a source is absent until the graph was examined.
-        unusable: sources that can't be subscribed (message type not installed), with the reason for the log.
+        unusable: sources that are not subscribed, with the reason.
         undecodable: sources of which the newest message could not be decoded.
         ros_passed_s: when the ROS sampler last had read all sources; monotonic seconds. None where no sampler
             runs.
@@ -43,7 +56,7 @@ class Board:
     def __init__(self, newest: Mapping[SourceSpec[Any], Received[Any]] | None = None) -> None:
         self._newest: dict[SourceSpec[Any], Received[Any]] = dict(newest or {})
         self.publishers: dict[SourceSpec[Any], Publishers] = {}
-        self.unusable: dict[SourceSpec[Any], str] = {}
+        self.unusable: dict[SourceSpec[Any], Unusable] = {}
         self.undecodable: set[SourceSpec[Any]] = set()
         self.ros_passed_s: float | None = None
 

@@ -158,7 +158,8 @@ def take(
         else assess(
             (
                 (spec.health_name or spec.display_name, samples[spec].freshness)
-                for spec in ROS_SOURCES
+                # The table's order, then the configuration's.
+                for spec in dict.fromkeys((*ROS_SOURCES, *configured))
                 if spec in configured and configured[spec].required
             ),
             faults,
@@ -175,7 +176,7 @@ def take(
                 samples[spec].freshness,
                 board.publishers.get(spec),
                 required=rule.required,
-                unusable=spec in board.unusable,
+                unusable=board.unusable.get(spec),
                 undecodable=spec in board.undecodable,
                 stalled=ros_stalled,
             )

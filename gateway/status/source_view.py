@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Any, Final, NamedTuple
 
-from gateway.status.board import Publishers
+from gateway.status.board import Publishers, Unusable
 from gateway.status.freshness import Freshness
 from gateway.status.sources import SourceSpec
 
@@ -25,6 +25,8 @@ class SourceState(Enum):
     """Every publisher has another message type than configured."""
     TYPE_MISSING = "type_missing"
     """The message type is not installed beside the gateway."""
+    FIELD_MISSING = "field_missing"
+    """The message type is installed, but lacks the configured field, or that is of another kind."""
     UNDECODABLE = "undecodable"
     """Messages arrive, but can't be decoded: the type has the same name and other fields."""
 
@@ -47,6 +49,8 @@ _SENTENCES: Final[Mapping[SourceState, str]] = {
     SourceState.QOS_MISMATCH: "the robot offers {name} with delivery guarantees that exclude the gateway's",
     SourceState.WRONG_TYPE: "the robot offers {name} in another form than the gateway is configured for",
     SourceState.TYPE_MISSING: "{name} can't be read: its message type is not installed beside the gateway",
+    SourceState.FIELD_MISSING: "{name} can't be read: its message type has no such field, or has it in"
+    " another form",
     SourceState.UNDECODABLE: "{name} arrives, but can't be decoded: the robot's message type has other fields"
     " than the one installed beside the gateway",
 }
@@ -61,7 +65,7 @@ def source_view(
     publishers: Publishers | None,
     *,
     required: bool,
-    unusable: bool,
+    unusable: Unusable | None,
     undecodable: bool,
     stalled: bool,
 ) -> SourceView:
@@ -72,7 +76,7 @@ def source_view(
         freshness: of its newest value.
         publishers: None before the graph was examined.
         required: whether the configuration requires it.
-        unusable: whether it can't be subscribed.
+        unusable: why it is not subscribed; None if it is.
         undecodable: whether its newest message could not be decoded.
         stalled: whether the ROS sampler makes no progress.
     """
@@ -96,10 +100,10 @@ def detail(state: SourceState, name: str, publishers: Publishers | None) -> str:
 
 
 def _state(
-    freshness: Freshness, publishers: Publishers | None, *, unusable: bool, undecodable: bool
+    freshness: Freshness, publishers: Publishers | None, *, unusable: Unusable | None, undecodable: bool
 ) -> SourceState:
     if unusable:
-        return SourceState.TYPE_MISSING
+        return SourceState.TYPE_MISSING if unusable.lacks_type else SourceState.FIELD_MISSING
     if freshness.fresh:
         return SourceState.RECEIVING
     if undecodable:

@@ -1,13 +1,15 @@
 """The table of sources: board, snapshot, change detection and configuration take every entry as it is.
 
-A new kind also needs a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
+Generic kinds (`number`) have one entry: the configuration makes a source of each label. A new kind also needs
+a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final, Generic, TypeVar
 
+from gateway.status.meaning import NumberMeaning
 from gateway.status.values import (
     MAX_COMPONENTS,
     Battery,
@@ -17,6 +19,7 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
+    Number,
     Velocity,
     Vision,
 )
@@ -34,6 +37,8 @@ class SourceSpec(Generic[ValueT]):
         kind: `kind` of the configuration; "odometry" for example.
         value_type: what its readers return.
         label: distinguishes sources of the same kind; None where a kind has one source.
+        title: name for people, where it does not follow from kind and label.
+        meaning: what the configuration says of a generic value; None of other kinds.
         stale_after_ms: default age limit. Of a platform source the configuration's platform.stale_after_ms
             applies instead.
         queue_depth: depth of the subscription's KEEP_LAST history. With 1 the middleware drops older messages
@@ -48,7 +53,9 @@ class SourceSpec(Generic[ValueT]):
 
     kind: str
     value_type: type[ValueT]
-    label: CommandSource | None = None
+    label: str | None = None
+    title: str = ""
+    meaning: NumberMeaning | None = None
     stale_after_ms: int = 1000
     queue_depth: int = 1
     max_items: int | None = None
@@ -62,12 +69,12 @@ class SourceSpec(Generic[ValueT]):
     @cached_property
     def name(self) -> str:
         """Unique, stable name for programs: "odometry", "mux_input.keyboard"."""
-        return f"{self.kind}.{self.label.value}" if self.label else self.kind
+        return f"{self.kind}.{self.label}" if self.label else self.kind
 
     @cached_property
     def display_name(self) -> str:
         """The name for people: "odometry", "commands of keyboard"."""
-        return f"commands of {self.label.value}" if self.label else self.kind.replace("_", " ")
+        return self.title or (self.label or self.kind).replace("_", " ")
 
 
 ODOMETRY: Final = SourceSpec("odometry", Velocity, health_name="odometry")
@@ -101,6 +108,7 @@ MUX_INPUTS: Final = {
         "mux_input",
         Velocity,
         label,
+        title=f"commands of {label}",
         stale_after_ms=500,
         quiet=True,
         # Not in the status: they only attribute the effective command, which is.
@@ -127,5 +135,16 @@ ROS_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
 """Those that the ROS sampler writes onto the board, from the topics of the configuration."""
 PLATFORM_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (COMPUTE, NETWORK, ONBOARD_BATTERY)
 """Those that the platform sampler writes, from the operating system."""
+NUMBER: Final = SourceSpec("number", Number, stale_after_ms=5000)
+"""Stands for the kind; the sources of this kind are those of the configuration, see `number_source`."""
+GENERIC_KINDS: Final[tuple[SourceSpec[Any], ...]] = (NUMBER,)
+"""Kinds of which the configuration makes sources, each with a label: a field of any message type."""
 SOURCES: Final = (*ROS_SOURCES, *PLATFORM_SOURCES)
 """Every source. The health summary names the first one in this order that is missing."""
+
+
+# Unbounded, because a spec that is made twice would be two keys; only the configuration makes new ones.
+@cache
+def number_source(label: str, title: str, meaning: NumberMeaning) -> SourceSpec[Number]:
+    """Returns the source of a number; the same one whenever the arguments are equal."""
+    return SourceSpec("number", Number, label, title, meaning, stale_after_ms=NUMBER.stale_after_ms)

@@ -4,7 +4,7 @@ Unknown values are None. Numbers are finite: the readers discard NaN and infinit
 """
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Final, Generic, Self, TypeVar
 
 MAX_COMPONENTS: Final = 256
@@ -77,7 +77,7 @@ class Velocity:
     wz_rad_s: float
 
 
-class CommandSource(Enum):
+class CommandSource(StrEnum):
     """The inputs of the robot's command mux."""
 
     KEYBOARD = "keyboard"
@@ -90,6 +90,17 @@ class Mode:
     """The robot's mode of operation under its own name: "idle", "exploring", "returning"."""
 
     name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number that the configuration names: a field of any message, in the unit of the configuration.
+
+    Attributes:
+        value: None where the newest message holds none: NaN, infinity, or a list that is too short.
+    """
+
+    value: float | None
 
 
 class DiagnosticLevel(Enum):

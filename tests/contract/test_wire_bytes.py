@@ -26,9 +26,10 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
     teleop_pb2,
+    value_pb2,
 )
 
-VARINT, LENGTH, FIXED32 = 0, 2, 5
+VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
 
 
 def varint(value: int) -> bytes:
@@ -50,6 +51,10 @@ def uint(number: int, value: int) -> bytes:
 
 def flt(number: int, value: float) -> bytes:
     return tag(number, FIXED32) + struct.pack("<f", value)
+
+
+def dbl(number: int, value: float) -> bytes:
+    return tag(number, FIXED64) + struct.pack("<d", value)
 
 
 def text(number: int, value: str) -> bytes:
@@ -366,13 +371,46 @@ ADDITIONS = [
         + sub(17, text(1, "b"))
         + sub(18, text(4, "exploring"))
         + sub(19, text(1, "odometry"))
-        + sub(20, uint(3, 61_000)),
+        + sub(20, uint(3, 61_000))
+        + sub(23, text(1, "cell")),
         {
             "insecure": True,
             "faults": [fault_pb2.Fault(id="a"), fault_pb2.Fault(id="b")],
             "mission": system_status_pb2.MissionStatus(mode="exploring"),
             "sources": [source_pb2.SourceStatus(name="odometry")],
             "gateway": gateway_info_pb2.GatewayFacts(uptime_ms=61_000),
+            "numbers": [value_pb2.NumberStatus(label="cell")],
+        },
+    ),
+    Case(
+        value_pb2.NumberStatus,
+        text(1, "cell")
+        + text(2, "Cell 3")
+        + uint(3, 1)
+        + uint(4, 1)
+        + uint(5, 40)
+        + dbl(6, 3.3)
+        + text(7, "V")
+        + uint(8, 2)
+        + uint(9, 2)
+        + dbl(10, 3.0)
+        + dbl(11, 3.4)
+        + dbl(12, 4.1)
+        + dbl(13, 4.3),
+        {
+            "label": "cell",
+            "title": "Cell 3",
+            "available": True,
+            "stale": True,
+            "age_ms": 40,
+            "value": 3.3,
+            "unit": "V",
+            "decimals": 2,
+            "level": value_pb2.NUMBER_LEVEL_WARNING_LOW,
+            "error_below": 3.0,
+            "warning_below": 3.4,
+            "warning_above": 4.1,
+            "error_above": 4.3,
         },
     ),
     Case(system_status_pb2.VisionStatus, uint(16, 70), {"age_ms": 70}),

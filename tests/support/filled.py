@@ -99,7 +99,7 @@ def _value(field: FieldDescriptor, *, number: int, text: str) -> Any:
             return True
         case FieldDescriptor.CPPTYPE_STRING:
             return text.encode() if field.type == FieldDescriptor.TYPE_BYTES else text
-        case FieldDescriptor.CPPTYPE_FLOAT:
+        case FieldDescriptor.CPPTYPE_FLOAT | FieldDescriptor.CPPTYPE_DOUBLE:
             return number + 0.5  # 32 bits hold it exactly
         case _:
             return number
@@ -158,7 +158,7 @@ def _other_values(field: FieldDescriptor) -> Sequence[Any]:
         case FieldDescriptor.CPPTYPE_STRING:
             is_bytes = field.type == FieldDescriptor.TYPE_BYTES
             return [b"other bytes", b""] if is_bytes else ["another text", ""]
-        case FieldDescriptor.CPPTYPE_FLOAT:
+        case FieldDescriptor.CPPTYPE_FLOAT | FieldDescriptor.CPPTYPE_DOUBLE:
             return [-0.1, 0.0, math.inf]  # a sign, and digits that 32 bits do not hold exactly
         case _:
             return [_EXTREMES[field.cpp_type], 0]

@@ -16,7 +16,7 @@ from functools import cache, partial
 from types import UnionType
 from typing import Any, Final, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from google.protobuf.descriptor import Descriptor
+from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
 from console.client import results
@@ -172,5 +172,7 @@ def _converter(name: str, kind: Any, source: Any) -> Callable[..., Any]:
         return printable_lines
     if issubclass(kind, Enum):
         return partial(enums.member, kind, source.enum_type)
+    if source.type == FieldDescriptor.TYPE_DOUBLE:
+        return float
     conversions: dict[type, Callable[[Any], Any]] = {str: printable, float: number}
     return conversions.get(kind, lambda value: value)

@@ -48,6 +48,8 @@ class SourceState(Enum):
     """Published with another type than configured: nothing can be received."""
     TYPE_MISSING = "type_missing"
     """The gateway lacks the message type: nothing can be received."""
+    FIELD_MISSING = "field_missing"
+    """The message type lacks the field that the gateway is configured for."""
     UNDECODABLE = "undecodable"
     """Messages arrive, but the robot's type has other fields than the gateway's."""
 

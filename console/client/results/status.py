@@ -10,6 +10,7 @@ from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
 from console.client.results.recording import RecordingStatus
 from console.client.results.sample import Sample, Source
+from console.client.results.value import NumberValue
 
 
 class HealthState(Enum):
@@ -165,6 +166,8 @@ class SystemStatus:
     """None where the robot is not set up for recording."""
     cloud: CloudStatus | None
     """None where the robot is not set up for a fleet."""
+    numbers: tuple[NumberValue, ...]
+    """Numbers that the robot's configuration names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

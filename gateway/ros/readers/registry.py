@@ -12,6 +12,8 @@ Reader = Callable[[Any, SourceSettings], ValueT | None]
 _ReaderT = TypeVar("_ReaderT", bound=Callable[..., Any])
 
 _readers: dict[tuple[str, SourceSpec[Any]], Reader[Any]] = {}
+_of_any_type: dict[str, Reader[Any]] = {}
+"""By generic kind."""
 _headers_and_lists: set[str] = set()
 
 
@@ -39,13 +41,23 @@ def reads(
     return register
 
 
+def reads_any_type(spec: SourceSpec[Any]) -> Callable[[_ReaderT], _ReaderT]:
+    """Registers the decorated function for all sources of a generic kind, whatever their message type."""
+
+    def register(reader: _ReaderT) -> _ReaderT:
+        _of_any_type[spec.kind] = reader
+        return reader
+
+    return register
+
+
 def reader_for(source: SourceSettings) -> Reader[Any]:
     """Returns the reader of a configured source.
 
     Raises:
         UserError: the type has no reader; the line names the types that have one.
     """
-    reader = _readers.get((source.type, source.spec))
+    reader = _of_any_type.get(source.kind) or _readers.get((source.type, source.spec))
     if reader is None:
         raise UserError(
             f"source '{source.name}' ({source.topic}) has type {source.type}, which no reader supports",

@@ -10,6 +10,7 @@ from gateway.status.event import ControlResult
 from gateway.status.event_log import GapReason
 from gateway.status.fault import Severity
 from gateway.status.health import HealthState
+from gateway.status.meaning import Side
 from gateway.status.pictures import Delivery
 from gateway.status.preview import Codec, PreviewState, Profile
 from gateway.status.recording import (
@@ -30,6 +31,7 @@ from omniseer.gateway.v1 import (
     source_pb2,
     states_pb2,
     teleop_pb2,
+    value_pb2,
 )
 
 _MemberT = TypeVar("_MemberT", bound=Enum)
@@ -52,6 +54,12 @@ DELIVERIES: Final = _or_none(Delivery, preview_pb2.PictureDelivery, "PICTURE_DEL
 HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")
 SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
 SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
+NUMBER_LEVELS: Final = {
+    (severity, side): value_pb2.NumberLevel.Value(f"NUMBER_LEVEL_{severity.name}_{side.name}")
+    for severity in (Severity.WARNING, Severity.ERROR)
+    for side in Side
+}
+"""Of numbers beyond a limit."""
 CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
 TELEOP_STATES: Final = {False: states_pb2.TELEOP_DISABLED, True: states_pb2.TELEOP_ENABLED}
 DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")

@@ -13,6 +13,7 @@ from gateway.rpc.mapping.platform import platform_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.recording import recording_status
 from gateway.rpc.mapping.teleop import teleop_status
+from gateway.rpc.mapping.values import fill_values
 from gateway.status.command import Command
 from gateway.status.event_log import OperatorEvent
 from gateway.status.freshness import Sample, age_ms
@@ -63,6 +64,7 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
         fill_fault(status.faults.add(), fault, snapshot.at_s)
     for source in snapshot.sources:
         _fill_source(status.sources.add(), source)
+    fill_values(status, snapshot)
     return status
 
 

@@ -6,31 +6,13 @@ from typing import Final
 
 from gateway.status.fault import Condition, Severity
 from gateway.status.freshness import Sample
+from gateway.status.limit import Limit
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
 from gateway.status.values import Battery
 
 _COMPUTER: Final = "computer"
 _COOL_DOWN: Final = "Check fan and dust, reduce the load (preview profile), let it cool down"
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """A threshold with hysteresis.
-
-    An upper limit if `raise_at` is the larger value (temperature), a lower limit if it is the smaller one
-    (state of charge).
-    """
-
-    raise_at: float
-    clear_at: float
-
-    def broken(self, value: float, *, was_broken: bool) -> bool:
-        """Returns whether `value` violates the limit, given the previous verdict."""
-        threshold = self.clear_at if was_broken else self.raise_at
-        if self.raise_at > self.clear_at:
-            return value > threshold if was_broken else value >= threshold
-        return value < threshold if was_broken else value <= threshold
 
 
 @dataclass(frozen=True, slots=True)

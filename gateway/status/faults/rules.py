@@ -8,6 +8,7 @@ from gateway.status.faults.access import access_faults
 from gateway.status.faults.cloud import cloud_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.driving import driving_faults
+from gateway.status.faults.numbers import number_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
 from gateway.status.faults.preview import preview_faults
 from gateway.status.faults.recording import recording_faults
@@ -59,5 +60,6 @@ def conditions(
     yield from cloud_faults(
         snapshot.cloud, snapshot.at_s, offline_after_s=rules.hub_offline_s, settled=settled
     )
+    yield from number_faults(snapshot)
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

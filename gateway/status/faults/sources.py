@@ -20,6 +20,7 @@ STATE_FAULTS: Final[Mapping[SourceState, tuple[str, str] | None]] = {
     ),
     SourceState.WRONG_TYPE: ("wrong_type", "Correct the type of this source in the gateway's configuration"),
     SourceState.TYPE_MISSING: ("type_missing", "Type on the robot: robot-gateway doctor"),
+    SourceState.FIELD_MISSING: ("field_missing", "Type on the robot: robot-gateway doctor"),
     SourceState.UNDECODABLE: (
         "undecodable",
         "Install the robot's version of this message package beside the gateway",

@@ -29,8 +29,8 @@ class FaultTracker:
     """Belongs to one event loop; `faults` may be read at any time.
 
     Args:
-        clear_after_s: how long a condition must be absent before its fault is cleared. What comes and goes
-            faster is one fault, not a series.
+        clear_after_s: how long a condition must be absent before its fault is cleared, and how long it must
+            be less severe before its fault is. What comes and goes faster is one fault, not a series.
         keep_cleared_s: how long a cleared fault is kept.
     """
 
@@ -40,6 +40,8 @@ class FaultTracker:
         self._active: dict[str, Fault] = {}
         self._cleared: dict[str, Fault] = {}
         self._times: dict[str, int] = {}
+        self._severe_s: dict[str, float] = {}
+        """When each active fault was last observed with its present severity."""
         self.faults: tuple[Fault, ...] = ()
         """Active faults by severity, then age; after them the cleared ones, the newest first."""
 
@@ -51,6 +53,7 @@ class FaultTracker:
     def update(self, conditions: Iterable[Condition], now_s: float) -> Changes:
         """Tracks the conditions that are present at `now_s`; returns the difference."""
         present = {condition.fault_id: condition for condition in conditions}
+        present = {fault_id: self._held(condition, now_s) for fault_id, condition in present.items()}
         candidates = {**self._lingering(now_s), **present}
         listed = self._listed(candidates)
         raised, worsened = [], []
@@ -63,6 +66,7 @@ class FaultTracker:
             if condition.severity.rank > before.condition.severity.rank:
                 worsened.append(fault)
         gone = [self._active.pop(fault_id) for fault_id in self._active.keys() - listed.keys()]
+        self._severe_s = {fault_id: self._severe_s.get(fault_id, now_s) for fault_id in self._active}
         # A fault that lost its place in the list to a more severe one is still present.
         absent = [fault for fault in gone if fault.condition.fault_id not in candidates]
         cleared = [replace(fault, cleared_s=now_s) for fault in absent]
@@ -70,6 +74,21 @@ class FaultTracker:
         self._forget(now_s)
         self.faults = (*_by_weight(self._active.values()), *reversed(self._cleared.values()))
         return Changes(_by_weight(raised), _by_weight(worsened), _by_weight(cleared))
+
+    def _held(self, condition: Condition, now_s: float) -> Condition:
+        """Returns the condition; the more severe one that its fault has, until `clear_after_s` after that.
+
+        Otherwise a value that swings over a limit would report "worse" at every swing.
+        """
+        fault_id, before = condition.fault_id, self._active.get(condition.fault_id)
+        if (
+            before is not None
+            and condition.severity.rank < before.condition.severity.rank
+            and now_s - self._severe_s[fault_id] < self._clear_after_s
+        ):
+            return before.condition
+        self._severe_s[fault_id] = now_s
+        return condition
 
     def _lingering(self, now_s: float) -> dict[str, Condition]:
         """Returns the conditions that were present less than `clear_after_s` ago."""

@@ -109,5 +109,5 @@ def test_what_cannot_be_read_is_not_looked_for(monkeypatch: pytest.MonkeyPatch) 
     missing = "no_such_msgs/msg/Thing"
     monkeypatch.setitem(registry._readers, (missing, specs.BATTERY), lambda *_: None)
     with watching(BATTERY.model_copy(update={"type": missing})) as (board, _):
-        assert "no_such_msgs" in board.unusable[specs.BATTERY]
+        assert "no_such_msgs" in board.unusable[specs.BATTERY].reason
         assert not board.publishers

@@ -147,7 +147,7 @@ def test_a_type_that_is_not_installed_leaves_the_others_alone(talker: Talker) ->
             assert "vision" not in running.sources
             talker.say(running, "/odometry/filtered", driving(0.5))
             wait_until(lambda: board[ODOMETRY], "odometry")
-    assert "install the ROS package no_such_msgs" in board.unusable[VISION]
+    assert "install the ROS package no_such_msgs" in board.unusable[VISION].reason
 
 
 def test_a_topic_of_another_type_than_configured_does_no_harm(talker: Talker) -> None:

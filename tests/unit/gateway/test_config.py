@@ -5,6 +5,9 @@ import pytest
 from common.errors import ExitCode, UserError
 from gateway.config import DEFAULT_SOURCES, GatewaySettings, load_settings
 
+NUMBER = "{kind: number, topic: /a, type: n/msg/O, label: x"
+"""A source of this kind, without its field and its end."""
+
 
 def load(tmp_path: Path, text: str) -> GatewaySettings:
     path = tmp_path / "gateway.yaml"
@@ -61,16 +64,47 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         ),
         (
             "sources: [{kind: mux_input, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
-            "has a label: keyboard, autonomy, navigation",
+            "only sources of kind mux_input (keyboard, autonomy, navigation) and number (any) have a label",
         ),
         (
             "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
-            "and no other, has a label",
+            "and number (any) have a label",
         ),
         (
             "sources: [{kind: odometry, topic: my odom, type: nav_msgs/msg/Odometry}]",
             "expected: a topic name",
         ),
+        (f"sources: [{NUMBER}}}]", "needs 'field'"),
+        (f"sources: [{NUMBER}, field: a..b}}]", "expected: a field of the message"),
+        (f"sources: [{NUMBER}, field: _x}}]", "expected: a field of the message"),
+        (f"sources: [{NUMBER}, field: 'a[-1]'}}]", "expected: a field of the message"),
+        (f"sources: [{NUMBER}, field: '{'a.' * 16}a'}}]", "expected: a field of the message"),
+        (f"sources: [{NUMBER}, field: a, label: Motor 1}}]", "key 'label' is there twice"),
+        ("sources: [{kind: number, topic: /a, type: n/msg/O, field: a}]", "has a label of its own"),
+        (
+            "sources: [{kind: number, label: A b, topic: /a, type: n/msg/O, field: a}]",
+            "has a label of its own",
+        ),
+        (f'sources: [{NUMBER}, field: a, unit: "\\e[1m"}}]', "expected: printable text"),
+        (f"sources: [{NUMBER}, field: a, scale: 0}}]", "scale must not be 0"),
+        (f"sources: [{NUMBER}, field: a, scale: .nan}}]", "a finite number"),
+        (
+            f"sources: [{NUMBER}, field: a, warning_above: {{raise_at: .inf, clear_at: 1}}}}]",
+            "a finite number",
+        ),
+        (
+            f"sources: [{NUMBER}, field: a, warning_above: {{raise_at: 9, clear_at: 8}},"
+            " error_above: {raise_at: 9, clear_at: 8}}]",
+            "error_above.raise_at must be above warning_above.raise_at",
+        ),
+        (
+            f"sources: [{NUMBER}, field: a, error_below: {{raise_at: 5, clear_at: 8}},"
+            " error_above: {raise_at: 9, clear_at: 8}}]",
+            "no value is good",
+        ),
+        ("sources: [{kind: odometry, unit: m, topic: /a, type: n/msg/O}]", "has no key 'unit'"),
+        (f"sources: [{', '.join(f'{NUMBER}{n}, field: a}}' for n in range(65))}]", "lists 65 generic values"),
+        (f"sources: [{NUMBER}, field: a}}, {NUMBER}, field: b}}]", "sources lists 'number.x' 2 times"),
         ("sources: [{kind: odometry, topic: /a/, type: n/msg/O}]", "expected: a topic name"),
         ("sources: [{kind: odometry, topic: /a//b, type: n/msg/O}]", "expected: a topic name"),
         ("sources: [{kind: odometry, topic: /1a, type: n/msg/O}]", "expected: a topic name"),

@@ -64,6 +64,7 @@ from omniseer.gateway.v1 import (
     states_pb2,
     system_status_pb2,
     teleop_pb2,
+    value_pb2,
 )
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import alternatives, changes, fields_of, fill_distinctly, is_alternative
@@ -82,6 +83,7 @@ FILES: Final = (
     states_pb2,
     system_status_pb2,
     teleop_pb2,
+    value_pb2,
 )
 ANSWERS: Final = {
     method.name: method
@@ -103,6 +105,7 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.GapReason, event_pb2.EventGapReason),
         (results.PreviewState, states_pb2.PreviewState),
         (results.SourceState, source_pb2.SourceState),
+        (results.NumberLevel, value_pb2.NumberLevel),
         (results.FaultSeverity, fault_pb2.FaultSeverity),
         (results.HealthState, states_pb2.RobotHealthState),
         (results.TeleopState, states_pb2.TeleopState),
@@ -197,6 +200,7 @@ INLINED: Final = {
 }
 """Submessages without an object of their own: their fields stand in the result of the message around them."""
 
+NUMBER_LIMITS: Final = ("error_below", "warning_below", "warning_above", "error_above")
 PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "VisionStatus.available": (
         "age_ms",
@@ -222,6 +226,10 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "EffectiveCommand.available": ("age_ms", "vx_mps", "vy_mps", "wz_rad_s", "active_source"),
     "MissionStatus.available": ("age_ms", "mode"),
+    "NumberStatus.available": ("age_ms", "value", "decimals", *NUMBER_LIMITS),
+    "NumberStatus.value": ("value",),
+    "NumberStatus.decimals": ("decimals",),
+    **{f"NumberStatus.{name}": (name,) for name in NUMBER_LIMITS},
     "SourceStatus.available": ("age_ms",),
     "ComputeStatus.available": (
         "age_ms",

@@ -7,7 +7,7 @@ import pytest
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row, View, table_rows
-from omniseer.gateway.v1 import overlay_pb2, source_pb2
+from omniseer.gateway.v1 import overlay_pb2, source_pb2, value_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import healthy_status
 
@@ -79,3 +79,19 @@ def test_a_row_never_breaks_between_a_number_and_its_unit(message: overlay_pb2.O
     text = by_label(view(message))["Computer"].text
     assert text.replace("\u00a0", " ") == "CPU 34 %, 51 °C, throttled by heat, memory 41 %"
     assert all("," in part for part in text.split(" ")[:-1])
+
+
+def test_numbers_of_the_configuration(message: overlay_pb2.OverlaySnapshot) -> None:
+    add = message.status.numbers.add
+    add(title="CO2", available=True, value=412.256, unit="ppm", decimals=1, level=value_pb2.NUMBER_LEVEL_GOOD)
+    add(title="cell 3", available=True, value=3.1, level=value_pb2.NUMBER_LEVEL_ERROR_LOW)
+    add(title="load", available=True, level=value_pb2.NUMBER_LEVEL_WARNING_HIGH)
+    add(title="old", available=True, stale=True, age_ms=9000, value=1, level=value_pb2.NUMBER_LEVEL_GOOD)
+    add(title="never", unit="m")
+    rows = by_label(view(message))
+    assert rows["CO2"] == Row("CO2", "fresh", SeverityStyle.GOOD, "412.3\u00a0ppm")
+    assert rows["Cell 3"] == Row("Cell 3", "TOO LOW", SeverityStyle.BAD, "3.1")
+    assert rows["Load"] == Row("Load", "UNKNOWN", SeverityStyle.WARNING, "-")
+    assert rows["Old"] == Row("Old", "STALE", SeverityStyle.WARNING, "1", "9.0 s")
+    assert rows["Never"] == Row("Never", "no data", SeverityStyle.QUIET, "")
+    assert [row.label for row in table_rows(replace(view(message), compact=False))].count("cell 3") == 1

@@ -22,6 +22,7 @@ from gateway.rpc.interceptors.stats import MethodStats, Stats
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.meaning import NumberMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
@@ -35,8 +36,8 @@ from gateway.status.preview import (
     Stream,
 )
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
-from gateway.status.sources import ODOMETRY, VISION
-from gateway.status.values import Received, Velocity
+from gateway.status.sources import ODOMETRY, VISION, number_source
+from gateway.status.values import Number, Received, Velocity
 from tests.support.cloud_views import uploading_view
 from tests.support.drive_views import stopped_view
 from tests.support.eventually import eventually
@@ -188,6 +189,30 @@ def test_the_robot_and_its_sources() -> None:
     assert ("robot_gateway_source_age_seconds", "source=vision") not in shown
     assert shown["robot_gateway_faults", "severity=error"] == 1
     assert shown["robot_gateway_faults", "severity=info"] == 0
+
+
+def test_the_numbers_of_the_configuration_that_can_be_relied_on() -> None:
+    fresh, stale, unknown, missing = (
+        number_source(label, "", NumberMeaning(unit="°C"))
+        for label in ("fresh", "stale", "unknown", "missing")
+    )
+    now = take(
+        identity=Identity("lab", "1.2.3", insecure=False),
+        rules=Rules(dict.fromkeys((fresh, stale, unknown, missing), SourceRule(1000, False)), 3000),
+        board=Board(
+            {
+                fresh: Received(Number(0.0), NOW_S),
+                stale: Received(Number(7.0), NOW_S - 2),
+                unknown: Received(Number(None), NOW_S),
+            }
+        ),
+        preview=PREVIEW,
+        events=(),
+        now_s=NOW_S,
+    )
+    shown = values(Stats(), now)
+    numbers = {labels: value for (name, labels), value in shown.items() if name == "robot_gateway_number"}
+    assert numbers == {"source=number.fresh unit=°C": 0.0}
 
 
 def test_the_running_preview() -> None:

@@ -18,16 +18,19 @@ from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
 from gateway.status.board import Board
 from gateway.status.change import change_key
+from gateway.status.meaning import ANY_NUMBER
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
     DETECTIONS,
     DIAGNOSTICS,
+    GENERIC_KINDS,
     MUX_INPUTS,
     PLATFORM_SOURCES,
     ROS_SOURCES,
     SOURCES,
     SourceSpec,
+    number_source,
 )
 from gateway.status.values import Received
 from tests.support.filled_values import filled_value
@@ -39,11 +42,16 @@ RECIPIENT = Recipient("10.0.0.1", sees_passphrase=False)
 NO_CHANGE = {DETECTIONS, DIAGNOSTICS, *MUX_INPUTS.values()}
 """Sources whose values alone change nothing that the status shows."""
 
-by_name = pytest.mark.parametrize("spec", SOURCES, ids=lambda spec: spec.name)
+OF_THE_CONFIGURATION = {"number": number_source("one", "", ANY_NUMBER)}
+"""A source of each generic kind."""
+by_name = pytest.mark.parametrize(
+    "spec", [*SOURCES, *OF_THE_CONFIGURATION.values()], ids=lambda spec: spec.name
+)
 
 
 def snapshot(board: Board, *more: SourceSpec[Any]) -> Snapshot:
-    rules = dict.fromkeys((*ROS_SOURCES, *more), SourceRule(1000, required=False))
+    known = (*ROS_SOURCES, *OF_THE_CONFIGURATION.values(), *more)
+    rules = dict.fromkeys(known, SourceRule(1000, required=False))
     return snapshot_of(board, rules, now_s=NOW_S)
 
 
@@ -55,6 +63,12 @@ def columns(page: str, heading: str) -> list[list[str]]:
     """The cells of the table below a heading row."""
     table = (DOCS / page).read_text(encoding="utf-8").split(f"\n{heading}\n")[1].split("\n\n")[0]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[1:]]
+
+
+def test_every_generic_kind_has_an_example_here() -> None:
+    assert {spec.kind: spec.value_type for spec in GENERIC_KINDS} == {
+        kind: spec.value_type for kind, spec in OF_THE_CONFIGURATION.items()
+    }
 
 
 def test_names_are_unique() -> None:
@@ -93,6 +107,8 @@ def test_a_value_has_a_field_in_the_contract_unless_the_source_is_named(spec: So
     if spec.name == "effective_command":
         assert given.status.effective_command.available, "mapped as the attributed command"
     for message in (without, given):
+        if spec.name.startswith("number."):
+            assert message.status.numbers[0].HasField("value") == (message is given)
         message.status.ClearField("sources")
         message.status.ClearField("effective_command")
     assert (without == given) == (spec in NOT_MAPPED)
@@ -112,6 +128,8 @@ def test_the_configuration_page_lists_every_kind_with_its_types() -> None:
     heading = "| kind | value | message types | default age limit | in the default list |"
     listed = {row[0]: (row[2], row[3]) for row in columns("configuration.md", heading)}
     assert list(listed) == list(KINDS)
+    for spec in GENERIC_KINDS:
+        assert listed[spec.kind][1] == f"{spec.stale_after_ms} ms"
     for spec in ROS_SOURCES:
         types, age_limit = listed[spec.kind]
         assert sorted(re.findall(r"`([^`]+)`", types)) == types_of(spec)
@@ -123,7 +141,7 @@ def test_the_page_on_adding_a_source_lists_every_source() -> None:
     expected = {
         (f"`{spec.kind}`", f"`{spec.value_type.__name__}`", "ros" if spec in ROS_SOURCES else "platform")
         for spec in SOURCES
-    }
+    } | {(f"`{spec.kind}`", f"`{spec.value_type.__name__}`", "ros, by label") for spec in GENERIC_KINDS}
     assert {(row[0], row[1], row[2]) for row in rows} == expected
 
 

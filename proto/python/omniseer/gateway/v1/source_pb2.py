@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n omniseer/gateway/v1/source.proto\x12\x13omniseer.gateway.v1\"\xa1\x01\n\x0cSourceStatus\x12\x0c\n\x04name\x18\x01 \x01(\t\x12/\n\x05state\x18\x02 \x01(\x0e\x32 .omniseer.gateway.v1.SourceState\x12\x11\n\tavailable\x18\x03 \x01(\x08\x12\r\n\x05stale\x18\x04 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x05 \x01(\x04\x12\x10\n\x08required\x18\x06 \x01(\x08\x12\x0e\n\x06\x64\x65tail\x18\x07 \x01(\t*\x8b\x02\n\x0bSourceState\x12\x1c\n\x18SOURCE_STATE_UNSPECIFIED\x10\x00\x12\x18\n\x14SOURCE_STATE_WAITING\x10\x01\x12\x17\n\x13SOURCE_STATE_SILENT\x10\x02\x12\x1a\n\x16SOURCE_STATE_RECEIVING\x10\x03\x12\x16\n\x12SOURCE_STATE_STALE\x10\x04\x12\x1d\n\x19SOURCE_STATE_QOS_MISMATCH\x10\x05\x12\x1b\n\x17SOURCE_STATE_WRONG_TYPE\x10\x06\x12\x1d\n\x19SOURCE_STATE_TYPE_MISSING\x10\x07\x12\x1c\n\x18SOURCE_STATE_UNDECODABLE\x10\x08\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n omniseer/gateway/v1/source.proto\x12\x13omniseer.gateway.v1\"\xa1\x01\n\x0cSourceStatus\x12\x0c\n\x04name\x18\x01 \x01(\t\x12/\n\x05state\x18\x02 \x01(\x0e\x32 .omniseer.gateway.v1.SourceState\x12\x11\n\tavailable\x18\x03 \x01(\x08\x12\r\n\x05stale\x18\x04 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x05 \x01(\x04\x12\x10\n\x08required\x18\x06 \x01(\x08\x12\x0e\n\x06\x64\x65tail\x18\x07 \x01(\t*\xab\x02\n\x0bSourceState\x12\x1c\n\x18SOURCE_STATE_UNSPECIFIED\x10\x00\x12\x18\n\x14SOURCE_STATE_WAITING\x10\x01\x12\x17\n\x13SOURCE_STATE_SILENT\x10\x02\x12\x1a\n\x16SOURCE_STATE_RECEIVING\x10\x03\x12\x16\n\x12SOURCE_STATE_STALE\x10\x04\x12\x1d\n\x19SOURCE_STATE_QOS_MISMATCH\x10\x05\x12\x1b\n\x17SOURCE_STATE_WRONG_TYPE\x10\x06\x12\x1d\n\x19SOURCE_STATE_TYPE_MISSING\x10\x07\x12\x1c\n\x18SOURCE_STATE_UNDECODABLE\x10\x08\x12\x1e\n\x1aSOURCE_STATE_FIELD_MISSING\x10\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -32,7 +32,7 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.source_
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_SOURCESTATE']._serialized_start=222
-  _globals['_SOURCESTATE']._serialized_end=489
+  _globals['_SOURCESTATE']._serialized_end=521
   _globals['_SOURCESTATUS']._serialized_start=58
   _globals['_SOURCESTATUS']._serialized_end=219
 # @@protoc_insertion_point(module_scope)

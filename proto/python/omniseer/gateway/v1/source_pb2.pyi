@@ -45,6 +45,10 @@ class _SourceStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_SourceSta
     """Messages arrive, but can't be decoded: their type has the same name and other fields than the
     gateway's.
     """
+    SOURCE_STATE_FIELD_MISSING: _SourceState.ValueType  # 9
+    """Its message type lacks the field that the gateway is configured for, or has it in another form:
+    nothing can be read.
+    """
 
 class SourceState(_SourceState, metaclass=_SourceStateEnumTypeWrapper):
     """State of a source of values at one instant."""
@@ -70,6 +74,10 @@ SOURCE_STATE_TYPE_MISSING: SourceState.ValueType  # 7
 SOURCE_STATE_UNDECODABLE: SourceState.ValueType  # 8
 """Messages arrive, but can't be decoded: their type has the same name and other fields than the
 gateway's.
+"""
+SOURCE_STATE_FIELD_MISSING: SourceState.ValueType  # 9
+"""Its message type lacks the field that the gateway is configured for, or has it in another form:
+nothing can be read.
 """
 Global___SourceState: _TypeAlias = SourceState  # noqa: Y015
 

@@ -16,6 +16,7 @@ from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 from omniseer.gateway.v1 import source_pb2 as _source_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 from omniseer.gateway.v1 import teleop_pb2 as _teleop_pb2
+from omniseer.gateway.v1 import value_pb2 as _value_pb2
 import builtins as _builtins
 import sys
 import typing as _typing
@@ -51,6 +52,7 @@ class SystemStatus(_message.Message):
     GATEWAY_FIELD_NUMBER: _builtins.int
     RECORDING_FIELD_NUMBER: _builtins.int
     CLOUD_FIELD_NUMBER: _builtins.int
+    NUMBERS_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -110,6 +112,10 @@ class SystemStatus(_message.Message):
     def cloud(self) -> _cloud_pb2.CloudStatus:
         """The connection to the robot's fleet. Unset where the robot is not set up for one."""
 
+    @_builtins.property
+    def numbers(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.NumberStatus]:
+        """Numbers of the robot's own, in the order of its configuration."""
+
     def __init__(
         self,
         *,
@@ -128,10 +134,11 @@ class SystemStatus(_message.Message):
         gateway: _gateway_info_pb2.GatewayFacts | None = ...,
         recording: _recording_pb2.RecordingStatus | None = ...,
         cloud: _cloud_pb2.CloudStatus | None = ...,
+        numbers: _abc.Iterable[_value_pb2.NumberStatus] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "numbers", b"numbers", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -23,6 +23,8 @@ from gateway.status.cloud import CloudState, RecordingCopyState
 from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
+from gateway.status.limit import Limit
+from gateway.status.meaning import NumberMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
@@ -56,6 +58,7 @@ from gateway.status.sources import (
     ONBOARD_BATTERY,
     ROS_SOURCES,
     VISION,
+    number_source,
 )
 from gateway.status.teleop import DriveInhibit, DrivePhase
 from gateway.status.values import (
@@ -66,6 +69,7 @@ from gateway.status.values import (
     Diagnostics,
     Mode,
     Network,
+    Number,
     Received,
     Velocity,
     Vision,
@@ -170,6 +174,14 @@ class _AnyService:
         return name
 
 
+STALE = SourceRule(1000, required=False)
+CELL = number_source(
+    "cell",
+    "Cell 3",
+    NumberMeaning("V", 2, Limit(3.3, 3.4), Limit(3.0, 3.1), Limit(4.1, 4.0), Limit(4.3, 4.2)),
+)
+
+
 def everything() -> Snapshot:
     """Every value known, none of them zero, all of them stale by a known age."""
     at_s = NOW_S - 10
@@ -199,13 +211,16 @@ def everything() -> Snapshot:
             NETWORK: Received(Network("wlan0", True, -60, 70), at_s),
             DIAGNOSTICS: Received(Diagnostics(()), at_s),
             ONBOARD_BATTERY: Received(Battery(True, 12.0, 70.0, True), at_s),
+            CELL: Received(Number(3.25), at_s),
         }
     )
     return take(
         identity=Identity("lab", "1.2.3", insecure=True),
         # All of them are stale but the one that is required.
         rules=Rules(
-            {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES} | {DIAGNOSTICS: FRESH}, 3000
+            {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES}
+            | {DIAGNOSTICS: FRESH, CELL: STALE},
+            3000,
         ),
         board=board,
         preview=preview,

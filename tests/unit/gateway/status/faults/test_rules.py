@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from gateway.config.faults import FaultSettings, LowerLimit, UpperLimit
-from gateway.status.board import Board, Publishers
+from gateway.status.board import Board, Publishers, Unusable
 from gateway.status.fault import Condition, Severity
-from gateway.status.faults.platform import Limit
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
+from gateway.status.limit import Limit
 from gateway.status.preview import Encoder, PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState, detail
@@ -214,7 +214,7 @@ def test_names_that_are_no_names_and_texts_without_end() -> None:
 
 def test_a_missing_type_is_reported_at_once_without_its_name() -> None:
     of = board()
-    of.unusable[DETECTIONS] = "message type yolo_msgs/msg/DetectionArray is not installed"
+    of.unusable[DETECTIONS] = Unusable("message type yolo_msgs/msg/DetectionArray is not installed")
     faults = found(snapshot(of, detections=False), up_s=0.0)
     assert set(faults) == {"detections.type_missing"}
     assert "yolo" not in str(faults)

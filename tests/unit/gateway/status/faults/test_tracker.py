@@ -105,6 +105,17 @@ def test_getting_worse_is_reported_and_keeps_the_onset(book: FaultTracker) -> No
     assert book.update([condition("a")], 12.0).worsened == ()
 
 
+def test_getting_better_has_to_last(book: FaultTracker) -> None:
+    book.update([condition("a", Severity.ERROR, "it burns")], 10.0)
+    for step in range(1, 40):
+        severity = Severity.ERROR if step % 2 == 0 else Severity.WARNING
+        assert book.update([condition("a", severity)], 10.0 + step).worsened == ()
+        assert book.faults[0].condition.severity is Severity.ERROR
+    book.update([condition("a")], 50.0)
+    assert book.faults[0].condition.severity is Severity.WARNING
+    assert ids(book.update([condition("a", Severity.ERROR)], 51.0).worsened) == ["a"]
+
+
 def test_the_worst_comes_first_then_the_oldest(book: FaultTracker) -> None:
     book.update([condition("old")], 1.0)
     book.update([condition("old"), condition("new"), condition("bad", Severity.ERROR)], 2.0)

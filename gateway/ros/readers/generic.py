@@ -1,0 +1,24 @@
+"""Generic values: fields of any message type, as the configuration names them."""
+
+import math
+from typing import Any
+
+from gateway.config import SourceSettings
+from gateway.ros.field_path import value_at
+from gateway.ros.readers.registry import reads_any_type
+from gateway.status.sources import NUMBER
+from gateway.status.values import Number
+
+
+@reads_any_type(NUMBER)
+def from_number(message: Any, source: SourceSettings) -> Number:
+    """Returns the number in the unit of the configuration; an unknown one if the message holds none."""
+    raw = value_at(message, source.field or "")
+    if raw is None:
+        return Number(None)
+    # A byte is a `bytes` of length 1 in rclpy.
+    number = float(raw[0] if isinstance(raw, bytes) else raw) * source.scale + source.offset
+    if not math.isfinite(number):
+        return Number(None)
+    # Adding zero turns -0.0 into 0.0, which reads as another value.
+    return Number(number if source.decimals is None else round(number, source.decimals) + 0.0)

@@ -1,0 +1,82 @@
+"""Faults of the numbers that the configuration names: beyond a limit, or received without a value."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.freshness import Sample
+from gateway.status.meaning import NumberMeaning, Side, Violation
+from gateway.status.snapshot import Snapshot
+from gateway.status.source_view import SourceView
+from gateway.status.sources import SourceSpec
+from gateway.status.values import Number
+
+_WORDS: Final[Mapping[tuple[Side, Severity], tuple[str, str]]] = {
+    (Side.HIGH, Severity.ERROR): ("too high", "or more"),
+    (Side.HIGH, Severity.WARNING): ("high", "or more"),
+    (Side.LOW, Severity.WARNING): ("low", "or less"),
+    (Side.LOW, Severity.ERROR): ("too low", "or less"),
+}
+
+
+def number_faults(snapshot: Snapshot) -> Iterator[Condition]:
+    """Yields the present conditions. An unknown or stale value neither breaks a limit nor clears one."""
+    for source in snapshot.sources:
+        meaning = source.spec.meaning
+        if isinstance(meaning, NumberMeaning):
+            sample = snapshot[source.spec]
+            yield from _limit(source.spec, meaning, sample, snapshot.faults)
+            yield from _no_value(source, sample)
+
+
+def violation_of(
+    spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
+) -> Violation | None:
+    """Returns which limit the newest value violates, with the hysteresis of the faults; None if none.
+
+    A value that is unknown or stale is judged as its fault says.
+    """
+    before = {
+        side: fault.condition.severity
+        for fault in faults
+        for side in Side
+        if fault.active and fault.condition.fault_id == _fault_id(spec, side)
+    }
+    value = sample.value.value if sample.value and sample.freshness.fresh else None
+    if value is not None:
+        return meaning.violation(value, before)
+    known = ((side, severity, meaning.limit(side, severity)) for side, severity in before.items())
+    return next((Violation(side, severity, limit) for side, severity, limit in known if limit), None)
+
+
+def _fault_id(spec: SourceSpec[Number], side: Side) -> str:
+    return f"{spec.name}.{side.value}"
+
+
+def _limit(
+    spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
+) -> Iterator[Condition]:
+    found = violation_of(spec, meaning, sample, faults)
+    if found is None:
+        return
+    word, beyond = _WORDS[found.side, found.severity]
+    limit = f"{found.limit.raise_at:.10g} {meaning.unit}".strip()
+    yield Condition(
+        _fault_id(spec, found.side),
+        found.severity,
+        spec.display_name,
+        f"{spec.display_name} is {word}: {limit} {beyond}",
+        meaning.remedy or f"Check {spec.display_name} on the robot; its configuration has the limits",
+    )
+
+
+def _no_value(source: SourceView, sample: Sample[Number]) -> Iterator[Condition]:
+    if sample.freshness.fresh and sample.value is not None and sample.value.value is None:
+        name = source.spec.display_name
+        yield Condition(
+            f"{source.spec.name}.no_value",
+            Severity.ERROR if source.required else Severity.WARNING,
+            name,
+            f"{name} arrives without a number: it is unknown, and no fault beyond a limit",
+            "Check its sensor and the program that publishes it: it sends NaN, infinity, or a list too short",
+        )
