@@ -11,6 +11,7 @@ from typing import Final, NoReturn
 from common import bind, heartbeat, rpc
 from common.health import Health
 from common.tasks import cancel
+from preview.camera_watch import watch_cameras
 from preview.config import PreviewSettings
 from preview.encoders import trial
 from preview.encoders.crash_marker import CrashMarkerFile
@@ -55,14 +56,17 @@ async def serve(settings: PreviewSettings, stop: asyncio.Event) -> None:
             srt.reached_at,
             srt.port,
         )
-        trials = asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials")
+        tasks = [
+            asyncio.create_task(prober.try_all(selection.order_of_trials), name="trials"),
+            asyncio.create_task(watch_cameras(supervisor, settings), name="watch cameras"),
+        ]
         try:
             await supervisor.run(stop)
         except HungError as error:
             _end_process(error)
         finally:
             await server.stop(rpc.STOP_GRACE_S)
-            await cancel([trials])
+            await cancel(tasks)
             await prober.close()
             settings.socket.unlink(missing_ok=True)
 

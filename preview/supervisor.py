@@ -11,8 +11,11 @@ What can fail, how it is noticed, and what follows:
 | no encoder works | selection: UserError | FAULTED, retry with backoff |
 | source unusable, element missing | building: UserError | FAULTED, retry with backoff |
 | port in use, address not local | ERROR of the listener | FAULTED, retry with backoff |
-| source fails or ends | ERROR of the source, EOS | FAULTED, retry with backoff; a file loops instead |
-| source stalls | watchdog: no frames come in | FAULTED, retry with backoff |
+| source fails or ends | ERROR of the source, EOS | its fallback; a file loops instead |
+| source stalls | watchdog: no frames come in | its fallback |
+| no fallback, or none that works | cameras.py | FAULTED, retry with backoff |
+| a camera to switch to fails | ERROR, EOS, no frame in time | the live one stays; retry with backoff |
+| a camera hangs when it has been replaced | deadline of the call | left behind; HungError when stopped |
 | encoder can't be opened or fails | ERROR of the encoder | next encoder at once |
 | encoder is silent, or gives empty buffers | watchdog: frames go in, none come out | next encoder at once |
 | source's or listener's driver blocks a start | deadline of the call | FAULTED, retry with backoff |
@@ -34,6 +37,9 @@ or vanished viewer is no failure: the listener drops it, and the others notice n
 takes over, the pipeline is rebuilt whole, listener included: viewers lose the connection for some tenths of a
 second and must reconnect, to a stream of possibly another codec.
 
+A fallback, and a camera that an operator chose, are started beside the live camera and take its place in the
+running pipeline (camera_switch.py): viewers stay connected. cameras.py decides which one is to be live.
+
 One pipeline serves two reasons: viewers (the desired state) and a recording (a reader of the video tap). It
 runs while there is one. The listener exists only for viewers, and comes and goes without a gap in the
 recording; state_for_viewers says what operators see.
@@ -42,7 +48,7 @@ recording; state_for_viewers says what operators see.
 import asyncio
 import logging
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -50,7 +56,8 @@ from typing import Final, Protocol
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
-from common.errors import NotRunningError, UserError
+from common.errors import InvalidRequestError, NotRunningError, UserError
+from preview.cameras import Cameras
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.crash_marker import CrashMarkerFile
@@ -65,8 +72,10 @@ from preview.lifecycle import (
     State,
     state_for_viewers,
 )
+from preview.pipeline import sources
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
+from preview.pipeline.sources import SourcePlan
 from preview.values import (
     CAPTURE_OFFSET_NS,
     ActualState,
@@ -108,6 +117,20 @@ class Pipeline(Protocol):
 
     async def switch(self, profile: Profile) -> None:
         """Switches to another profile; viewers stay connected."""
+
+    @property
+    def live_camera(self) -> str | None:
+        """Camera whose frames are served; None while it has failed and another one is being started."""
+
+    @property
+    def starting_camera(self) -> str | None:
+        """Camera that is being started beside the live one; None if none is."""
+
+    def show(self, source: SourcePlan | None) -> None:
+        """Starts another camera beside the live one, instead of any that is being started; None: none.
+
+        With its first frame it becomes the live one; viewers stay connected. Reported as an event.
+        """
 
     async def listen(self, passphrase: str | None) -> None:
         """Replaces the listener by one with another passphrase, None: by none; the encoder goes on.
@@ -172,6 +195,8 @@ class Supervisor:
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
         self._desired = DesiredState()
+        self._cameras = Cameras({name: each.fallback for name, each in settings.named_sources.items()})
+        self._camera_retry: asyncio.TimerHandle | None = None
         self._last_error = ""
         self._pipeline: Pipeline | None = None
         self._teardowns: dict[asyncio.Task[bool], str] = {}
@@ -196,7 +221,15 @@ class Supervisor:
         """Accepts a desired state and returns the actual state at this moment.
 
         The same revision again is the same request and changes nothing; nor does any once the service stops.
+
+        Raises:
+            InvalidRequestError: enabled with an unknown camera.
         """
+        known = not desired.camera or desired.camera in self._cameras.names
+        if desired.enabled and not known:
+            raise InvalidRequestError(
+                f"no camera is called '{desired.camera}'; there are: {', '.join(self._cameras.names)}"
+            )
         if self._closed:
             return self.actual()
         if desired.revision != self._desired.revision or desired.revision == 0:
@@ -206,7 +239,8 @@ class Supervisor:
             self._forget_listener_retry()
             self._listener_backoff.reset()
             self._desired = replace(desired, profile=profile)
-            mode = f"on, {profile.value}" if desired.enabled else "off"
+            self._cameras.want(desired.camera if known else "")
+            mode = f"on, {profile.value}, camera {self._cameras.wanted}" if desired.enabled else "off"
             _log.info("desired state %d: %s", desired.revision, mode)
             self._follow_desired(new_request=True)
         self._restart_unwatched_timer()
@@ -232,7 +266,17 @@ class Supervisor:
             measurement=pipeline.measurement if pipeline else None,
             pipeline_state=self._lifecycle.state,
             reasons=self._reasons,
+            wanted_camera=self._cameras.wanted,
+            cameras=self._cameras.listed(*self._live_and_starting),
         )
+
+    @property
+    def _live_and_starting(self) -> tuple[str | None, str | None]:
+        """The live camera and the one that is being started; None for none."""
+        pipeline, state = self._pipeline, self._lifecycle.state
+        if pipeline and state is State.RUNNING:
+            return pipeline.live_camera, pipeline.starting_camera
+        return None, pipeline.plan.source.camera if pipeline and state is State.STARTING else None
 
     @property
     def _reasons(self) -> tuple[Reason, ...]:
@@ -277,6 +321,25 @@ class Supervisor:
             self._watchers -= 1
             self._restart_unwatched_timer()
 
+    # --- for the watch of the cameras ---
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a gateway watches the service."""
+        return self._watchers > 0
+
+    @property
+    def unused_cameras(self) -> tuple[str, ...]:
+        """Names of the cameras that are neither live nor being started."""
+        used = self._live_and_starting
+        return tuple(name for name in self._cameras.names if name not in used)
+
+    def cameras_found(self, problems: Mapping[str, str]) -> None:
+        """Takes why cameras can't be used, by name; empty for those that are there."""
+        self._cameras.found(problems)
+        self._follow_cameras()
+        self.changes.notify_all()
+
     # --- for the video tap ---
 
     def record(self, recording: Recording | None) -> None:
@@ -297,6 +360,7 @@ class Supervisor:
             error=self._last_error,
             stream=pipeline.stream if pipeline else None,
             encoder=pipeline.plan.choice if pipeline else None,
+            camera=pipeline.plan.source.camera if pipeline else "",
         )
 
     def request_recorded_key_frame(self) -> None:
@@ -368,11 +432,17 @@ class Supervisor:
             return
         try:
             encoder, choice = self._encoders.choose()
-            plan = make_plan(self._settings, self._desired, encoder, choice)
+        except UserError as error:
+            self.failed(Fault(Blame.OTHER, str(error)))
+            return
+        camera = self._cameras.next_attempt(None, self._now()) or self._cameras.wanted
+        try:
+            plan = make_plan(self._settings, self._desired, encoder, choice, camera)
             self._report_software_fallback(choice)
             pipeline = self._pipeline = self._new_pipeline(plan, self)
         except UserError as error:
-            self.failed(Fault(Blame.OTHER, str(error)))
+            self._cameras.failed(camera, str(error), self._now())
+            self.failed(Fault(Blame.SOURCE, str(error)))
             return
         self._retry_now = False
         self._marker.set(encoder.name, proven=self._encoders.proven)
@@ -458,6 +528,9 @@ class Supervisor:
         """Handles the first frame of the pipeline."""
         self._running_since = asyncio.get_running_loop().time()
         self._move(Event.FIRST_FRAME)
+        if self._pipeline:
+            self._cameras.delivers(self._pipeline.plan.source.camera, self._now())
+        self._follow_cameras()
 
     def measured(self, viewers_refused: int) -> None:
         """Handles new statistics of the pipeline."""
@@ -469,6 +542,58 @@ class Supervisor:
         if self._lifecycle.state is State.RUNNING and running_s > STEADY_AFTER_S:
             self._lifecycle.reset_backoff()
         self.changes.notify_all()
+
+    def camera_shown(self, camera: str) -> None:
+        """Handles another camera that is live now."""
+        _log.info("camera %s is live", camera)
+        self._cameras.delivers(camera, self._now())
+        self._follow_cameras()
+        self.changes.notify_all()
+
+    def camera_failed(self, camera: str, fault: Fault) -> bool:
+        """Handles the fault of a camera; whether the pipeline goes on, with the live one or another."""
+        _log.error("%s", fault.text)
+        self._last_error = fault.text
+        self._cameras.failed(camera, fault.text, self._now())
+        self._follow_cameras()
+        self.changes.notify_all()
+        return any(self._live_and_starting)
+
+    def _follow_cameras(self, *, new_request: bool = False) -> None:
+        """Starts a better camera than the live one, beside it, or arranges when to."""
+        if self._camera_retry:
+            self._camera_retry.cancel()
+            self._camera_retry = None
+        pipeline = self._pipeline
+        if pipeline is None or self._lifecycle.state is not State.RUNNING:
+            return
+        live, starting = pipeline.live_camera, pipeline.starting_camera
+        if starting in self._cameras.chain and not new_request:
+            return  # What follows is decided when it delivers, or fails.
+        while (camera := self._cameras.next_attempt(live, self._now())) is not None:
+            if camera == starting:
+                return
+            try:
+                source = sources.plan_camera(self._settings, camera)
+            except UserError as error:
+                _log.error("%s", error)
+                self._last_error = str(error)
+                self._cameras.failed(camera, str(error), self._now())
+                continue
+            _log.info("camera %s -> %s", live or "(failed)", camera)
+            pipeline.show(source)
+            return
+        if live is None:
+            return
+        if starting is not None:
+            pipeline.show(None)
+        wait_s = self._cameras.wait_s(live, self._now())
+        if wait_s is not None:
+            loop = asyncio.get_running_loop()
+            self._camera_retry = loop.call_later(wait_s, self._follow_cameras)
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
 
     def listener_failed(self, fault: Fault) -> bool:
         """Handles the fault of a listener; a recording goes on without it."""
@@ -496,6 +621,11 @@ class Supervisor:
         if self._lifecycle.state is State.STOPPING:
             return
         self._last_error = fault.text
+        if fault.blame is Blame.SOURCE:
+            if self._pipeline and self._lifecycle.state is State.STARTING:
+                # While running, the pipeline has reported it before.
+                self._cameras.failed(self._pipeline.plan.source.camera, fault.text, self._now())
+            self._retry_now = self._retry_now or self._cameras.next_attempt(None, self._now()) is not None
         self._move(Event.FAILURE)
         if fault.blame is Blame.ENCODER and self._pipeline:
             self._encoders.pass_over(self._pipeline.plan.encoder.name, fault.text)
@@ -524,6 +654,8 @@ class Supervisor:
         ):
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
+        elif new_request:
+            self._follow_cameras(new_request=True)
         self._wake.set()
         self.changes.notify_all()
 

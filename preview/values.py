@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
+from preview.cameras import Camera
 from preview.lifecycle import Counters, Reason, State
 
 CAPTURE_OFFSET_NS: Final = -3_600 * 1_000_000_000
@@ -35,12 +36,15 @@ class DesiredState:
         enabled: whether the preview is to run.
         profile: bandwidth profile; kept while disabled.
         passphrase: SRT passphrase (SRTO_PASSPHRASE), empty for none. Excluded from repr.
+        camera: name of the camera to be live; kept while disabled. Empty: the one before it, at first the
+            configuration's first.
     """
 
     revision: int = 0
     enabled: bool = False
     profile: Profile = Profile.BALANCED
     passphrase: str = field(default="", repr=False)
+    camera: str = ""
 
     @property
     def session(self) -> str | None:
@@ -135,6 +139,7 @@ class RecordedStream:
         error: last error; empty for none.
         stream: None while no pipeline exists.
         encoder: None while no pipeline exists.
+        camera: whose frames they are; empty while no pipeline exists.
     """
 
     state: State
@@ -142,6 +147,7 @@ class RecordedStream:
     error: str
     stream: StreamState | None
     encoder: EncoderChoice | None
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +170,8 @@ class ActualState:
         measurement: None before the end of the first window.
         pipeline_state: of the one pipeline that serves all reasons.
         reasons: for which it is to run, in the order of their definition.
+        wanted_camera: of the newest desired state.
+        cameras: all of them, in the order of the configuration.
     """
 
     instance_id: str
@@ -181,3 +189,5 @@ class ActualState:
     measurement: Measurement | None = None
     pipeline_state: State = State.DISABLED
     reasons: tuple[Reason, ...] = ()
+    wanted_camera: str = ""
+    cameras: tuple[Camera, ...] = ()

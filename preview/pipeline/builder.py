@@ -2,8 +2,10 @@
 
     source ! rate ! leaky queue ! scale, convert ! encoder ! parser ! muxer ! pipe (listener.py)
 
+- The source is replaced while the rest goes on (camera_switch.py). Its last element gives its frames one
+  timeline from the pipeline's start on, so that the encoder notices nothing.
 - Frames are dropped to the profile's rate before any work is done on them. A source that generates any rate
-  is negotiated to that rate instead.
+  is negotiated to that rate as well.
 - The only queue that drops frames is before the encoder: two wait there, older ones are dropped.
 - Scaling and converting cost nothing where the source delivers what the encoder takes.
 - Parameter sets come with every key frame, PAT and PMT at most 100 ms apart, a PCR with every frame (and
@@ -26,6 +28,9 @@ _TABLES_EVERY: Final = 4500
 _CLOCK_REFERENCE_EVERY: Final = 900
 """In ticks of 90 kHz: 10 ms, so that every frame has a PCR, up to 100 frames per second."""
 _SQUARE: Final = "video/x-raw(ANY),pixel-aspect-ratio=1/1"
+SOURCE_END: Final = "source_end"
+"""Last element of every source."""
+_SOURCE_CAPS: Final = "source_caps"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
 
 
@@ -35,9 +40,14 @@ class Parts:
 
     pipeline: Any
     source: Any
+    """The live camera."""
+    body: Any
+    """Everything behind it."""
+    body_pad: Any
+    """Where its frames enter the rest."""
     rate: Any
     apply_target: Callable[[Plan], None]
-    """Sets what changes with the profile, also while playing."""
+    """Sets what changes with the profile behind the source, also while playing."""
     encoder: Any
     encoded_pad: Any
     """All access units pass it, ..."""
@@ -55,13 +65,8 @@ def build(plan: Plan) -> Parts:
     """
     pipeline = Gst.Pipeline.new("preview")
     capture_clock.use(pipeline)
-    source = _source(plan)
-    body = _parsed(
-        _body(plan),
-        "rate_caps" if plan.source.any_rate else "rate",
-        "sink",
-        "install the GStreamer plugins: scripts/setup",
-    )
+    source = build_source(plan)
+    body = _parsed(_body(plan), "rate", "sink", "install the GStreamer plugins: scripts/setup")
     pipeline.add(source)
     pipeline.add(body)
     if not source.link(body):
@@ -76,6 +81,8 @@ def build(plan: Plan) -> Parts:
     return Parts(
         pipeline=pipeline,
         source=source,
+        body=body,
+        body_pad=body.get_static_pad("sink"),
         rate=find("rate"),
         apply_target=apply_target,
         encoder=encoder,
@@ -93,28 +100,45 @@ def _apply_target(rate: Any, size: Any, encoder: Any, plan: Plan) -> None:
     """
     target = plan.target
     properties.set_rates(encoder, plan.encoder, target.bitrate_kbps, plan.gop_frames)
-    framerate = f"[ 0/1, {target.fps}/1 ]"
-    if plan.source.any_rate:
-        framerate = f"{target.fps}/1,width={target.width_px},height={target.height_px}"
-    rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate={framerate}")
+    rate_caps = Gst.Caps.from_string(f"video/x-raw(ANY),framerate=[ 0/1, {target.fps}/1 ]")
+    _set_caps(size, properties.size_caps(plan.encoder, target))
+    _set_caps(rate, rate_caps)
+
+
+def apply_source_target(source: Any, plan: Plan) -> None:
+    """Sets frame rate and frame size of a source that generates any; also while playing."""
+    if capsfilter := source.get_by_name(_SOURCE_CAPS):
+        target = plan.target
+        size = f"width={target.width_px},height={target.height_px}"
+        _set_caps(capsfilter, Gst.Caps.from_string(f"video/x-raw(ANY),framerate={target.fps}/1,{size}"))
+
+
+def _set_caps(capsfilter: Any, caps: Any) -> None:
     # Setting equal caps again would reinitialise the encoder for nothing.
-    for capsfilter, caps in ((size, properties.size_caps(plan.encoder, target)), (rate, rate_caps)):
-        if not capsfilter.get_property("caps").is_equal(caps):
-            capsfilter.set_property("caps", caps)
+    if not capsfilter.get_property("caps").is_equal(caps):
+        capsfilter.set_property("caps", caps)
 
 
-def _source(plan: Plan) -> Any:
+def build_source(plan: Plan) -> Any:
+    """Returns the plan's source as a bin with one pad, `src`, not yet started.
+
+    Raises:
+        UserError: an element is missing, or the source's description is invalid.
+    """
     description = plan.source.description
     if plan.source.capture_fps:
         # Negotiates the camera's highest rate up to this; one that has none posts an error itself.
         description += f" ! video/x-raw,framerate=[ 1/1, {plan.source.capture_fps}/1 ]"
-    # The identity is needed by descriptions that end in caps, which must be followed by an element.
-    source = _parsed(f"{description} ! identity name=source_end", "source_end", "src", plan.source.remedy)
-    source.set_name("source")
+    if plan.source.any_rate:
+        description += f" ! capsfilter name={_SOURCE_CAPS}"
+    # It is also needed by descriptions that end in caps, which must be followed by an element.
+    description += f" ! identity name={SOURCE_END} single-segment=true"
+    source = _parsed(description, SOURCE_END, "src", plan.source.remedy)
     for name, values in plan.source.properties.items():
         for key, value in values.items():
             source.get_by_name(name).set_property(key, value)
     _fill_in_square_pixels(source)
+    apply_source_target(source, plan)
     return source
 
 
@@ -147,12 +171,10 @@ def _follows_untyped_source(element: Any) -> bool:
 
 
 def _body(plan: Plan) -> str:
-    rate = ["videorate name=rate drop-only=true skip-to-first=true", "capsfilter name=rate_caps"]
-    if plan.source.any_rate:
-        rate.reverse()
     return " ! ".join(
         [
-            *rate,
+            "videorate name=rate drop-only=true skip-to-first=true",
+            "capsfilter name=rate_caps",
             "queue leaky=downstream max-size-buffers=2 max-size-bytes=0 max-size-time=0",
             properties.chain(plan.encoder),
             f"mpegtsmux name=muxer alignment=0 pat-interval={_TABLES_EVERY} pmt-interval={_TABLES_EVERY}"

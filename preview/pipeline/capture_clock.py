@@ -10,6 +10,9 @@ was switched, rebuilt or restarted in between, until the computer restarts.
   computer's uptime.
 - The offset is before the encoder: a request for a key frame travels upstream through the pads behind it, and
   GStreamer adds a pad's offset to the time of the request even where that is "at once" (1.22).
+- A camera that is started later (camera_switch.py) has a base time of its own, so that what plays at its own
+  speed counts from 0 there as well. The difference is added at the source's last element, which stamps the
+  frames anew: for everything behind it, time goes on as if nothing had been switched.
 - v4l2src stamps a frame with the driver's time of its capture, other live sources with the time at which they
   got it; a file's frame has the time at which it is due.
 """
@@ -53,6 +56,29 @@ def play(pipeline: Any, source: Any) -> Any:
     pipeline.set_base_time(base_time)
     source.get_static_pad("src").set_offset(base_time)
     return pipeline.set_state(Gst.State.PLAYING)
+
+
+def play_beside(pipeline: Any, source: Any, source_end: Any) -> Any:
+    """Starts another source in a pipeline that `play` has started; may block in a driver.
+
+    Args:
+        pipeline: the pipeline.
+        source: a bin in it, whose state is locked.
+        source_end: the last element of that bin, an identity that stamps frames with their running time.
+
+    Returns:
+        The outcome, a Gst.StateChangeReturn.
+    """
+    outcome = source.set_state(Gst.State.PAUSED)
+    if outcome == Gst.StateChangeReturn.FAILURE:
+        return outcome
+    if outcome == Gst.StateChangeReturn.ASYNC:
+        source.get_state(_PREROLL_NS)
+    base_time, pipeline_base_time = pipeline.get_pipeline_clock().get_time(), pipeline.get_base_time()
+    source.set_base_time(base_time)
+    source_end.get_static_pad("sink").set_offset(base_time - pipeline_base_time)
+    source.get_static_pad("src").set_offset(pipeline_base_time)
+    return source.set_state(Gst.State.PLAYING)
 
 
 def captured_ns(buffer: Any, pad: Any) -> int:

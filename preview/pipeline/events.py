@@ -60,5 +60,16 @@ class PipelineEvents(Protocol):
     def listener_failed(self, fault: Fault) -> bool:
         """The listener has failed; whether the pipeline goes on without it. Otherwise it fails as a whole."""
 
+    def camera_shown(self, camera: str) -> None:
+        """Another camera is live."""
+
+    def camera_failed(self, camera: str, fault: Fault) -> bool:
+        """A camera has failed: the live one, or one that was to become it.
+
+        Returns:
+            Whether the pipeline goes on: with the live camera, or with another one that is being started.
+            Otherwise it fails as a whole.
+        """
+
     def measured(self, viewers_refused: int) -> None:
         """New statistics are available; so many viewers were refused since the last ones."""

@@ -34,10 +34,19 @@ def of(blame: Blame, what: str, plan: Plan) -> Fault:
 
 def from_message(message: Any, parts: Parts, plan: Plan) -> Fault:
     """Returns the fault of an ERROR message of the bus."""
-    culprit = message.src
     elements = _elements(parts).items()
-    blame = next((b for b, e in elements if culprit is e or culprit.has_as_ancestor(e)), Blame.OTHER)
-    return of(blame, f"failed: {_reason(*message.parse_error())}", plan)
+    blame = next((b for b, e in elements if is_within(message.src, e)), Blame.OTHER)
+    return of(blame, f"failed: {reason(message)}", plan)
+
+
+def is_within(element: Any, other: Any) -> bool:
+    """Whether an element is another one, or a part of it."""
+    return bool(element is other or element.has_as_ancestor(other))
+
+
+def reason(message: Any) -> str:
+    """Returns the text of an ERROR message of the bus."""
+    return _reason(*message.parse_error())
 
 
 def of_listener(message: Any, plan: Plan) -> Fault:

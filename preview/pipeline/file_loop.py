@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from common.gst import Gst
-from preview.pipeline.builder import Parts
 from preview.pipeline.threads import call_on_loop, in_thread
 
 _SEEK_DEADLINE_S: Final = 3.0
@@ -19,13 +18,15 @@ class FileLoop:
     """The probe on the last pad of a file source.
 
     Args:
-        parts: the pipeline.
+        pipeline: the pipeline.
+        source: a source in it that plays a file.
         on_failure: called on the event loop when the seek fails.
     """
 
-    def __init__(self, parts: Parts, on_failure: Callable[[], None]) -> None:
-        self._pipeline = parts.pipeline
-        self._pad = parts.source.get_by_name("pace").get_static_pad("sink")
+    def __init__(self, pipeline: Any, source: Any, on_failure: Callable[[], None]) -> None:
+        self._pipeline = pipeline
+        self._source = source
+        self._pad = source.get_by_name("pace").get_static_pad("sink")
         self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
         self._task: asyncio.Task[None] | None = None
@@ -55,8 +56,8 @@ class FileLoop:
         clock = self._pipeline.get_clock()
         if clock is None:
             return  # Stopped in the meantime.
-        # The last frame was due just now: the next one is due now, in the pipeline's running time.
-        self._pad.set_offset(clock.get_time() - self._pipeline.get_base_time())
+        # The last frame was due just now: the next one is due now, in the source's running time.
+        self._pad.set_offset(clock.get_time() - self._source.get_base_time())
         to_start = Gst.Event.new_seek(
             1.0, Gst.Format.TIME, Gst.SeekFlags.FLUSH, Gst.SeekType.SET, 0, Gst.SeekType.NONE, -1
         )

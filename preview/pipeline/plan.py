@@ -15,7 +15,7 @@ class Plan:
 
     Args:
         settings: of the service.
-        source: its first elements.
+        source: its first elements: the live camera.
         encoder: entry of the catalogue.
         choice: the encoder and the preferred one, as reported in the status.
         profile: profile in effect.
@@ -46,12 +46,12 @@ class Plan:
 
 
 def make_plan(
-    settings: PreviewSettings, desired: DesiredState, encoder: Encoder, choice: EncoderChoice
+    settings: PreviewSettings, desired: DesiredState, encoder: Encoder, choice: EncoderChoice, camera: str
 ) -> Plan:
-    """Returns the plan for a desired state and an encoder.
+    """Returns the plan for a desired state, an encoder and a camera.
 
     Raises:
-        UserError: the source can't be used.
+        UserError: the camera can't be used.
     """
-    source = sources.plan(settings.source, max(t.fps for t in settings.profiles.targets.values()))
+    source = sources.plan_camera(settings, camera)
     return Plan(settings, source, encoder, choice, desired.profile, desired.session)

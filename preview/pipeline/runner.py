@@ -1,9 +1,10 @@
 """One running pipeline, controlled from the event loop: start, watch, adjust, stop.
 
-supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in four
-places only (framing.py, keyframe_gate.py, file_loop.py, access_units.py), at most frame rates for no frame
-unless it is recorded, and schedule calls on the loop. Every call that may block in a driver (state changes,
-properties of a playing encoder, requests for key frames) runs in a thread of its own with a deadline.
+supervisor.py has the table of what can fail and what follows. GStreamer's threads enter Python in few places
+only (framing.py, keyframe_gate.py, file_loop.py, source_end.py, access_units.py, camera_switch.py), at most
+frame rates for no frame unless it is recorded, and schedule calls on the loop. Every call that may block in a
+driver (state changes, properties of a playing encoder, requests for key frames) runs in a thread of its own
+with a deadline.
 """
 
 import asyncio
@@ -16,18 +17,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from common.errors import UserError
 from common.gst import Gst, stop, stop_element
 from common.private_files import make_own_directory
 from preview.encoders import properties
 from preview.pipeline import builder, capture_clock, faults, statistics
 from preview.pipeline.access_units import AccessUnits
 from preview.pipeline.adaptive import BitrateController, Decision, Sample
+from preview.pipeline.camera_switch import CameraFailedError, Candidate, dispose
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.file_loop import FileLoop
 from preview.pipeline.framing import Framing
 from preview.pipeline.keyframe_gate import KeyframeGate
 from preview.pipeline.listener import Listener
 from preview.pipeline.plan import Plan
+from preview.pipeline.source_end import SourceEnd
+from preview.pipeline.sources import SourcePlan
 from preview.pipeline.threads import in_thread
 from preview.pipeline.watchdogs import Watchdogs
 from preview.values import Measurement, Profile, StreamState
@@ -69,7 +74,18 @@ class Runner:
         self._listener: Listener | None = None
         self._access_units: AccessUnits | None = None
         self._keyframe_gate = KeyframeGate(parts, self._request_key_frame)
-        self._file_loop = FileLoop(parts, self._source_ended) if plan.source.loops else None
+        self._file_loop: FileLoop | None = None
+        self._attach_source()
+        self._candidate: Candidate | None = None
+        """A camera that is being started beside the live one."""
+        self._begun = False
+        """Whether the first frame has come."""
+        self._lost: Fault | None = None
+        """Of the live camera, while the pipeline goes on because another one is being started."""
+        self._showing: SourcePlan | None = None
+        """What is being started, or about to be."""
+        self._left_behind: list[str] = []
+        """Labels of cameras that hung when they were stopped."""
         self._bus = parts.pipeline.get_bus()
         self._bus_fd = self._bus.get_pollfd().fd
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -114,13 +130,34 @@ class Runner:
         target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, self._floor_kbps)
-        apply_target, framing = self._parts.apply_target, self._framing
+        parts, framing = self._parts, self._framing
 
         def apply() -> None:
-            apply_target(plan)
+            builder.apply_source_target(parts.source, plan)
+            parts.apply_target(plan)
             framing.set_rate(target.fps)
 
         await self._call_driver(apply, "the profile was changed")
+
+    @property
+    def live_camera(self) -> str | None:
+        """Name of the camera whose frames are served; None while it has failed."""
+        return None if self._lost else self.plan.source.camera
+
+    @property
+    def starting_camera(self) -> str | None:
+        """Name of the camera that is being started to become the live one; None if none is."""
+        return self._showing.camera if self._showing else None
+
+    def show(self, source: SourcePlan | None) -> None:
+        """Starts another camera, which becomes the live one with its first frame; reported as an event.
+
+        Args:
+            source: the newest one counts: a camera that is being started is stopped first. None: it is
+                stopped, and the live one stays.
+        """
+        self._showing = source
+        self._spawn("camera", self._show(source, self._tasks.get("camera")))
 
     async def listen(self, passphrase: str | None) -> None:
         """Replaces the listener by one with another passphrase, None: by none; the encoder goes on.
@@ -182,6 +219,8 @@ class Runner:
             await in_thread(partial(stop_element, self._parts.source), deadline_s)
         except TimeoutError as error:
             raise HungError(f"{self.plan.source.label} hung when it was stopped") from error
+        if self._left_behind:
+            raise HungError(f"{self._left_behind[0]} hung when it was stopped")
         work = _stop_pipeline(free_listener, self._release(), self._framing.close, deadline_s)
         return asyncio.create_task(work, name="stop the encoder")
 
@@ -205,9 +244,7 @@ class Runner:
         self.record(None)
         self._keyframe_gate.detach()
         self._framing.detach()
-        if self._file_loop:
-            self._file_loop.detach()
-            self._file_loop = None
+        self._detach_source()
         last = [self._parts.pipeline]
         del self._parts, self._bus
         return last
@@ -244,6 +281,7 @@ class Runner:
 
     def _first_frame(self) -> None:
         if not self._ended.done():
+            self._begun = True
             self._events.first_frame()
 
     def _listener_failed(self, fault: Fault) -> None:
@@ -251,20 +289,47 @@ class Runner:
             self._fail(fault)
 
     def _source_ended(self) -> None:
-        self._fail(faults.of(Blame.SOURCE, "has ended", self.plan))
-
-    def _fail(self, fault: Fault) -> None:
         if not self._ended.done():
-            self._ended.set_result(None)
-            self._events.failed(fault)
+            self._read_bus()  # An error comes with an end, and says why.
+            self._fail(faults.of(Blame.SOURCE, "has ended", self.plan))
+
+    def _fail(self, fault: Fault, *, final: bool = False) -> None:
+        """Reports the first fault, unless it is of the live camera and another one takes its place."""
+        if self._ended.done() or (not final and fault.blame is Blame.SOURCE and self._replaces(fault)):
+            return
+        self._ended.set_result(None)
+        self._events.failed(fault)
+
+    def _replaces(self, fault: Fault) -> bool:
+        """Whether the pipeline goes on without its live camera."""
+        if not self._begun:
+            return False
+        if self._lost is None:
+            self._lost = fault
+            return self._events.camera_failed(self.plan.source.camera, fault)
+        return True
 
     def _read_bus(self) -> None:
-        while (message := self._bus.pop_filtered(_MESSAGES)) is not None:
+        while not self._ended.done() and (message := self._bus.pop_filtered(_MESSAGES)) is not None:
             if message.type == Gst.MessageType.ERROR:
                 _log.debug("%s: %s", message.src.get_path_string(), message.parse_error())
-                self._fail(faults.from_message(message, self._parts, self.plan))
+                self._take_error(message)
             else:
                 _log.warning("%s: %s", message.src.get_path_string(), message.parse_warning()[0].message)
+
+    def _take_error(self, message: Any) -> None:
+        culprit, candidate = message.src, self._candidate
+        if candidate and faults.is_within(culprit, candidate.source):
+            candidate.fail(f"failed: {faults.reason(message)}")
+        elif not self._is_old_camera(culprit):
+            self._fail(faults.from_message(message, self._parts, self.plan))
+
+    def _is_old_camera(self, culprit: Any) -> bool:
+        """Whether an element is of a camera that is being stopped; its errors are of no interest any more."""
+        parts, top = self._parts, culprit
+        while top is not None and top is not parts.pipeline and top.get_parent() is not parts.pipeline:
+            top = top.get_parent()  # None once it has been removed.
+        return top not in (parts.pipeline, parts.source, parts.body)
 
     async def _watch(self) -> None:
         """Checks the watchdogs every 0.2 s and measures every window, until the pipeline fails or stops."""
@@ -274,9 +339,12 @@ class Runner:
             await asyncio.sleep(_CHECK_INTERVAL_S)
             now = time.monotonic()
             silent = watchdogs.check(self._parts.rate.get_property("in"), self._framing.frames, now)
-            if silent:
+            if silent and not self._lost:
                 self._fail(faults.of(*silent, self.plan))
+            if self._ended.done():
                 return
+            if self._lost:
+                watchdogs = Watchdogs(now, self._timeouts)  # The next camera's time begins when it is live.
             if now - reading.at >= _WINDOW_S or self._is_overwhelmed(now):
                 reading = self._measure(reading)
 
@@ -298,6 +366,82 @@ class Runner:
     def _picture_age(self, now: float) -> float | None:
         """Returns the newest reported age; None where no viewer has reported one lately."""
         return self._picture_age_ms if now - self._picture_age_at < _PICTURE_AGE_COUNTS_S else None
+
+    # --- cameras ---
+
+    async def _show(self, source: SourcePlan | None, before: "asyncio.Task[None] | None") -> None:
+        if before and not before.done():
+            before.cancel()
+            await _finished(before)
+        if source is None:
+            return
+        try:
+            candidate = self._candidate = Candidate(self._parts, replace(self.plan, source=source))
+            try:
+                await candidate.deliver(self._timeouts.start_s, self._read_bus)
+                await _uninterrupted(self._take_over(candidate, source))
+            finally:
+                self._candidate = None
+                if self._parts.source is not candidate.source:
+                    await _uninterrupted(self._leave(candidate.stop(self._timeouts.stop_s), source))
+        except UserError as error:
+            self._show_failed(source, Fault(Blame.SOURCE, str(error)))
+        except CameraFailedError as error:
+            plan = replace(self.plan, source=source)
+            self._show_failed(source, faults.of(Blame.SOURCE, str(error), plan))
+
+    async def _take_over(self, candidate: Candidate, source: SourcePlan) -> None:
+        """Makes a camera that delivers the live one, and stops the old one."""
+        async with self._driver_lock:
+            if self._ended.done():
+                return
+            old, before = self._parts.source, self.plan.source
+            try:
+                await candidate.take_over(old, replace(self.plan, source=source))
+            except TimeoutError:
+                self._fail(faults.of(Blame.OTHER, "hung when the camera was changed", self.plan))
+                return
+            self._detach_source()
+            self._parts = replace(self._parts, source=candidate.source)
+            self.plan = replace(self.plan, source=source)
+            self._candidate = self._lost = None
+            self._attach_source()
+        self._request_key_frame()
+        if self._showing is source:
+            self._showing = None
+        if not self._ended.done():
+            self._events.camera_shown(source.camera)
+        await self._leave(dispose(self._parts.pipeline, old, self._timeouts.stop_s), before)
+
+    def _show_failed(self, source: SourcePlan, fault: Fault) -> None:
+        if self._ended.done():
+            return
+        if self._showing is source:
+            self._showing = None
+        goes_on = self._events.camera_failed(source.camera, fault)
+        if self._lost and not goes_on:
+            self._fail(self._lost, final=True)
+
+    async def _leave(self, stopping: Coroutine[Any, Any, None], source: SourcePlan) -> None:
+        """Waits until a camera has stopped; one that hangs is left behind until the pipeline is stopped."""
+        try:
+            await stopping
+        except TimeoutError:
+            _log.error("%s hung when it was stopped", source.label)
+            self._left_behind.append(source.label)
+
+    def _attach_source(self) -> None:
+        """Watches the end of the live camera."""
+        source = self._parts.source
+        self._source_end = SourceEnd(source, self._source_ended)
+        if self.plan.source.loops:
+            self._file_loop = FileLoop(self._parts.pipeline, source, self._source_ended)
+
+    def _detach_source(self) -> None:
+        self._source_end.detach()
+        if self._file_loop:
+            self._file_loop.detach()
+            self._file_loop = None
 
     # --- calls into the encoder's driver ---
 
@@ -351,6 +495,22 @@ class Runner:
                 self._fail(faults.of(Blame.ENCODER, f"hung when {when}", self.plan))
             finally:
                 calling.cancel()
+
+
+async def _uninterrupted(work: Coroutine[Any, Any, None]) -> None:
+    """Awaits what must not be left half done, to its end even if it is cancelled meanwhile."""
+    task = asyncio.create_task(work)
+    await _finished(task)
+    task.result()
+
+
+async def _finished(task: "asyncio.Task[None]") -> None:
+    """Waits for the end of a task, even if the wait is cancelled: the task takes a bounded time."""
+    try:
+        await asyncio.wait({task})
+    except asyncio.CancelledError:
+        await asyncio.wait({task})
+        raise
 
 
 async def _stop_pipeline(

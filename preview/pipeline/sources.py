@@ -6,17 +6,17 @@ its failure.
 
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from common.errors import UserError
-from preview.config import FileSource, GstSource, TestSource, V4l2Source
+from preview.config import FileSource, GstSource, PreviewSettings, TestSource, V4l2Source
 
 CLASS_DIR = Path("/sys/class/video4linux")
 
 _REMEDY_CAMERA = "Check that the camera is connected and that this user may read it (group video)"
-_REMEDY_FILE = "Name a video file that this user may read, under source.path"
-_REMEDY_GST = "Try it with gst-launch-1.0, and correct source.description"
+_REMEDY_FILE = "Name a video file that this user may read, under {key}.path"
+_REMEDY_GST = "Try it with gst-launch-1.0, and correct {key}.description"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,7 @@ class SourcePlan:
     """First elements of a pipeline.
 
     Args:
+        camera: its name in the configuration.
         label: name for people.
         description: elements in the syntax of gst-launch, ending in raw video.
         remedy: what to do when it fails.
@@ -33,6 +34,7 @@ class SourcePlan:
         loops: restarts at its end.
     """
 
+    camera: str
     label: str
     description: str
     remedy: str
@@ -42,29 +44,43 @@ class SourcePlan:
     loops: bool = False
 
 
-def plan(source: TestSource | V4l2Source | FileSource | GstSource, fastest_fps: int) -> SourcePlan:
-    """Returns the first elements for a configured source.
+def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
+    """Returns the first elements for a camera of the configuration.
 
     Args:
-        source: section of the configuration.
-        fastest_fps: frame rate of the fastest profile.
+        settings: of the service.
+        camera: its name.
 
     Raises:
-        UserError: the source can't be used: it is missing, unreadable or of another type.
+        UserError: the camera can't be used: it is missing, unreadable or of another type.
     """
+    source = settings.named_sources[camera]
+    fastest_fps = max(target.fps for target in settings.profiles.targets.values())
+    if not settings.cameras:
+        return _plan(camera, "source", source, fastest_fps)
+    try:
+        planned = _plan(camera, f"cameras.{camera}", source, fastest_fps)
+    except UserError as error:
+        raise UserError(f"camera {camera}: {error.what}", error.remedy) from error
+    return replace(planned, label=f"camera {camera} ({planned.label.removeprefix('camera ')})")
+
+
+def _plan(
+    camera: str, key: str, source: TestSource | V4l2Source | FileSource | GstSource, fastest_fps: int
+) -> SourcePlan:
     match source:
-        case TestSource():
-            description = "videotestsrc is-live=true horizontal-speed=4"
-            return SourcePlan("test pattern", description, "", any_rate=True)
+        case TestSource(pattern=pattern):
+            description = f"videotestsrc is-live=true horizontal-speed=4 pattern={pattern}"
+            return SourcePlan(camera, "test pattern", description, "", any_rate=True)
         case V4l2Source():
-            return _camera(source, fastest_fps)
-        case FileSource():
-            return _file(source.path)
-        case GstSource():
-            return SourcePlan("source.description", source.description, _REMEDY_GST)
+            return _camera(camera, source, fastest_fps)
+        case FileSource(path=path):
+            return _file(camera, path, _REMEDY_FILE.format(key=key))
+        case GstSource(description=description):
+            return SourcePlan(camera, f"{key}.description", description, _REMEDY_GST.format(key=key))
 
 
-def _camera(source: V4l2Source, fastest_fps: int) -> SourcePlan:
+def _camera(camera: str, source: V4l2Source, fastest_fps: int) -> SourcePlan:
     device = source.device or find_card(source.card)
     try:
         mode = Path(device).stat().st_mode
@@ -73,6 +89,7 @@ def _camera(source: V4l2Source, fastest_fps: int) -> SourcePlan:
     if not stat.S_ISCHR(mode):
         raise UserError(f"camera {device} is not a device", "Name a device such as /dev/video11")
     return SourcePlan(
+        camera,
         f"camera {device}",
         "v4l2src name=camera do-timestamp=true",
         _REMEDY_CAMERA,
@@ -102,20 +119,21 @@ def _card_name(entry: Path) -> str:
         return ""  # Unplugged in the meantime.
 
 
-def _file(path: Path) -> SourcePlan:
+def _file(camera: str, path: Path, remedy: str) -> SourcePlan:
     try:
         with path.open("rb") as file:
             empty = not file.read(1)
     except OSError as error:
-        raise UserError(f"video file {path} can't be read: {error.strerror}", _REMEDY_FILE) from error
+        raise UserError(f"video file {path} can't be read: {error.strerror}", remedy) from error
     if empty:
-        raise UserError(f"video file {path} is empty", _REMEDY_FILE)
+        raise UserError(f"video file {path} is empty", remedy)
     return SourcePlan(
+        camera,
         f"video file {path}",
         # Only video is decoded; clocksync plays it at its own speed.
         'filesrc name=file ! decodebin caps="video/x-raw(ANY)" expose-all-streams=false'
         " ! clocksync name=pace",
-        _REMEDY_FILE,
+        remedy,
         properties={"file": {"location": str(path)}},
         loops=True,
     )

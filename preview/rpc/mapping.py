@@ -7,6 +7,7 @@ from typing import Final
 
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from preview.cameras import Camera, CameraState
 from preview.encoders.catalogue import Encoder
 from preview.encoders.probe import Verdict
 from preview.lifecycle import Reason, State
@@ -23,6 +24,9 @@ CODECS: Final[Mapping[Codec, pb.Codec.ValueType]] = MappingProxyType(
 )
 REASONS: Final[Mapping[Reason, pb.Reason.ValueType]] = MappingProxyType(
     {reason: pb.Reason.Value(f"REASON_{reason.name}") for reason in Reason}
+)
+CAMERA_STATES: Final[Mapping[CameraState, pb.CameraState.ValueType]] = MappingProxyType(
+    {state: pb.CameraState.Value(f"CAMERA_STATE_{state.name}") for state in CameraState}
 )
 _PROFILES_BACK: Final = {message: profile for profile, message in PROFILES.items()}
 
@@ -47,7 +51,13 @@ def desired_state(message: pb.DesiredState) -> DesiredState:
         raise InvalidRequestError(
             f"the passphrase has {size} bytes; SRT takes {_MIN_PASSPHRASE_BYTES} to {_MAX_PASSPHRASE_BYTES}"
         )
-    return DesiredState(message.revision, message.enabled, profile or Profile.BALANCED, message.passphrase)
+    return DesiredState(
+        message.revision,
+        message.enabled,
+        profile or Profile.BALANCED,
+        message.passphrase,
+        message.camera,
+    )
 
 
 def actual_state(actual: ActualState) -> pb.ActualState:
@@ -70,6 +80,14 @@ def actual_state(actual: ActualState) -> pb.ActualState:
         ),
         pipeline_state=STATES[actual.pipeline_state],
         reasons=[REASONS[reason] for reason in actual.reasons],
+        wanted_camera=actual.wanted_camera,
+        cameras=[_camera(camera) for camera in actual.cameras],
+    )
+
+
+def _camera(camera: Camera) -> pb.Camera:
+    return pb.Camera(
+        name=camera.name, state=CAMERA_STATES[camera.state], error=camera.error, fallback=camera.fallback
     )
 
 

@@ -20,6 +20,7 @@ from preview.config import (
 from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import AccessUnit, Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
+from preview.pipeline.sources import SourcePlan
 from preview.supervisor import Pipeline
 from preview.values import DesiredState, EncoderChoice, Profile, Target
 from tests.support.free import free_udp_port
@@ -34,7 +35,9 @@ class Events:
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
         self.goes_on = False
-        """Whether a pipeline goes on without its listener."""
+        """Whether a pipeline goes on without its listener, or its camera."""
+        self.cameras: list[str] = []
+        """Those that became live, or failed."""
         self.faults: list[Fault] = []
         self._changed = asyncio.Event()
 
@@ -48,6 +51,17 @@ class Events:
     def listener_failed(self, fault: Fault) -> bool:
         self.faults.append(fault)
         self._count("listener_failed")
+        return self.goes_on
+
+    def camera_shown(self, camera: str) -> None:
+        self.cameras.append(camera)
+        self._count("camera_shown")
+
+    def camera_failed(self, camera: str, fault: Fault) -> bool:
+        self.cameras.append(camera)
+        if self.goes_on:
+            self.faults.append(fault)
+        self._count("camera_failed")
         return self.goes_on
 
     def measured(self, viewers_refused: int) -> None:
@@ -77,7 +91,17 @@ def plan_of(description: str, passphrase: str = "", start_s: float = 5.0) -> Pla
         timeouts=TimeoutSettings(start_s=start_s),
     )
     desired = DesiredState(1, True, Profile.BALANCED, passphrase)
-    return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"))
+    return make_plan(settings, desired, CATALOGUE["x264"], EncoderChoice("x264", False, "x264"), "camera")
+
+
+def another(name: str, description: str = f"{LIVE} pattern=ball") -> SourcePlan:
+    """A camera beside the one of the plan."""
+    return SourcePlan(name, f"camera {name}", description, "Check its cable")
+
+
+def cameras_of(pipeline: Pipeline) -> tuple[str | None, str | None]:
+    """The live one, and the one that is being started."""
+    return pipeline.live_camera, pipeline.starting_camera
 
 
 class PipelineContract:
@@ -128,6 +152,50 @@ class PipelineContract:
         assert await (await pipeline.stop())
         assert events.counts["first_frame"] == 1
         assert not events.faults
+
+    async def test_another_camera_takes_the_place_of_the_live_one(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE), events)
+        await pipeline.start()
+        await events.wait_for("first_frame")
+        assert cameras_of(pipeline) == ("camera", None)
+        for number, name in enumerate(("rear", "arm"), 1):
+            live = pipeline.live_camera
+            pipeline.show(another(name))
+            assert cameras_of(pipeline) == (live, name)
+            await events.wait_for("camera_shown", number)
+            assert cameras_of(pipeline) == (name, None)
+        assert pipeline.plan.source.camera == "arm"
+        await events.wait_for("measured", events.counts["measured"] + 2)
+        assert pipeline.measurement is not None
+        assert pipeline.measurement.fps > 0
+        assert await (await pipeline.stop())
+        assert events.counts["first_frame"] == 1
+        assert not events.faults
+
+    async def test_of_two_cameras_the_newest_counts_and_none_may_be(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE), events)
+        await pipeline.start()
+        await events.wait_for("first_frame")
+        pipeline.show(another("rear"))
+        pipeline.show(another("arm"))
+        await events.wait_for("camera_shown")
+        pipeline.show(another("rear"))
+        pipeline.show(None)
+        assert cameras_of(pipeline) == ("arm", None)
+        await events.wait_for("measured", events.counts["measured"] + 2)
+        assert await (await pipeline.stop())
+        assert events.cameras == ["arm"]
+
+    async def test_a_camera_that_is_being_started_may_be_stopped_with_the_pipeline(self) -> None:
+        events = Events()
+        pipeline = self.build(plan_of(LIVE), events)
+        await pipeline.start()
+        await events.wait_for("first_frame")
+        pipeline.show(another("rear"))
+        assert await (await pipeline.stop())
+        assert not events.cameras
 
     async def test_a_recording_gets_its_access_units_from_then_on(self) -> None:
         events, units = Events(), list[AccessUnit]()

@@ -11,9 +11,11 @@ from pathlib import Path
 from common.errors import UserError
 from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
 from preview.pipeline.plan import Plan
+from preview.pipeline.sources import SourcePlan
 from preview.values import Measurement, Profile, StreamState
 
 FIRST_FRAME_S = 0.05
+SHOW_S = 0.05
 WINDOW_S = 0.5
 STOP_DEADLINE_S = 3.0
 
@@ -27,6 +29,7 @@ class Script:
         fault: reported instead of the first frame, or `fault_after_s` after it.
         fault_after_s: 0: no frame comes.
         fault_in_switch: reported when the profile is switched.
+        camera_faults: of cameras that are shown while it runs, by name.
         fault_in_stop: reported while it is being stopped.
         listener_faults: of the listeners that are opened while it runs, in turn.
         viewers_refused: in each window.
@@ -39,6 +42,7 @@ class Script:
     fault: Fault | None = None
     fault_after_s: float = 0.0
     fault_in_switch: Fault | None = None
+    camera_faults: dict[str, Fault] = field(default_factory=dict)
     fault_in_stop: Fault | None = None
     listener_faults: list[Fault] = field(default_factory=list)
     viewers_refused: int = 0
@@ -60,6 +64,10 @@ class PipelineDouble:
         self._events = events
         self._script = script or _script_of(plan)
         self._serving: asyncio.Task[None] | None = None
+        self._begun = False
+        self._lost: Fault | None = None
+        self.starting_camera: str | None = None
+        self._showing: asyncio.TimerHandle | None = None
         if self._script.build_error:
             raise UserError(self._script.build_error)
 
@@ -77,6 +85,35 @@ class PipelineDouble:
         self.plan = replace(self.plan, profile=profile)
         if self._script.fault_in_switch:
             self._fail(self._script.fault_in_switch)
+
+    @property
+    def live_camera(self) -> str | None:
+        return None if self._lost else self.plan.source.camera
+
+    def show(self, source: SourcePlan | None) -> None:
+        if self._showing:
+            self._showing.cancel()
+        self._showing, self.starting_camera = None, None
+        if source:
+            self.starting_camera = source.camera
+            self._showing = asyncio.get_running_loop().call_later(SHOW_S, self._shown, source)
+
+    def lose_camera(self, fault: Fault) -> None:
+        """The live camera fails."""
+        self._lost = fault
+        if not self._events.camera_failed(self.plan.source.camera, fault):
+            self._fail(fault)
+
+    def _shown(self, source: SourcePlan) -> None:
+        self.starting_camera = None
+        if fault := self._script.camera_faults.get(source.camera):
+            goes_on = self._events.camera_failed(source.camera, fault)
+            if self._lost and not goes_on:
+                self._fail(self._lost)
+            return
+        self.plan = replace(self.plan, source=source)
+        self._lost = None
+        self._events.camera_shown(source.camera)
 
     async def listen(self, passphrase: str | None) -> None:
         self.plan = replace(self.plan, passphrase=passphrase)
@@ -110,9 +147,10 @@ class PipelineDouble:
         script = self._script
         await asyncio.sleep(FIRST_FRAME_S)
         if script.fault is None or script.fault_after_s:
+            self._begun = True
             self._events.first_frame()
         if script.fault:
-            asyncio.get_running_loop().call_later(script.fault_after_s, self._fail, script.fault)
+            asyncio.get_running_loop().call_later(script.fault_after_s, self._fail_by_script, script.fault)
         while True:
             await asyncio.sleep(WINDOW_S)
             if self.take:
@@ -124,12 +162,20 @@ class PipelineDouble:
         if not self._events.listener_failed(fault):
             self._fail(fault)
 
+    def _fail_by_script(self, fault: Fault) -> None:
+        if fault.blame is Blame.SOURCE and self._begun and self._serving:
+            self.lose_camera(fault)
+        else:
+            self._fail(fault)
+
     def _fail(self, fault: Fault) -> None:
         if self._end():
             self._events.failed(fault)
 
     def _end(self) -> bool:
         """Ends the frames; False when they had ended before."""
+        if self._showing:
+            self._showing.cancel()
         serving, self._serving = self._serving, None
         return serving is not None and serving.cancel()
 

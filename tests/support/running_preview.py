@@ -60,11 +60,14 @@ class RunningPreview:
             "socket": str(self.socket),
             "runtime_dir": str(self.runtime_dir),
             "source": {"kind": "test"},
+            "cameras": {},
             "profiles": PROFILES if small else {},
             "srt": {"port": self.port, "bind": "127.0.0.1", "latency_ms": 20},
             "encoders": {"order": ["x264"]},
         }
-        self._config.write_text(yaml.safe_dump(_merged(own, settings or {})), encoding="utf-8")
+        self._config.write_text(
+            yaml.safe_dump(_merged(own, settings or {}), sort_keys=False), encoding="utf-8"
+        )
         self.process = self._spawn()
         self.channel = grpc.insecure_channel(f"unix:{self.socket}")
         self.stub = pb_grpc.PreviewServiceStub(self.channel)
@@ -95,6 +98,10 @@ class RunningPreview:
     def descriptors(self) -> int:
         """How many file descriptors it has."""
         return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+    def threads(self) -> int:
+        """How many threads it has."""
+        return len(list(Path(f"/proc/{self.process.pid}/task").iterdir()))
 
     def resident_mib(self) -> float:
         """Its memory that is in RAM."""
@@ -180,10 +187,14 @@ class RunningPreview:
 
 
 def _merged(base: dict[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """`more` wins, section by section; a source is replaced whole."""
+    """`more` wins, section by section; sources are replaced whole."""
     merged = dict(base)
     for key, value in more.items():
-        both = isinstance(value, Mapping) and isinstance(base.get(key), dict) and key != "source"
+        both = (
+            isinstance(value, Mapping)
+            and isinstance(base.get(key), dict)
+            and key not in {"source", "cameras"}
+        )
         merged[key] = _merged(base[key], value) if both else value
     return merged
 

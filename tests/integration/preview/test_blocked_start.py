@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 
 import pytest
 
-from common.gst import Gst
+from common.gst import Gst, stop
+from preview.config import TimeoutSettings
 from preview.encoders.catalogue import CATALOGUE
-from preview.pipeline.events import Blame
+from preview.pipeline.events import Blame, HungError
 from preview.pipeline.runner import Runner
-from tests.support.pipeline_contract import LIVE, Events, plan_of
+from tests.support.pipeline_contract import LIVE, Events, another, plan_of
 
 pytestmark = pytest.mark.gst
 
@@ -45,16 +46,55 @@ class SlowEncoder(Slow):
     inner = "videoconvert ! x264enc tune=zerolatency"
 
 
-@pytest.fixture(params=[Gst.StateChange.NULL_TO_READY, Gst.StateChange.READY_TO_PAUSED])
-def elements(request: pytest.FixtureRequest) -> Iterator[None]:
-    """The slow elements exist, and block in one of the changes."""
-    Slow.blocks, Slow.released = request.param, threading.Event()
+def register() -> None:
     for name, element in (("slowcamera", SlowCamera), ("slowencoder", SlowEncoder)):
         if Gst.ElementFactory.find(name) is None:
             element.set_metadata(name, "Video", "An element with a slow driver", "the tests")
             assert Gst.Element.register(None, name, Gst.Rank.NONE, element)
+
+
+@pytest.fixture(params=[Gst.StateChange.NULL_TO_READY, Gst.StateChange.READY_TO_PAUSED])
+def elements(request: pytest.FixtureRequest) -> Iterator[None]:
+    """The slow elements exist, and block in one of the changes."""
+    Slow.blocks, Slow.released = request.param, threading.Event()
+    register()
     yield
     Slow.released.set()
+
+
+@pytest.fixture
+def slow_stop() -> Iterator[None]:
+    """A camera exists that does not return from being stopped."""
+    Slow.blocks, Slow.released = Gst.StateChange.PAUSED_TO_READY, threading.Event()
+    register()
+    yield
+    Slow.released.set()
+
+
+@pytest.mark.usefixtures("slow_stop")
+async def test_a_camera_that_hangs_when_it_has_been_replaced_is_left_behind() -> None:
+    """The stream goes on with the new one; only the end of the process frees the driver of the old one."""
+    events = Events()
+    plan = plan_of("slowcamera")
+    short = TimeoutSettings(stop_s=0.3)
+    plan = replace(plan, settings=plan.settings.model_copy(update={"timeouts": short}))
+    pipeline = Runner(plan, events)
+    await pipeline.start()
+    await events.wait_for("first_frame")
+    for number, name in enumerate(("rear", "arm"), 1):
+        pipeline.show(another(name))
+        await events.wait_for("camera_shown", number)
+    await events.wait_for("measured", events.counts["measured"] + 3)
+    assert pipeline.measurement is not None
+    assert pipeline.measurement.fps > 20
+    assert not events.faults
+    with pytest.raises(HungError, match=r"source.description hung when it was stopped"):
+        await pipeline.stop()
+    # What the end of the process does.
+    Slow.released.set()
+    stop(pipeline._parts.pipeline)
+    pipeline._release()
+    pipeline._framing.close()
 
 
 @pytest.mark.parametrize(

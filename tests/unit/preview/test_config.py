@@ -6,7 +6,7 @@ import pytest
 
 from common.config import as_yaml, load
 from common.errors import UserError
-from preview.config import PreviewSettings, V4l2Source
+from preview.config import PreviewSettings, TestSource, V4l2Source
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER
 from preview.values import Codec, Profile
 
@@ -86,3 +86,45 @@ def test_profiles_are_spelled_as_everywhere(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.delenv("PREVIEW__PROFILES__LOW_BW__FPS")
     with pytest.raises(UserError, match=r"line 2: key 'profiles.low-bw.fps' is 0"):
         from_text(tmp_path, "profiles:\n low_bw: {fps: 0, width_px: 640}")
+
+
+FRONT_AND_REAR = """
+cameras:
+  front: {kind: v4l2, card: rkisp_mainpath, fallback: rear}
+  rear: {kind: v4l2, device: /dev/video2}
+"""
+
+
+def test_a_single_source_is_the_only_camera(tmp_path: Path) -> None:
+    settings = from_text(tmp_path, "source: {kind: test}")
+    assert settings.named_sources == {"camera": TestSource()}
+    assert "cameras: {}" in as_yaml(settings)
+
+
+def test_cameras_have_names_and_an_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = from_text(tmp_path, FRONT_AND_REAR)
+    assert list(settings.named_sources) == ["front", "rear"]
+    assert settings.named_sources["front"].fallback == "rear"
+    assert from_text(tmp_path, as_yaml(settings)).named_sources == settings.named_sources
+    # As an overlay of a robot with one camera sets it.
+    monkeypatch.setenv("PREVIEW__SOURCE__KIND", "test")
+    assert list(from_text(tmp_path, FRONT_AND_REAR).named_sources) == ["front", "rear"]
+    monkeypatch.setenv("PREVIEW__CAMERAS__REAR__DEVICE", "/dev/video5")
+    rear = from_text(tmp_path, FRONT_AND_REAR).named_sources["rear"]
+    assert rear == V4l2Source(device="/dev/video5")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("source: {kind: test, fallback: rear}", "a single source has no other to fall back on"),
+        ("cameras: {front: {kind: test, fallback: back}, rear: {kind: test}}", r"\(there are: rear\)"),
+        ("cameras: {front: {kind: test, fallback: front}}", r"\(there are: none\), not 'front'"),
+        ("cameras: {Front door: {kind: test}}", "Front door"),
+        ("cameras: {front: {kind: v4l2, device: a, card: b}}", "name either the device"),
+        (f"cameras: {{{', '.join(f'c{i}: {{kind: test}}' for i in range(17))}}}", "16"),
+    ],
+)
+def test_cameras_that_contradict_themselves_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        from_text(tmp_path, text)

@@ -5,8 +5,13 @@ from pathlib import Path
 import pytest
 
 from common.errors import UserError
-from preview.config import FileSource, GstSource, TestSource, V4l2Source
+from preview.config import FileSource, GstSource, PreviewSettings, Source, TestSource, V4l2Source
 from preview.pipeline import sources
+from preview.pipeline.sources import SourcePlan
+
+
+def planned(source: Source) -> SourcePlan:
+    return sources.plan_camera(PreviewSettings(source=source), "camera")
 
 
 def cards(directory: Path, **names: str) -> Path:
@@ -33,18 +38,18 @@ def test_a_card_that_is_not_there_names_those_that_are(tmp_path: Path) -> None:
 def test_the_test_pattern_makes_any_rate_and_the_others_do_not(tmp_path: Path) -> None:
     film = tmp_path / "film.mkv"
     film.write_bytes(b"x")
-    assert sources.plan(TestSource(), 60).any_rate
-    file = sources.plan(FileSource(path=film), 60)
+    assert planned(TestSource()).any_rate
+    file = planned(FileSource(path=film))
     assert (file.any_rate, file.loops) == (False, True)
     assert file.properties["file"]["location"] == str(film)
-    described = sources.plan(GstSource(description="videotestsrc"), 60)
+    described = planned(GstSource(description="videotestsrc"))
     assert (described.any_rate, described.loops, described.description) == (False, False, "videotestsrc")
 
 
 def test_a_camera_is_asked_for_the_fastest_profile_or_what_is_configured() -> None:
     # Any character device will do for a plan.
-    assert sources.plan(V4l2Source(device="/dev/null"), 60).capture_fps == 60
-    assert sources.plan(V4l2Source(device="/dev/null", fps=25), 60).capture_fps == 25
+    assert planned(V4l2Source(device="/dev/null")).capture_fps == 60
+    assert planned(V4l2Source(device="/dev/null", fps=25)).capture_fps == 25
 
 
 @pytest.mark.parametrize("content", [None, b""])
@@ -53,6 +58,6 @@ def test_a_film_that_can_not_be_played_is_named(tmp_path: Path, content: bytes |
     if content is not None:
         film.write_bytes(content)
     with pytest.raises(UserError, match=str(film)):
-        sources.plan(FileSource(path=film), 60)
+        planned(FileSource(path=film))
     with pytest.raises(UserError, match="Is a directory"):
-        sources.plan(FileSource(path=tmp_path), 60)
+        planned(FileSource(path=tmp_path))

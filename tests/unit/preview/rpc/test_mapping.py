@@ -6,6 +6,7 @@ import pytest
 
 from common.errors import InvalidRequestError
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from preview.cameras import Camera, CameraState
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.probe import Verdict
 from preview.lifecycle import Counters, Reason, State
@@ -28,6 +29,11 @@ FULL = ActualState(
     measurement=Measurement(59.5, 4400.0, 21, 12, 30.5, 1.5),
     pipeline_state=State.RUNNING,
     reasons=(Reason.VIEWERS, Reason.RECORDING),
+    wanted_camera="rear",
+    cameras=(
+        Camera("rear", CameraState.FAILED, "unplugged", "front"),
+        Camera("front", CameraState.LIVE),
+    ),
 )
 
 
@@ -38,6 +44,7 @@ FULL = ActualState(
         (mapping.PROFILES, Profile, pb.Profile),
         (mapping.CODECS, Codec, pb.Codec),
         (mapping.REASONS, Reason, pb.Reason),
+        (mapping.CAMERA_STATES, CameraState, pb.CameraState),
     ],
 )
 def test_every_enum_is_covered_on_both_sides(table: Any, ours: Any, theirs: Any) -> None:
@@ -51,6 +58,8 @@ def unset_fields(message: object, prefix: str = "") -> list[str]:
     for field in message.DESCRIPTOR.fields:  # type: ignore[attr-defined]
         if field.name not in present:
             unset.append(prefix + field.name)
+        elif field.is_repeated and field.message_type:
+            unset += unset_fields(present[field.name][0], f"{prefix}{field.name}.")
         elif field.message_type:
             unset += unset_fields(present[field.name], f"{prefix}{field.name}.")
     return unset
@@ -89,6 +98,11 @@ def test_every_value_arrives_at_its_place() -> None:
         ),
         pipeline_state=pb.LIFECYCLE_STATE_RUNNING,
         reasons=[pb.REASON_VIEWERS, pb.REASON_RECORDING],
+        wanted_camera="rear",
+        cameras=[
+            pb.Camera(name="rear", state=pb.CAMERA_STATE_FAILED, error="unplugged", fallback="front"),
+            pb.Camera(name="front", state=pb.CAMERA_STATE_LIVE),
+        ],
     )
 
 
@@ -118,7 +132,10 @@ def test_a_candidate_fills_every_field() -> None:
 
 def test_a_desired_state_and_its_passphrase() -> None:
     desired = pb.DesiredState(revision=3, enabled=True, profile=pb.PROFILE_LOW_BW, passphrase="0123456789")
+    assert mapping.desired_state(desired).camera == ""
+    desired.camera = "rear"
     mapped = mapping.desired_state(desired)
+    assert mapped.camera == "rear"
     assert (mapped.revision, mapped.enabled, mapped.profile) == (3, True, Profile.LOW_BW)
     assert mapped.passphrase == "0123456789"
     assert "0123456789" not in repr(mapped)

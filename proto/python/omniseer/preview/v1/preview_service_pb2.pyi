@@ -131,6 +131,40 @@ CODEC_H265: Codec.ValueType  # 2
 """H.265 / HEVC."""
 Global___Codec: _TypeAlias = Codec  # noqa: Y015
 
+class _CameraState:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _CameraStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_CameraState.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    CAMERA_STATE_UNSPECIFIED: _CameraState.ValueType  # 0
+    """Never sent."""
+    CAMERA_STATE_READY: _CameraState.ValueType  # 1
+    """It is there, and delivered when it was last used, or has not been used yet."""
+    CAMERA_STATE_STARTING: _CameraState.ValueType  # 2
+    """It is being started, to become the live one."""
+    CAMERA_STATE_LIVE: _CameraState.ValueType  # 3
+    """Its frames are the stream's."""
+    CAMERA_STATE_FAILED: _CameraState.ValueType  # 4
+    """It is missing, or failed when it was last used."""
+
+class CameraState(_CameraState, metaclass=_CameraStateEnumTypeWrapper):
+    """What is known of a camera. None is opened to find out: a camera that has not been used is READY if it is
+    there.
+    """
+
+CAMERA_STATE_UNSPECIFIED: CameraState.ValueType  # 0
+"""Never sent."""
+CAMERA_STATE_READY: CameraState.ValueType  # 1
+"""It is there, and delivered when it was last used, or has not been used yet."""
+CAMERA_STATE_STARTING: CameraState.ValueType  # 2
+"""It is being started, to become the live one."""
+CAMERA_STATE_LIVE: CameraState.ValueType  # 3
+"""Its frames are the stream's."""
+CAMERA_STATE_FAILED: CameraState.ValueType  # 4
+"""It is missing, or failed when it was last used."""
+Global___CameraState: _TypeAlias = CameraState  # noqa: Y015
+
 @_typing.final
 class DesiredState(_message.Message):
     """The state that the gateway requests."""
@@ -141,6 +175,7 @@ class DesiredState(_message.Message):
     ENABLED_FIELD_NUMBER: _builtins.int
     PROFILE_FIELD_NUMBER: _builtins.int
     PASSPHRASE_FIELD_NUMBER: _builtins.int
+    CAMERA_FIELD_NUMBER: _builtins.int
     revision: _builtins.int
     """Incremented by every request of an operator. The service echoes the newest revision applied. Two
     desired states with the same revision are the same request.
@@ -151,6 +186,10 @@ class DesiredState(_message.Message):
     """Bandwidth profile. Ignored when enabled is false."""
     passphrase: _builtins.str
     """The SRT passphrase of this session (10 to 79 bytes). Empty: no encryption. Never logged."""
+    camera: _builtins.str
+    """Name of the camera that is to be live. Empty: the one that was wanted before, at first the
+    configuration's first. Kept when enabled is false.
+    """
     def __init__(
         self,
         *,
@@ -158,10 +197,11 @@ class DesiredState(_message.Message):
         enabled: _builtins.bool = ...,
         profile: Global___Profile.ValueType = ...,
         passphrase: _builtins.str = ...,
+        camera: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled", "passphrase", b"passphrase", "profile", b"profile", "revision", b"revision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["camera", b"camera", "enabled", b"enabled", "passphrase", b"passphrase", "profile", b"profile", "revision", b"revision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -185,6 +225,8 @@ class ActualState(_message.Message):
     LISTENER_FIELD_NUMBER: _builtins.int
     PIPELINE_STATE_FIELD_NUMBER: _builtins.int
     REASONS_FIELD_NUMBER: _builtins.int
+    WANTED_CAMERA_FIELD_NUMBER: _builtins.int
+    CAMERAS_FIELD_NUMBER: _builtins.int
     instance_id: _builtins.str
     """Random for every process of the service: a new value means that all counters restarted at 0."""
     applied_revision: _builtins.int
@@ -200,6 +242,10 @@ class ActualState(_message.Message):
     """The last error and what to do, for people. Empty for none since the preview was last enabled."""
     pipeline_state: Global___LifecycleState.ValueType
     """State of the one pipeline that serves all reasons."""
+    wanted_camera: _builtins.str
+    """Name of the camera that is to be live, as far as it works; the newest revision applied chose it. Empty:
+    a service that is older than this field.
+    """
     @_builtins.property
     def stream(self) -> Global___Stream:
         """Parameters of the stream being served. Unset while no pipeline exists."""
@@ -224,6 +270,10 @@ class ActualState(_message.Message):
     def reasons(self) -> _containers.RepeatedScalarFieldContainer[Global___Reason.ValueType]:
         """Why a pipeline is to run. Empty: none is."""
 
+    @_builtins.property
+    def cameras(self) -> _containers.RepeatedCompositeFieldContainer[Global___Camera]:
+        """All cameras, in the order of the configuration; at most one is LIVE. Empty: as above."""
+
     def __init__(
         self,
         *,
@@ -239,14 +289,50 @@ class ActualState(_message.Message):
         listener: Global___Listener | None = ...,
         pipeline_state: Global___LifecycleState.ValueType = ...,
         reasons: _abc.Iterable[Global___Reason.ValueType] | None = ...,
+        wanted_camera: _builtins.str = ...,
+        cameras: _abc.Iterable[Global___Camera] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["counters", b"counters", "encoder", b"encoder", "listener", b"listener", "measurement", b"measurement", "stream", b"stream"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "counters", b"counters", "encoder", b"encoder", "instance_id", b"instance_id", "last_error", b"last_error", "listener", b"listener", "measurement", b"measurement", "pipeline_state", b"pipeline_state", "profile", b"profile", "reasons", b"reasons", "state", b"state", "stream", b"stream"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["applied_revision", b"applied_revision", "cameras", b"cameras", "counters", b"counters", "encoder", b"encoder", "instance_id", b"instance_id", "last_error", b"last_error", "listener", b"listener", "measurement", b"measurement", "pipeline_state", b"pipeline_state", "profile", b"profile", "reasons", b"reasons", "state", b"state", "stream", b"stream", "wanted_camera", b"wanted_camera"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___ActualState: _TypeAlias = ActualState  # noqa: Y015
+
+@_typing.final
+class Camera(_message.Message):
+    """One camera."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    STATE_FIELD_NUMBER: _builtins.int
+    ERROR_FIELD_NUMBER: _builtins.int
+    FALLBACK_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """Its name in the configuration."""
+    state: Global___CameraState.ValueType
+    """At this moment."""
+    error: _builtins.str
+    """Why it has failed and what to do, for people. Empty unless it has."""
+    fallback: _builtins.str
+    """Name of the camera that takes its place while it fails. Empty: none does."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+        state: Global___CameraState.ValueType = ...,
+        error: _builtins.str = ...,
+        fallback: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["error", b"error", "fallback", b"fallback", "name", b"name", "state", b"state"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Camera: _TypeAlias = Camera  # noqa: Y015
 
 @_typing.final
 class Listener(_message.Message):

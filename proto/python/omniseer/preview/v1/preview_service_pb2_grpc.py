@@ -80,8 +80,8 @@ class PreviewServiceServicer:
         """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
         streams the transition. Applying the same revision again changes nothing. A new revision while the
         preview is faulted makes the next attempt at once.
-        INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
-        that SRT does not accept.
+        INVALID_ARGUMENT: enabled with a profile or a camera that the service does not know, or a passphrase of
+        a length that SRT does not accept.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -43,8 +43,8 @@ class PreviewServiceStub:
     """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
     streams the transition. Applying the same revision again changes nothing. A new revision while the
     preview is faulted makes the next attempt at once.
-    INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
-    that SRT does not accept.
+    INVALID_ARGUMENT: enabled with a profile or a camera that the service does not know, or a passphrase of
+    a length that SRT does not accept.
     """
     WatchActualState: _grpc.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]
     """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
@@ -79,8 +79,8 @@ class PreviewServiceAsyncStub(PreviewServiceStub):
     """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
     streams the transition. Applying the same revision again changes nothing. A new revision while the
     preview is faulted makes the next attempt at once.
-    INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
-    that SRT does not accept.
+    INVALID_ARGUMENT: enabled with a profile or a camera that the service does not know, or a passphrase of
+    a length that SRT does not accept.
     """
     WatchActualState: _aio.UnaryStreamMultiCallable[_preview_service_pb2.WatchActualStateRequest, _preview_service_pb2.WatchActualStateResponse]  # type: ignore[assignment]
     """The actual state now, then on every change, and at least every 500 ms while a pipeline exists
@@ -118,8 +118,8 @@ class PreviewServiceServicer(metaclass=_abc_1.ABCMeta):
         """Applies a desired state. Returns at once with the actual state at that moment; WatchActualState
         streams the transition. Applying the same revision again changes nothing. A new revision while the
         preview is faulted makes the next attempt at once.
-        INVALID_ARGUMENT: enabled with a profile that the service does not know, or a passphrase of a length
-        that SRT does not accept.
+        INVALID_ARGUMENT: enabled with a profile or a camera that the service does not know, or a passphrase of
+        a length that SRT does not accept.
         """
 
     @_abc_1.abstractmethod

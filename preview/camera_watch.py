@@ -1,0 +1,47 @@
+"""Finds out which cameras are there, without opening any: device nodes, cards and files.
+
+So an operator sees that a camera has been unplugged before asking for it, and one that is plugged in again is
+used at once. It looks only while a gateway watches, and not at cameras that are in use. Looking may block, at
+a file on a dead network share for example: it has a deadline in a thread of its own, and then a long pause.
+"""
+
+import asyncio
+from collections.abc import Iterable
+from functools import partial
+from typing import Final, NoReturn
+
+from common.errors import UserError
+from preview.config import PreviewSettings
+from preview.pipeline import sources
+from preview.pipeline.threads import in_thread
+from preview.supervisor import Supervisor
+
+LOOK_EVERY_S: Final = 2.0
+LOOK_DEADLINE_S: Final = 1.0
+PAUSE_AFTER_HANG_S: Final = 60.0
+
+
+async def watch_cameras(supervisor: Supervisor, settings: PreviewSettings) -> NoReturn:
+    """Reports to the supervisor which cameras are there, until it is cancelled."""
+    while True:
+        pause_s = LOOK_EVERY_S
+        if supervisor.is_watched:
+            look = partial(problems, settings, supervisor.unused_cameras)
+            try:
+                supervisor.cameras_found(await in_thread(look, LOOK_DEADLINE_S))
+            except TimeoutError:
+                pause_s = PAUSE_AFTER_HANG_S
+        await asyncio.sleep(pause_s)
+
+
+def problems(settings: PreviewSettings, cameras: Iterable[str]) -> dict[str, str]:
+    """Returns why cameras can't be used, by name; empty for those that can be, as far as is known."""
+    found = {}
+    for camera in cameras:
+        try:
+            sources.plan_camera(settings, camera)
+        except UserError as error:
+            found[camera] = str(error)
+        else:
+            found[camera] = ""
+    return found

@@ -1,0 +1,295 @@
+"""Several cameras over one SRT connection: switched, missing, failing, hanging."""
+
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Self
+
+import grpc
+import pytest
+
+from console.receiver.address import StreamAddress
+from console.receiver.frame import Frame
+from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.film import clip
+from tests.support.receiver import NoFrameError, Receiver
+from tests.support.running_preview import RunningPreview
+from tests.support.stalling_camera import StallingCamera
+from tests.support.waiting import wait_until
+
+pytestmark = pytest.mark.gst
+
+GAP_S = 0.4
+"""The promise: the longest time without a frame while the camera is switched."""
+RED, GREEN, BLUE = ({"kind": "test", "pattern": pattern} for pattern in ("red", "green", "blue"))
+# Chroma of a plain colour, Cb and Cr (ITU-R BT.601).
+CHROMA = {"red": (90, 240), "green": (54, 34), "blue": (240, 110)}
+
+
+def cameras(**sources: Mapping[str, Any]) -> dict[str, Any]:
+    return {"cameras": {name: dict(source) for name, source in sources.items()}}
+
+
+def gst(description: str, **more: str) -> dict[str, str]:
+    return {"kind": "gst", "description": description, **more}
+
+
+def colour(frame: Frame) -> str:
+    """The plain colour of a frame; "mixed" for anything else."""
+    pixels = frame.read()
+    luma, size = frame.stride * frame.height, frame.stride // 2 * (frame.height // 2)
+    middle = frame.stride // 2 * (frame.height // 4) + frame.width // 4
+    cb, cr = pixels[luma + middle], pixels[luma + size + middle]
+    near = [name for name, (b, r) in CHROMA.items() if abs(b - cb) < 25 and abs(r - cr) < 25]
+    return near[0] if near else "mixed"
+
+
+class Eye:
+    """A viewer with one connection: notes when frames came and of which colour they are."""
+
+    def __init__(self, port: int) -> None:
+        self.seen: list[tuple[float, str, float]] = []
+        """Arrival, colour, and PTS in seconds."""
+        self.corrupt = 0
+        self.error = ""
+        self._over = threading.Event()
+        self._receiver = Receiver(StreamAddress("127.0.0.1", port, latency_ms=20), queue_size=30)
+        self._thread = threading.Thread(target=self._watch, name="eye")
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._over.set()
+        self._thread.join(10)
+        self._receiver.__exit__()
+
+    def sees(self, name: str, within_s: float = 20) -> float:
+        """Waits for frames of a colour from now on; returns when the first one came."""
+        begin = len(self.seen)
+        wait_until(lambda: name in [each for _, each, _ in self.seen[begin:]], f"{name} is seen", within_s)
+        return next(at for at, each, _ in self.seen[begin:] if each == name)
+
+    def more_frames(self, count: int) -> None:
+        expected = len(self.seen) + count
+        wait_until(lambda: len(self.seen) >= expected, f"{count} more frames", 20)
+
+    def longest_gap_s(self, since: int = 0) -> float:
+        times = [at for at, _, _ in self.seen[since:]]
+        return max(later - sooner for sooner, later in pairwise(times))
+
+    def _watch(self) -> None:
+        with self._receiver:
+            while not self._over.is_set():
+                try:
+                    frame = self._receiver.next_frame(timeout_s=0.2)
+                except NoFrameError:
+                    continue
+                self.corrupt += frame.corrupt
+                self.seen.append((frame.arrival_s, colour(frame), (frame.pts_ns or 0) / 1e9))
+
+
+@contextmanager
+def watched(tmp_path: Path, settings: dict[str, Any]) -> Iterator[tuple[RunningPreview, Eye]]:
+    """A service that is running, and a viewer."""
+    with RunningPreview(tmp_path, settings) as preview:
+        preview.enable()
+        preview.running()
+        with Eye(preview.port) as eye:
+            eye.more_frames(10)
+            yield preview, eye
+
+
+def choose(preview: RunningPreview, camera: str, **more: Any) -> pb.ActualState:
+    preview.revision += 1
+    return preview.apply(
+        pb.DesiredState(
+            revision=preview.revision, enabled=True, profile=pb.PROFILE_BALANCED, camera=camera, **more
+        )
+    )
+
+
+def states(actual: pb.ActualState) -> dict[str, str]:
+    return {
+        each.name: pb.CameraState.Name(each.state).removeprefix("CAMERA_STATE_") for each in actual.cameras
+    }
+
+
+def is_live(preview: RunningPreview, camera: str) -> pb.ActualState:
+    return preview.wait_for(lambda it: states(it)[camera] == "LIVE", f"{camera} is live")
+
+
+@pytest.mark.timed
+def test_the_picture_changes_over_one_connection_without_a_gap(tmp_path: Path) -> None:
+    """Sources of every kind, of other sizes, rates and forms, live and played."""
+    film = clip(1.0, tmp_path / "film.mkv")
+    everything = cameras(
+        red=RED,
+        blue=gst(
+            "videotestsrc is-live=true pattern=blue"
+            " ! video/x-raw,format=RGB,width=400,height=300,framerate=20/1"
+        ),
+        film={"kind": "file", "path": str(film)},
+        green=gst("videotestsrc pattern=green ! video/x-raw,framerate=25/1 ! identity sync=true"),
+    )
+    with watched(tmp_path, everything) as (preview, eye):
+        assert states(is_live(preview, "red")) == {
+            "red": "LIVE",
+            "blue": "READY",
+            "film": "READY",
+            "green": "READY",
+        }
+        begin = len(eye.seen)
+        for camera in ("blue", "film", "green", "red", "film", "blue", "red"):
+            choose(preview, camera)
+            actual = is_live(preview, camera)
+            assert actual.wanted_camera == camera
+            eye.sees("mixed" if camera == "film" else camera)
+            eye.more_frames(15)
+        gap_s = eye.longest_gap_s(begin)
+        print(f"longest gap {gap_s * 1000:.0f} ms")
+        assert gap_s < GAP_S
+        assert eye.corrupt == 0
+        pts = [at for _, _, at in eye.seen]
+        assert all(later > sooner for sooner, later in pairwise(pts))
+        assert actual.counters == pb.Counters(starts=1)
+        assert actual.last_error == ""
+
+
+def test_a_camera_that_was_left_is_closed(tmp_path: Path) -> None:
+    """One that stays open would take power, bandwidth and the device."""
+    with watched(tmp_path, cameras(red=RED, blue=BLUE)) as (preview, eye):
+        choose(preview, "blue")
+        eye.sees("blue")
+        choose(preview, "red")
+        eye.sees("red")
+        threads, descriptors = preview.threads(), preview.descriptors()
+        for _ in range(10):
+            choose(preview, "blue")
+            is_live(preview, "blue")
+            choose(preview, "red")
+            is_live(preview, "red")
+        wait_until(lambda: preview.threads() <= threads, "no more threads than before")
+        wait_until(lambda: preview.descriptors() <= descriptors, "no more descriptors than before")
+        assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path) -> None:
+    settings = cameras(
+        red=RED,
+        none=gst("filesrc location=/nowhere ! decodebin"),
+        ends=gst("videotestsrc is-live=true num-buffers=0"),
+        silent=gst("appsrc is-live=true ! video/x-raw,format=I420,width=320,height=240,framerate=30/1"),
+        sound=gst("audiotestsrc is-live=true"),
+        missing={"kind": "v4l2", "device": "/dev/not-there"},
+    )
+    settings["timeouts"] = {"start_s": 1.0}
+    words = {
+        "none": 'failed: Resource not found (No such file "/nowhere")',
+        "ends": "has ended",
+        "silent": "has sent no frame for 1.0 s",
+        "sound": "does not deliver raw video",
+        "missing": "/dev/not-there can't be used: No such file or directory",
+    }
+    with watched(tmp_path, settings) as (preview, eye):
+        preview.wait_for(lambda it: states(it)["missing"] == "FAILED", "it is seen to be missing")
+        begin = len(eye.seen)
+        for camera, text in words.items():
+            choose(preview, camera)
+            actual = preview.wait_for(
+                lambda it, camera=camera: states(it)[camera] == "FAILED" and it.wanted_camera == camera,  # type: ignore[misc]
+                camera,
+            )
+            error = next(each.error for each in actual.cameras if each.name == camera)
+            assert text in error
+            assert camera in error
+            assert states(actual)["red"] == "LIVE"
+            assert actual.state == pb.LIFECYCLE_STATE_RUNNING
+        choose(preview, "red")
+        eye.more_frames(30)
+        assert {each for _, each, _ in eye.seen[begin:]} == {"red"}
+        assert eye.longest_gap_s(begin) < GAP_S
+        assert preview.running().counters == pb.Counters(starts=1)
+
+
+@pytest.mark.parametrize("how", ["ends", "stalls", "fails"])
+def test_the_fallback_takes_over_in_the_same_connection(tmp_path: Path, how: str) -> None:
+    with StallingCamera() as camera:
+        front = {
+            "ends": gst("videotestsrc is-live=true pattern=red num-buffers=90", fallback="rear"),
+            "stalls": gst(camera.description, fallback="rear"),
+            "fails": gst("videotestsrc is-live=true pattern=red ! identity error-after=90", fallback="rear"),
+        }[how]
+        with watched(tmp_path, cameras(front=front, rear=BLUE)) as (preview, eye):
+            camera.stall()
+            eye.sees("blue")
+            actual = preview.wait_for(lambda it: states(it)["front"] == "FAILED", "front has failed")
+            assert actual.wanted_camera == "front"
+            assert "front" in actual.cameras[0].error
+            # Silence is noticed after timeouts.source_silence_s, 1.5 s; the others at once.
+            gap_s = eye.longest_gap_s()
+            print(f"{how}: {gap_s * 1000:.0f} ms without a frame")
+            assert gap_s < (2.5 if how == "stalls" else GAP_S)
+            if how == "stalls":
+                camera.go_on()
+                is_live(preview, "front")
+                eye.sees("mixed")
+            assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_an_unknown_camera_is_refused_with_the_names(tmp_path: Path) -> None:
+    with watched(tmp_path, cameras(red=RED, blue=BLUE)) as (preview, eye):
+        with pytest.raises(grpc.RpcError) as refusal:
+            choose(preview, "bleu")
+        assert refusal.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+        assert "no camera is called 'bleu'; there are: red, blue" in str(refusal.value.details())
+        eye.more_frames(5)
+
+
+@pytest.mark.parametrize("settings", [{}, cameras(camera={"kind": "test"})])
+def test_a_single_camera_has_a_name_as_well(tmp_path: Path, settings: dict[str, Any]) -> None:
+    with RunningPreview(tmp_path, settings) as preview:
+        preview.enable()
+        actual = preview.running()
+        assert (actual.wanted_camera, states(actual)) == ("camera", {"camera": "LIVE"})
+        choose(preview, "camera")
+        assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_a_profile_and_a_camera_may_change_together(tmp_path: Path) -> None:
+    with watched(tmp_path, cameras(red=RED, blue=BLUE)) as (preview, eye):
+        begin = len(eye.seen)
+        for number in range(6):
+            preview.revision += 1
+            preview.apply(
+                pb.DesiredState(
+                    revision=preview.revision,
+                    enabled=True,
+                    profile=(pb.PROFILE_LOW_BW, pb.PROFILE_HIGH_QUALITY)[number % 2],
+                    camera=("blue", "red")[number % 2],
+                )
+            )
+            eye.sees(("blue", "red")[number % 2])
+            eye.more_frames(10)
+        assert eye.longest_gap_s(begin) < GAP_S
+        # The camera that is live now has the profile's rate, 60 frames per second.
+        preview.wait_for(lambda it: it.measurement.fps > 45, "the rate of high-quality")
+        assert preview.running().counters == pb.Counters(starts=1)
+
+
+def test_many_choices_at_once_end_with_the_last_one(tmp_path: Path) -> None:
+    with watched(tmp_path, cameras(red=RED, blue=BLUE, green=GREEN)) as (preview, eye):
+        until = time.monotonic() + 3
+        while time.monotonic() < until:
+            for camera in ("blue", "green", "red"):
+                choose(preview, camera)
+        choose(preview, "green")
+        is_live(preview, "green")
+        eye.sees("green")
+        eye.more_frames(30)
+        assert {each for _, each, _ in eye.seen[-20:]} == {"green"}
+        assert preview.running().counters == pb.Counters(starts=1)
