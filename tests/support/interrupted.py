@@ -1,4 +1,4 @@
-"""Runs a command until it has written something, then interrupts it as Ctrl-C does: `interrupted.py COMMAND...`.
+"""Runs a command until it has written something, then interrupts it like Ctrl-C: `interrupted.py COMMAND...`.
 
 What it writes is its standard output or, if it has the option --record FILE, that file. Its exit code is this
 program's.
