@@ -17,6 +17,7 @@ passes on, nor the content, whose SHA-256 is in the recording's receipt.
 import asyncio
 import socket
 import ssl
+import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from http import HTTPStatus
@@ -31,6 +32,7 @@ from console.client.results import ExportHeader, RecordingFile
 from omniseer.gateway.v1.recording_pb2 import ExportRecordingRequest
 
 _CHUNK: Final = 256 * 1024
+_CONNECTED_WITHIN_S: Final = 10.0
 _LONGEST_URL: Final = 8192
 _LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 _BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
@@ -81,18 +83,17 @@ class StoreStream:
 
     def __init__(self, file: RecordingFile, offset: int, urls: Urls, tls: ssl.SSLContext) -> None:
         self._file, self._offset, self._urls, self._tls = file, offset, urls, tls
-        self._connection: HTTPConnection | None = None
+        self._connection: _Connection | None = None
         self._response: HTTPResponse | None = None
 
     async def read(self, within_s: float | None = None) -> Any:
         """Returns the header, and then chunk after chunk; raises a `GatewayError`."""
-        if self._response is None:
-            url = usable(await self._urls.url(self._file.name))
-            self._connection = _connection(url, self._tls, within_s or SILENT_S)
-            self._response = await _in_thread(_opened, self._connection, url, self._offset)
+        if self._connection is None or self._response is None:
+            self._connection = _Connection(usable(await self._urls.url(self._file.name)), self._tls)
+            self._response = await self._connection.get(self._offset, within_s or SILENT_S)
             self.check(self._response)
             return ExportHeader(size=self._file.size, sha256=self._file.sha256)
-        data = await _in_thread(self._response.read1, _CHUNK)
+        data: bytes = await self._connection.call(self._response.read1, _CHUNK)
         if not data:
             raise Unreachable(f"the store ended {self._file.name} too early", _WAIT)
         chunk = chunk_of(data, self._offset)
@@ -100,14 +101,9 @@ class StoreStream:
         return chunk
 
     def cancel(self) -> None:
-        """Closes the connection, also under a thread that reads."""
-        connection, self._connection = self._connection, None
-        if connection is None:
-            return
-        if connection.sock is not None:
-            with suppress(OSError):
-                connection.sock.shutdown(socket.SHUT_RDWR)
-        connection.close()
+        """Closes the connection, also while a thread reads."""
+        if self._connection:
+            self._connection.end()
 
     def check(self, response: HTTPResponse) -> None:
         """Checks the head of an answer.
@@ -154,15 +150,81 @@ async def read_whole(url: SplitResult, tls: ssl.SSLContext, most: int) -> bytes:
     Raises:
         GatewayError: It can't be read, or has more bytes than `most`.
     """
-    connection = _connection(url, tls, SILENT_S)
+    connection = _Connection(url, tls)
     try:
-        response: HTTPResponse = await _in_thread(_opened, connection, url, 0)
-        content: bytes = await _in_thread(response.read, most + 1)
+        response = await connection.get(0, SILENT_S)
+        content: bytes = await connection.call(response.read, most + 1)
     finally:
-        connection.close()
+        connection.end()
     if response.status != HTTPStatus.OK or len(content) > most:
         raise Refused(f"the store does not have the recording's list of files (status {response.status})")
     return content
+
+
+class _Connection:
+    """One connection. Threads use it, one at a time; the loop may end it at any moment.
+
+    Args:
+        url: Of the object.
+        tls: For the store's certificate.
+    """
+
+    def __init__(self, url: SplitResult, tls: ssl.SSLContext) -> None:
+        self._url = url
+        host, limit_s = url.hostname or "", _CONNECTED_WITHIN_S
+        self._http = (
+            HTTPSConnection(host, url.port, timeout=limit_s, context=tls)
+            if url.scheme == "https"
+            else HTTPConnection(host, url.port, timeout=limit_s)
+        )
+        self._socket: socket.socket | None = None
+        self._in_use = threading.Lock()
+        self._ended = False
+
+    async def get(self, offset: int, silent_s: float) -> HTTPResponse:
+        """Returns the answer to a GET from an offset on; raises a `GatewayError`."""
+        response: HTTPResponse = await self.call(self._get, offset, silent_s)
+        return response
+
+    async def call(self, blocking: Callable[..., Any], *arguments: Any) -> Any:
+        """Returns what a blocking call returns, from a thread; raises a `GatewayError`."""
+        return await _in_thread(self._used, blocking, *arguments)
+
+    def end(self) -> None:
+        """Ends it, and what a thread waits for."""
+        self._ended = True
+        if self._socket:
+            with suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
+        self._close_if_ended()
+
+    def _get(self, offset: int, silent_s: float) -> HTTPResponse:
+        self._http.connect()
+        # The library forgets it where the store closes the connection after its answer.
+        self._socket = self._http.sock
+        self._socket.settimeout(silent_s)
+        # The Host header is part of the signature: http.client sends the one of the URL.
+        path = f"{self._url.path}?{self._url.query}" if self._url.query else self._url.path
+        self._http.request("GET", path or "/", headers={"Range": f"bytes={offset}-"} if offset else {})
+        return self._http.getresponse()
+
+    def _used(self, blocking: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            with self._in_use:
+                return blocking(*arguments)
+        finally:
+            self._close_if_ended()
+
+    def _close_if_ended(self) -> None:
+        """Closes it, unless a thread uses it: then that does so.
+
+        A response that is closed under its reader would be waited for.
+        """
+        if self._ended and self._in_use.acquire(blocking=False):
+            try:
+                self._http.close()
+            finally:
+                self._in_use.release()
 
 
 async def _in_thread(call: Callable[..., Any], *arguments: Any) -> Any:
@@ -177,18 +239,3 @@ async def _in_thread(call: Callable[..., Any], *arguments: Any) -> Any:
     except (OSError, HTTPException, ValueError) as error:
         text = str(error) or type(error).__name__
         raise Unreachable(f"the store does not answer: {text}", _WAIT) from error
-
-
-def _connection(url: SplitResult, tls: ssl.SSLContext, timeout_s: float) -> HTTPConnection:
-    host = url.hostname or ""
-    if url.scheme == "https":
-        return HTTPSConnection(host, url.port, timeout=timeout_s, context=tls)
-    return HTTPConnection(host, url.port, timeout=timeout_s)
-
-
-def _opened(connection: HTTPConnection, url: SplitResult, offset: int) -> HTTPResponse:
-    """Returns the answer to a GET from an offset on. Redirects are answers, too."""
-    # The Host header is part of the signature: http.client sends the one of the URL.
-    path = f"{url.path}?{url.query}" if url.query else url.path
-    connection.request("GET", path or "/", headers={"Range": f"bytes={offset}-"} if offset else {})
-    return connection.getresponse()
