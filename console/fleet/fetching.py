@@ -17,13 +17,15 @@ from console.fleet.wire import recording_of
 from console.printable import printable
 from fleet import names
 from fleet.connection import Hub
-from fleet.errors import HubError
+from fleet.errors import HubError, HubReason
 from fleet.reading import LARGEST_ENTRY, NotReadableError, receiver_answer, store_entry
 from fleet.receipt_keys import digest_of
 from omniseer.fleet.v1 import upload_pb2 as pb
 from omniseer.gateway.v1.recording_pb2 import RecordingFile as RecordingFileMessage
 
 _RECEIVERS: Final = "Receivers answer that, robot-bridge hub receiver: one has to run (docs/uploads.md)"
+_ANSWER_S: Final = 20.0
+"""A receiver asks the store before it answers."""
 _LIST: Final = "Type: robotctl fleet recordings"
 
 
@@ -45,6 +47,7 @@ class ReceiverUrls:
 
         Raises:
             GatewayError: No receiver answers, or it refuses.
+            HubError: The hub does not permit the request.
         """
         if name not in self._known:
             # A URL is good for some minutes, and a file may take longer: one at a time.
@@ -59,8 +62,11 @@ class ReceiverUrls:
         request = pb.GetFilesRequest(recording_id=self._recording_id, file_names=[name] if name else [])
         subject = names.reading_subject(self._robot, "get_files")
         try:
-            response = receiver_answer(await self._hub.request(subject, request.SerializeToString()))
+            answer = await self._hub.request(subject, request.SerializeToString(), _ANSWER_S)
+            response = receiver_answer(answer)
         except HubError as error:
+            if error.reason is HubReason.REFUSED:
+                raise  # The login does not permit it, and will not.
             raise Unreachable(f"no receiver says where the recording is: {error}", _RECEIVERS) from error
         except NotReadableError as error:
             raise GatewayFailed(f"a receiver's answer is unreadable: {error}") from error

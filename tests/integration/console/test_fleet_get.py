@@ -259,3 +259,19 @@ async def test_without_a_receiver_it_ends_at_once_and_says_what_has_to_run(
     assert asyncio.get_running_loop().time() - begin_s < 20
     none = await laptop.get(recording="none")
     assert (none.returncode, "the store has no recording none" in none.stderr) == (2, True)
+
+
+async def test_a_login_from_before_this_command_needs_a_new_one(
+    ground: Ground,  # noqa: F811
+    secure: SecureHub,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with monkeypatch.context() as earlier:
+        earlier.setattr(names, "READING_SUBJECTS", "fleet.*.other.*")
+        laptop = Laptop(secure, tmp_path)
+    async with stored(ground):
+        refused = await laptop.get()
+    assert refused.returncode == 1
+    assert "do not permit" in refused.stderr
+    assert "Ask the hub's administrator for a new login" in refused.stderr
