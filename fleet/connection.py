@@ -113,12 +113,12 @@ class Entry:
 
 
 class Request:
-    """A robot's request, whose answers go to that robot.
+    """A request of a robot, or of a person about one; the answers go to its sender.
 
     Attributes:
         robot: by the subject, which the hub enforces.
         name: last part of the subject: "begin_file".
-        payload: as sent by the robot.
+        payload: as sent.
     """
 
     def __init__(self, robot: str, name: str, payload: bytes, session: Session, reply: str) -> None:
@@ -147,6 +147,7 @@ class _Service:
     handler: Handler
     at_once: int
     busy: bytes
+    of_people: bool
 
 
 class Hub:
@@ -311,12 +312,20 @@ class Hub:
                 yield message.payload
 
     async def serve(
-        self, subject: str, queue: str, handler: Handler, *, at_once: int = 8, busy: bytes = b""
+        self,
+        subject: str,
+        queue: str,
+        handler: Handler,
+        *,
+        at_once: int = 8,
+        busy: bytes = b"",
+        of_people: bool = False,
     ) -> None:
-        """Answers requests of robots, on subjects "fleet.<robot>.<kind>.<name>", over all lost connections.
+        """Answers requests, on subjects "fleet.<robot>.<kind>.<name>", over all lost connections.
 
-        A request whose answer would not go to the inbox of the robot in its subject is dropped: a hostile
-        robot could name another one's.
+        A robot's request whose answer would not go to the inbox of the robot in its subject is dropped: a
+        hostile robot could name another one's. So is a person's whose answer would go to no inbox: it would
+        be published with the rights of this program.
 
         Args:
             subject: which requests.
@@ -324,8 +333,9 @@ class Hub:
             handler: answers one; it handles its own errors.
             at_once: requests in hand at any moment.
             busy: answer to requests beyond that.
+            of_people: whether they are those of people, who share an account with this program.
         """
-        service = _Service(subject, queue, handler, at_once, busy)
+        service = _Service(subject, queue, handler, at_once, busy, of_people)
         self._services.append(service)
         if self._session is not None:
             await self._serve_in(self._session, service)
@@ -441,7 +451,7 @@ class Hub:
 
         async def on_message(message: Message) -> None:
             parts = message.subject.split(".")
-            if len(parts) < 3 or not message.reply.startswith((f"{names.inbox_prefix(parts[1])}.", _ROUTED)):
+            if len(parts) < 3 or not message.reply.startswith(_inboxes(service, parts[1])):
                 return
             request = Request(parts[1], parts[-1], message.payload, session, message.reply)
             if len(running) >= service.at_once:
@@ -465,6 +475,13 @@ async def connect(address: FleetAddress) -> AsyncGenerator[Hub, None]:
     finally:
         await cancel([supervisor])
         await hub.close()
+
+
+def _inboxes(service: _Service, robot: str) -> tuple[str, ...]:
+    """Returns where the answer to a request may go."""
+    if service.of_people:
+        return (f"{names.INBOXES}.",)
+    return (f"{names.inbox_prefix(robot)}.", _ROUTED)
 
 
 def acknowledged(message: Message) -> None:

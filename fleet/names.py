@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+INBOXES: Final = "_INBOX"
+"""Prefix of the inboxes of people and programs of the hub, which share it."""
 ROBOT_NAME: Final = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
 """A robot's name, and a fleet's: a DNS label (RFC 1123 2.1), and so one token of a subject and a key."""
 
@@ -25,6 +27,8 @@ EVENT_SUBJECTS: Final = "fleet.*.ev.>"
 COMMAND_SUBJECTS: Final = "fleet.*.cmd.*"
 RESULT_SUBJECTS: Final = "fleet.*.res.*"
 UPLOAD_SUBJECTS: Final = "fleet.*.up.*"
+READING_SUBJECTS: Final = "fleet.*.get.*"
+"""People's requests for what receivers have of a robot. Robots may not use them."""
 
 
 def event_subject(robot: str, run_id: str, first_sequence: int) -> str:
@@ -50,6 +54,11 @@ def time_subject(robot: str) -> str:
 def upload_subject(robot: str, request: str) -> str:
     """Returns the subject of a request about an upload: "begin_file", for example."""
     return f"fleet.{robot}.up.{request}"
+
+
+def reading_subject(robot: str, request: str) -> str:
+    """Returns the subject of a person's request for what receivers have of a robot: "get_files"."""
+    return f"fleet.{robot}.get.{request}"
 
 
 def inbox_prefix(robot: str) -> str:

@@ -8,12 +8,15 @@ from fleet.names import ROBOT_NAME
 from omniseer.fleet.v1.command_pb2 import CommandResult
 from omniseer.fleet.v1.event_pb2 import EventBatch, EventItem
 from omniseer.fleet.v1.state_pb2 import RobotState
-from omniseer.fleet.v1.upload_pb2 import StoredRecording
+from omniseer.fleet.v1.upload_pb2 import StoredRecording, UploadResponse
 
 LARGEST_STATE: Final = 64 * 1024
 """Bytes of a state; one with everything in it has about 4 KiB."""
 LARGEST_MESSAGE: Final = 1024 * 1024
 """Bytes of any other message: `max_payload` of the hub's servers."""
+
+LARGEST_ENTRY: Final = 4 * 1024 * 1024
+"""Bytes of a recording's own entry in the store; a receiver makes none that is larger."""
 
 MessageT = TypeVar("MessageT", bound=Message)
 
@@ -45,6 +48,24 @@ def stored_recording(key: str, payload: bytes) -> StoredRecording:
     if not ROBOT_NAME.fullmatch(robot) or stored.recording.id != recording_id:
         raise NotReadableError("the entry is of another recording")
     return stored
+
+
+def store_entry(payload: bytes) -> StoredRecording:
+    """Returns the entry of a recording in the store, with all of its files.
+
+    Raises:
+        NotReadableError: It is none.
+    """
+    return _parsed(StoredRecording, payload, LARGEST_ENTRY)
+
+
+def receiver_answer(payload: bytes) -> UploadResponse:
+    """Returns a receiver's answer to a request.
+
+    Raises:
+        NotReadableError: It is none.
+    """
+    return _parsed(UploadResponse, payload, LARGEST_MESSAGE)
 
 
 def event_batch(subject: str, payload: bytes) -> EventBatch:

@@ -190,6 +190,25 @@ def operator_login(
     )
 
 
+def operator_files(directory: HubDirectory, name: str, out: Path, *, days: float | None, again: bool) -> None:
+    """Issues credentials for a program that reads as people do: operator.creds, ca.pem, fleet.yaml.
+
+    Raises:
+        UserError: there is one of this name, or the files can't be written.
+    """
+    with directory.locked():
+        allowed = permissions.operator(commands=False)
+        record, creds = _issue(directory, "operator", name, allowed, days, again=again)
+        write_all_private(
+            {
+                out / "operator.creds": creds.text().encode(),
+                out / "ca.pem": directory.secret("keys/ca.pem"),
+                out / "fleet.yaml": _fragment(record),
+            }
+        )
+        directory.write(record)
+
+
 def receiver_files(directory: HubDirectory, name: str, out: Path, *, days: float | None, again: bool) -> None:
     """Issues credentials for receivers: receiver.creds, ca.pem, receipts.key, fleet.yaml.
 

@@ -146,12 +146,26 @@ def robots(
 def operator(
     name: Annotated[str, typer.Argument(help="Of the person.")],
     directory: Dir = _DEFAULT_DIR,
+    *,
     commands: Annotated[bool, typer.Option("--commands", help="May send robots commands, too.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="For a program instead, the exporter: where its files go.")
+    ] = None,
     days: Days = None,
     again: Again = False,
 ) -> None:
-    """Print a login for a person: robotctl fleet login FILE."""
+    """Print a login for a person: robotctl fleet login FILE. With --out, write the files of a program."""
     hub = HubDirectory(directory)
+    if out:
+        if commands:
+            raise UserError(
+                "programs that read the hub send no commands",
+                "Leave out --commands, or --out for a person",
+                exit_code=ExitCode.USAGE,
+            )
+        administration.operator_files(hub, name, out, days=days, again=again)
+        typer.echo(f"{out}: credentials of a program that reads the hub.")
+        return
     typer.echo(administration.operator_login(hub, name, commands=commands, days=days, again=again), nl=False)
 
 

@@ -57,24 +57,31 @@ def robot(name: str) -> Permissions:
 
 
 def operator(*, commands: bool) -> Permissions:
-    """Returns the permissions of people: they read what robots have reported.
+    """Returns the permissions of people: they read what robots have reported, and their recordings.
 
     Args:
         commands: whether they may send robots commands, too.
     """
     return Permissions(
-        publish=(*_reads(*_READ), *((names.COMMAND_SUBJECTS,) if commands else ())),
+        publish=(
+            *_reads(*_READ),
+            names.READING_SUBJECTS,
+            *((names.COMMAND_SUBJECTS,) if commands else ()),
+        ),
         subscribe=("_INBOX.>",),
         payload=_MAX_MESSAGE,
     )
 
 
 def receiver() -> Permissions:
-    """Returns the permissions of the receivers: they answer robots, and list what they have verified."""
+    """Returns the permissions of the receivers: they answer requests, and list what they have verified."""
     stream = f"KV_{names.RECORDINGS}"
     return Permissions(
         publish=(f"$KV.{names.RECORDINGS}.>", *_reads(stream)),
-        subscribe=("_INBOX.>", f"{names.UPLOAD_SUBJECTS} {names.RECEIVERS}"),
+        subscribe=(
+            "_INBOX.>",
+            *(f"{each} {names.RECEIVERS}" for each in (names.UPLOAD_SUBJECTS, names.READING_SUBJECTS)),
+        ),
         respond_s=_ANSWER_S,
         payload=_MAX_MESSAGE,
     )

@@ -7,6 +7,7 @@ import socket
 import sys
 from contextlib import suppress
 from difflib import get_close_matches
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
@@ -18,11 +19,16 @@ from console.cli.fleet_tables import answer_line, fleet_view, recordings_table
 from console.cli.fleet_watch import fleet_json, watch
 from console.cli.login import STANDARD_INPUT, login_text
 from console.cli.options import JsonOption, json_requested
+from console.cli.record import exported_json
 from console.cli.session import Session, print_json, standard_output
+from console.cli.transfer_bar import TransferBar
+from console.client.export_path import path_below
+from console.client.exporting import Export, ExportedRecording, ExportOptions
 from console.fleet.login import fleet_login_path, keep_fleet_login
 from console.fleet.values import CommandAnswer, CommandOutcome, FleetRow, StoredRecording, Unreadable
 from console.presentation.formatting import age
 from console.presentation.json_form import json_form
+from console.presentation.recording import exported
 from console.robots import Robot, read_robots_file
 from console.target import parse_target
 from fleet.standing import Standing
@@ -67,6 +73,41 @@ def recordings(
     session.show(
         recordings_json(found), recordings_table(found) if found else "No recording was uploaded yet."
     )
+
+
+@fleet_app.command("get")
+@with_fleet
+def get(
+    session: FleetSession,
+    *,
+    robot: RobotArgument,
+    recording_id: Annotated[
+        str, typer.Argument(metavar="ID", help="The recording, as `robotctl fleet recordings` names it.")
+    ],
+    to: Annotated[
+        Path, typer.Option("--to", metavar="DIR", help="Where its folder is made.", show_default="here")
+    ] = Path(),
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what an earlier copy has left.")
+    ] = False,
+    store_ca: Annotated[
+        Path | None,
+        typer.Option(
+            "--store-ca", metavar="FILE", help="Authority of the store.", show_default="those of the system"
+        ),
+    ] = None,
+) -> None:
+    """Copy a verified recording from the hub's store, into the folder DIR/ROBOT/ID, and verify it again.
+
+    The robot is not asked, and need not be on. The copy goes on by itself when the connection was cut.
+    """
+    try:
+        done = asyncio.run(_get(session, robot, recording_id, to, resume=resume, store_ca=store_ca))
+    except KeyboardInterrupt:
+        words = shlex.join(["fleet", "get", robot, recording_id, "--to", str(to), "--resume"])
+        print(f"What was received stays. To go on, type: robotctl {words}", file=sys.stderr)
+        raise
+    session.show({"ok": True, **exported_json(done)}, exported(done))
 
 
 @fleet_app.command("command")
@@ -189,6 +230,28 @@ async def _recordings(session: FleetSession) -> list[StoredRecording | Unreadabl
     login = session.login
     async with session.connect() as hub:
         return await read_recordings(hub, login.fleet, login.receivers)
+
+
+async def _get(
+    session: FleetSession, robot: str, recording_id: str, to: Path, *, resume: bool, store_ca: Path | None
+) -> ExportedRecording:
+    from console.fleet.fetching import ReceiverUrls, read_verified, tls_context  # noqa: PLC0415
+    from console.fleet.store import StoreTransport  # noqa: PLC0415
+
+    login, tls = session.login, tls_context(store_ca)
+    async with session.connect() as hub:
+        found = await read_verified(
+            hub, login.fleet, login.receivers, robot=robot, recording_id=recording_id, tls=tls
+        )
+        folder = path_below(to, f"{robot}/{found.id}")
+        urls = ReceiverUrls(hub, robot, recording_id)
+        # Where there is no receiver, that is said at once; one that is lost later is waited for.
+        await urls.url(found.files[0].name)
+        transport = StoreTransport({file.name: file for file in found.files}, urls, tls)
+        with TransferBar(session.out, shown=not session.as_json) as bar:
+            return await Export(
+                transport, found, folder, ExportOptions(resume=resume, progress=bar.show_export)
+            ).run()
 
 
 async def _command(session: FleetSession, robot: str, wanted: "Command", expires_s: int) -> CommandAnswer:

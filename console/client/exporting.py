@@ -229,7 +229,7 @@ class Export:
                 partial_path.unlink()
                 raise GatewayFailed(
                     f"{file.name} arrived twice with another SHA-256 than the robot has computed",
-                    "Check the robot's disk and memory; the file is not kept",
+                    "Check the disk and memory of where it comes from; the file is not kept",
                 )
             await asyncio.to_thread(partial.sync)
         partial_path.replace(path)
@@ -332,6 +332,11 @@ async def file_bytes(
             yield data
     finally:
         stream.cancel()
+
+
+def chunk_of(data: bytes, offset: int) -> ExportChunk:
+    """Returns bytes from elsewhere as a robot would send them."""
+    return ExportChunk(offset=offset, data=data, crc32c=google_crc32c.value(data))
 
 
 async def _to_the_end(write: Callable[[bytes], None], data: bytes) -> None:

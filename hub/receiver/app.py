@@ -14,7 +14,7 @@ from common.metrics_endpoint import serving_metrics
 from common.tasks import first_to_end
 from fleet.connection import FleetAddress, Handler, Hub, Request, connect
 from fleet.errors import HubError
-from fleet.names import RECEIVERS, UPLOAD_SUBJECTS
+from fleet.names import READING_SUBJECTS, RECEIVERS, UPLOAD_SUBJECTS
 from fleet.receipt_keys import read_public_keys, read_signer
 from hub.receiver.config import ReceiverSettings
 from hub.receiver.metrics import ReceiverMetrics
@@ -34,7 +34,7 @@ _NAMES: Final = frozenset(field.name for field in UploadResponse.DESCRIPTOR.fiel
 
 
 async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
-    """Answers robots until `stop`.
+    """Answers robots and people until `stop`.
 
     Raises:
         UserError: A key can't be read, or a socket can't be used.
@@ -57,9 +57,11 @@ async def serve(settings: ReceiverSettings, stop: asyncio.Event) -> None:
         page = nullcontext() if port is None else serving_metrics(metrics.text, settings.metrics.host, port)
         try:
             async with page:
-                await hub.serve(
-                    UPLOAD_SUBJECTS, RECEIVERS, _handler(service, metrics), at_once=AT_ONCE, busy=busy()
-                )
+                for subjects, of_people in ((UPLOAD_SUBJECTS, False), (READING_SUBJECTS, True)):
+                    handler = _handler(service, metrics, of_people=of_people)
+                    await hub.serve(
+                        subjects, RECEIVERS, handler, at_once=AT_ONCE, busy=busy(), of_people=of_people
+                    )
                 _log.info("receiving recordings of the fleet %s", settings.fleet)
                 await first_to_end(
                     stop.wait(),
@@ -83,7 +85,7 @@ async def _opened(settings: ReceiverSettings) -> AsyncIterator[tuple[Store, Thre
         store.close()
 
 
-def _handler(service: ReceiverService, metrics: ReceiverMetrics) -> Handler:
+def _handler(service: ReceiverService, metrics: ReceiverMetrics, *, of_people: bool) -> Handler:
     async def handle(request: Request) -> None:
         async def send(response: UploadResponse) -> None:
             await request.respond(response.SerializeToString())
@@ -91,9 +93,11 @@ def _handler(service: ReceiverService, metrics: ReceiverMetrics) -> Handler:
         name = request.name if request.name in _NAMES else "other"
         with metrics.in_hand.track_inprogress():
             try:
-                outcome = await service.answer(request.robot, request.name, request.payload, send)
+                outcome = await service.answer(
+                    request.robot, request.name, request.payload, send, of_people=of_people
+                )
             except HubError as error:
-                # Without an answer the robot asks again.
+                # Without an answer the request is repeated.
                 _log.warning("%s of %s got no answer: %s", name, request.robot, error)
                 outcome = "no answer"
         metrics.count(name, outcome)

@@ -1,4 +1,6 @@
-"""Answers the requests of robots about uploads. Remembers nothing: any receiver may answer the next request.
+"""Answers the requests of robots about uploads, and of people who read them.
+
+Remembers nothing: any receiver may answer the next request.
 
 | what happens | what follows |
 |---|---|
@@ -9,6 +11,7 @@
 | the store is full, refuses or does not answer | NO_ROOM or STORE, with the reason in words |
 | the receiver ends while it reads | the robot asks again after 10 s, and another receiver answers |
 | a name that could lead out of the recording's folder | INVALID |
+| a person requests what is not verified | NOT_VERIFIED |
 """
 
 import asyncio
@@ -113,17 +116,27 @@ class ReceiverService:
             "verify_file": (pb.VerifyFileRequest, self._verify_file),
             "complete_upload": (pb.CompleteUploadRequest, self._complete_upload),
         }
+        self._methods_of_people: Mapping[str, tuple[type[Any], Callable[..., Awaitable[Message]]]] = {
+            "get_files": (pb.GetFilesRequest, self._get_files),
+        }
 
     async def answer(
-        self, robot: str, name: str, payload: bytes, send: Callable[[pb.UploadResponse], Awaitable[None]]
+        self,
+        robot: str,
+        name: str,
+        payload: bytes,
+        send: Callable[[pb.UploadResponse], Awaitable[None]],
+        *,
+        of_people: bool = False,
     ) -> str:
         """Answers one request.
 
         Args:
             robot: Of the request's subject.
             name: Of the request.
-            payload: From the robot.
+            payload: As sent.
             send: Sends an answer; the last one ends the request.
+            of_people: Whether it is one of those that people may send, instead of robots.
 
         Returns:
             "ok", or the name of the code that it was refused with.
@@ -135,7 +148,7 @@ class ReceiverService:
             await send(response)
 
         try:
-            kind, method = self._method(name)
+            kind, method = _method(self._methods_of_people if of_people else self._methods, name)
             await send_part(await method(robot, kind.FromString(payload), send_part))
         except DecodeError:
             refusal = Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "the request can't be read")
@@ -153,12 +166,6 @@ class ReceiverService:
         _log.info("%s of %s is refused with %s: %s", name, robot, code, refusal)
         await send(pb.UploadResponse(error=pb.UploadError(code=refusal.code, message=str(refusal))))
         return code.lower()
-
-    def _method(self, name: str) -> tuple[type[Any], Callable[..., Awaitable[Message]]]:
-        found = self._methods.get(name)
-        if found is None:
-            raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "there is no such request")
-        return found
 
     async def _begin_upload(self, robot: str, request: pb.BeginUploadRequest, _send: _Send) -> Message:
         recording = request.recording
@@ -211,6 +218,20 @@ class ReceiverService:
             for number in numbers
         ]
         return pb.GetPartsResponse(urls=urls)
+
+    async def _get_files(self, robot: str, request: pb.GetFilesRequest, _send: _Send) -> Message:
+        keys, names = self._keys(robot, request.recording_id), request.file_names
+        if len(names) > _MOST_URLS:
+            raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, f"at most {_MOST_URLS} files at once")
+        # An object and what shows that it is verified. The receipt itself is checked where the file is read.
+        wanted = [(name, keys.file(name), keys.receipt(name)) for name in names]
+        urls = []
+        for name, key, proof in wanted or [("", keys.recording, keys.recording)]:
+            if not await self._call(self._store.find, proof):
+                raise _not_verified(name or request.recording_id)
+            url = await self._call(self._store.file_url, key)
+            urls.append(pb.FileUrl(file_name=name, url=url, expires_in_s=URL_VALID_S))
+        return pb.GetFilesResponse(urls=urls)
 
     async def _complete_file(self, robot: str, request: pb.CompleteFileRequest, _send: _Send) -> Message:
         keys = self._keys(robot, request.recording_id)
@@ -409,6 +430,15 @@ async def _every(period_s: float, task: "asyncio.Future[None]") -> AsyncIterator
     while not task.done():
         yield
         await asyncio.wait({task}, timeout=period_s)
+
+
+def _method(
+    methods: Mapping[str, tuple[type[Any], Callable[..., Awaitable[Message]]]], name: str
+) -> tuple[type[Any], Callable[..., Awaitable[Message]]]:
+    found = methods.get(name)
+    if found is None:
+        raise Refusal(pb.UPLOAD_ERROR_CODE_INVALID, "there is no such request")
+    return found
 
 
 def _checked_file(file: RecordingFile) -> RecordingFile:

@@ -184,6 +184,13 @@ class Store:
                 ExpiresIn=URL_VALID_S,
             )
 
+    def file_url(self, key: str) -> str:
+        """Returns a URL from which an object can be read, and this one alone, for URL_VALID_S."""
+        with _problems():
+            return self._signing.generate_presigned_url(
+                "get_object", Params={"Bucket": self._bucket, "Key": key}, ExpiresIn=URL_VALID_S
+            )
+
     def complete(self, key: str, upload_id: str, parts: Sequence[tuple[int, str]]) -> None:
         """Puts parts, each with its number and entity tag, together to an object."""
         with _problems():

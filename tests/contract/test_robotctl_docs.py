@@ -193,6 +193,7 @@ def fleet_command() -> dict[str, Any]:
         pytest.param("fleet list --json", fleet_list(), id="fleet list"),
         pytest.param("fleet events --json", fleet_events(), id="fleet events"),
         pytest.param("fleet recordings --json", fleet_recordings(), id="fleet recordings"),
+        pytest.param("fleet get --json", {"ok": True, **exported_json(EXPORTED)}, id="fleet get"),
         pytest.param("fleet command --json", fleet_command(), id="fleet command"),
         pytest.param("doctor --json", findings_json([good("tcp", "answers")]), id="doctor"),
     ],

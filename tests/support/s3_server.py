@@ -24,6 +24,7 @@ from tests.support.waiting import wait_until
 
 _UP_WITHIN_S: Final = 60.0
 _READ: Final = 64 * 1024
+_KEPT: Final = ("ETag", "Content-Range")
 
 
 @dataclass
@@ -97,6 +98,8 @@ class FaultyStore:
         answers: status and code of the next requests, in place of the store's; None passes one on.
         early: whether these come before the body is read.
         damage: the number of the part that is changed on its way, once.
+    cut_reading_at: closes the connection after so many bytes of an object that is read, once.
+    ranges: of the requests that read objects, in order; empty for the whole.
     """
 
     port: int
@@ -106,6 +109,8 @@ class FaultyStore:
     answers: deque[tuple[int, str] | None] = field(default_factory=deque)
     early: bool = False
     damage: int = 0
+    cut_reading_at: int | None = None
+    ranges: list[str] = field(default_factory=list)
 
     @property
     def url(self) -> str:
@@ -147,13 +152,26 @@ async def faulty_store(server: S3Server) -> AsyncIterator[FaultyStore]:
             if number and state.damage == number:
                 state.damage = 0
                 body[0] ^= 1
+            sent = {"Range": request.headers["Range"]} if "Range" in request.headers else {}
             async with session.request(
-                request.method, f"{server.url}{request.raw_path}", data=bytes(body)
+                request.method, f"{server.url}{request.raw_path}", data=bytes(body), headers=sent
             ) as passed:
-                if passed.status == 200:
+                if request.method == "GET":
+                    state.ranges.append(sent.get("Range", ""))
+                elif passed.status == 200:
                     state.passed.append(number)
-                etag = {"ETag": passed.headers["ETag"]} if "ETag" in passed.headers else {}
-                return web.Response(status=passed.status, body=await passed.read(), headers=etag)
+                kept = {name: passed.headers[name] for name in _KEPT if name in passed.headers}
+                content = await passed.read()
+            if request.method != "GET" or state.cut_reading_at is None:
+                return web.Response(status=passed.status, body=content, headers=kept)
+            cut_at, state.cut_reading_at = state.cut_reading_at, None
+            answer_stream = web.StreamResponse(status=passed.status, headers=kept)
+            answer_stream.content_length = len(content)
+            await answer_stream.prepare(request)
+            await answer_stream.write(content[:cut_at])
+            if request.transport:
+                request.transport.close()
+            return answer_stream
 
         application = web.Application(client_max_size=0)
         application.router.add_route("*", "/{path:.*}", handle)

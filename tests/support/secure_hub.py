@@ -51,10 +51,10 @@ class SecureHub:
         creds.write_text(login.partition("credentials:\n")[2].partition("authority:")[0], encoding="ascii")
         return self.address(creds)
 
-    def receiver(self) -> FleetAddress:
+    def receiver(self, name: str = "receiver") -> FleetAddress:
         """Issues credentials for a receiver; returns how it connects."""
-        out = self.path / "receiver"
-        administration.receiver_files(self.directory, "receiver", out, days=None, again=False)
+        out = self.path / name
+        administration.receiver_files(self.directory, name, out, days=None, again=False)
         return self.address(out / "receiver.creds")
 
     def administrator(self) -> FleetAddress:

@@ -102,6 +102,8 @@ async def test_receivers_answer_the_robot_that_asked(hub: SecureHub, victim: Fle
         "fleet.b.ev.run.7",
         "fleet.b.res.c1",
         "fleet.b.up.begin_file",
+        "fleet.b.get.get_files",
+        "fleet.a.get.get_files",
         "fleet.a.cmd.c9",
         "fleet.b.cmd.c9",
         "$KV.fleet_state.b",
@@ -257,6 +259,32 @@ async def test_operators_read_and_do_not_write(hub: SecureHub) -> None:
                 await work
     async with _connected(hub.operator("commander", commands=True)) as commander:
         assert await commander.publish_once("fleet.a.cmd.c1", b"") is Published.DELIVERED
+
+
+@pytest.mark.usefixtures("thief", "victim")
+async def test_answers_of_receivers_to_people_go_to_inboxes_alone(hub: SecureHub) -> None:
+    """A receiver publishes answers with its own rights, in the account of the streams."""
+    asked: list[str] = []
+
+    async def handle(request: Request) -> None:
+        asked.append(request.robot)
+        await request.respond(b"urls")
+
+    async with (
+        _connected(hub.receiver("receiver2")) as receiver,
+        _connected(hub.administrator()) as administrator,
+        _session(hub.operator("prying")) as session,
+    ):
+        await receiver.serve(names.READING_SUBJECTS, names.RECEIVERS, handle, of_people=True)
+        await _put_marks(administrator)
+        before = await _everything(administrator)
+        subject = names.reading_subject("b", "get_files")
+        for reply in ("$JS.API.STREAM.DELETE.fleet_events", "fleet.a.cmd.c99", "_INBOX_a.x", "_INBOXx.y"):
+            await session.send(subject, b"", reply)
+        # What was sent before is done when this is.
+        assert (await session.request(subject, b"", 5.0)).payload == b"urls"
+        assert await _everything(administrator) == before
+    assert asked == ["b"]
 
 
 @pytest.mark.timed

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from common.errors import UserError
 from fleet import names
-from fleet.connection import FleetAddress, connect
+from fleet.connection import Entry, FleetAddress, connect
 from fleet.errors import RefusedError
 from hub.cli import app
 from tests.support.free import free_tcp_port
@@ -92,6 +92,17 @@ def test_logins_of_people_and_receivers(hub: Path, tmp_path: Path) -> None:
         "fleet.yaml",
     }
     assert len(json.loads(_type("robots", "--all", "--json", "--dir", str(hub)).output)) == 2
+    out = tmp_path / "exporter"
+    assert "reads the hub" in _type("operator", "exporter", "--dir", str(hub), "--out", str(out)).output
+    assert {each.name for each in out.iterdir()} == {"operator.creds", "ca.pem", "fleet.yaml"}
+    assert all(each.stat().st_mode & 0o077 == 0 for each in out.iterdir())
+    url = re.search(r"tls://\S+", (out / "fleet.yaml").read_text(encoding="utf-8"))
+    assert url is not None
+    _type("apply", "--dir", str(hub))
+    reader = FleetAddress((url[0],), out / "operator.creds", out / "ca.pem")
+    assert asyncio.run(_listed(reader)) == {}
+    with pytest.raises(UserError, match="send no commands"):
+        _type("operator", "other", "--commands", "--dir", str(hub), "--out", str(tmp_path / "other"))
 
 
 @pytest.mark.parametrize(
@@ -120,6 +131,12 @@ def test_a_hub_that_is_off_is_reported(tmp_path: Path) -> None:
         _type("enroll", "r1", "--dir", str(made), "--out", str(tmp_path / "r1"))
     assert refused.value.exit_code == 3
     assert not (tmp_path / "r1").exists()
+
+
+async def _listed(address: FleetAddress) -> dict[str, Entry]:
+    async with connect(address) as hub:
+        await hub.connected(5)
+        return await hub.entries(names.ROBOTS)
 
 
 async def _publish(address: FleetAddress) -> None:

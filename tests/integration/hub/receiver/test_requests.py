@@ -5,6 +5,7 @@ import hashlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import aiohttp
@@ -14,7 +15,7 @@ from google.protobuf.message import Message
 from bridge.uploads.receivers import Receivers
 from common.healthcheck import state_of
 from fleet.connection import FleetAddress, Hub, connect
-from fleet.names import upload_subject
+from fleet.names import reading_subject, upload_subject
 from hub.receiver.app import AT_ONCE, sweep
 from hub.receiver.store import PART_BYTES, Store
 from omniseer.fleet.v1 import upload_pb2 as pb
@@ -235,3 +236,49 @@ async def _until_last(hub: Hub, name: str, request: Message) -> AsyncIterator[by
         answer = pb.UploadResponse.FromString(payload)
         if answer.HasField("error") or answer.complete_upload.HasField("receipt"):
             return
+
+
+@pytest.fixture
+async def reader(secure: SecureHub, tmp_path: Path) -> AsyncIterator[Hub]:
+    """A person's connection."""
+    address = await asyncio.to_thread(
+        secure.operator, f"reader{tmp_path.name}"[:60].replace("_", "-").strip("-")
+    )
+    async with connect(address) as hub:
+        await hub.connected(20)
+        yield hub
+
+
+async def read_by(hub: Hub, request: pb.GetFilesRequest, name: str = "get_files") -> pb.UploadResponse:
+    subject = reading_subject(ROBOT, name)
+    return pb.UploadResponse.FromString(await hub.request(subject, request.SerializeToString(), 20))
+
+
+async def test_people_get_urls_of_what_is_verified_and_of_nothing_else(ground: Ground, reader: Hub) -> None:
+    wanted = pb.GetFilesRequest(recording_id="one", file_names=[FILE.name])
+    async with receiving(ground) as receivers:
+        assert (await read_by(reader, wanted)).error.code == pb.UPLOAD_ERROR_CODE_NOT_VERIFIED
+        await uploaded(receivers)
+        assert (await read_by(reader, wanted)).error.code == pb.UPLOAD_ERROR_CODE_NOT_VERIFIED
+        await receivers.verify_file("one", FILE)
+        (url,) = (await read_by(reader, wanted)).get_files.urls
+        assert (url.file_name, url.expires_in_s) == (FILE.name, 900)
+        async with aiohttp.ClientSession() as session, session.get(url.url) as answer:
+            assert await answer.read() == DATA
+        # The list of the whole recording is there once the whole is verified.
+        entry = pb.GetFilesRequest(recording_id="one")
+        assert (await read_by(reader, entry)).error.code == pb.UPLOAD_ERROR_CODE_NOT_VERIFIED
+        for wrong in (
+            pb.GetFilesRequest(recording_id="../r2/one", file_names=[FILE.name]),
+            pb.GetFilesRequest(recording_id="one", file_names=["../two/data.bin"]),
+            pb.GetFilesRequest(recording_id="one", file_names=[FILE.name] * 17),
+        ):
+            assert (await read_by(reader, wrong)).error.code == pb.UPLOAD_ERROR_CODE_INVALID
+
+
+async def test_people_and_robots_have_requests_of_their_own(ground: Ground, reader: Hub) -> None:
+    request = pb.GetFilesRequest(recording_id="one", file_names=[FILE.name])
+    async with receiving(ground):
+        assert (await ask(ground.hub, "get_files", request)).error.code == pb.UPLOAD_ERROR_CODE_INVALID
+        for name in ("begin_file", "get_parts", "complete_upload"):
+            assert (await read_by(reader, request, name)).error.code == pb.UPLOAD_ERROR_CODE_INVALID

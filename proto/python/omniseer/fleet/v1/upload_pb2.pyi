@@ -522,6 +522,94 @@ class CompleteUploadResponse(_message.Message):
 Global___CompleteUploadResponse: _TypeAlias = CompleteUploadResponse  # noqa: Y015
 
 @_typing.final
+class GetFilesRequest(_message.Message):
+    """Requests URLs for reading verified files of a recording. From people, on the subject fleet.<robot>.get.get_files;
+    robots may not.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    RECORDING_ID_FIELD_NUMBER: _builtins.int
+    FILE_NAMES_FIELD_NUMBER: _builtins.int
+    recording_id: _builtins.str
+    """The recording."""
+    @_builtins.property
+    def file_names(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
+        """Names of its files, at most 16. Empty: one URL, of the recording's StoredRecording with all of its files, which the
+        bucket "fleet_recordings" leaves out where there are too many.
+        """
+
+    def __init__(
+        self,
+        *,
+        recording_id: _builtins.str = ...,
+        file_names: _abc.Iterable[_builtins.str] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["file_names", b"file_names", "recording_id", b"recording_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetFilesRequest: _TypeAlias = GetFilesRequest  # noqa: Y015
+
+@_typing.final
+class GetFilesResponse(_message.Message):
+    """Signed URLs."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    URLS_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def urls(self) -> _containers.RepeatedCompositeFieldContainer[Global___FileUrl]:
+        """In the order of the request."""
+
+    def __init__(
+        self,
+        *,
+        urls: _abc.Iterable[Global___FileUrl] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["urls", b"urls"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetFilesResponse: _TypeAlias = GetFilesResponse  # noqa: Y015
+
+@_typing.final
+class FileUrl(_message.Message):
+    """Where a file can be read with GET, whole or from any byte on. Its content is what counts: whoever reads it checks its
+    SHA-256 against the recording's receipt.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    FILE_NAME_FIELD_NUMBER: _builtins.int
+    URL_FIELD_NUMBER: _builtins.int
+    EXPIRES_IN_S_FIELD_NUMBER: _builtins.int
+    file_name: _builtins.str
+    """The file's name. Empty for the StoredRecording."""
+    url: _builtins.str
+    """An HTTPS URL, good for this file alone."""
+    expires_in_s: _builtins.int
+    """For how long from now, in s."""
+    def __init__(
+        self,
+        *,
+        file_name: _builtins.str = ...,
+        url: _builtins.str = ...,
+        expires_in_s: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["expires_in_s", b"expires_in_s", "file_name", b"file_name", "url", b"url"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___FileUrl: _TypeAlias = FileUrl  # noqa: Y015
+
+@_typing.final
 class UploadError(_message.Message):
     """A refusal."""
 
@@ -560,6 +648,7 @@ class UploadResponse(_message.Message):
     COMPLETE_FILE_FIELD_NUMBER: _builtins.int
     VERIFY_FILE_FIELD_NUMBER: _builtins.int
     COMPLETE_UPLOAD_FIELD_NUMBER: _builtins.int
+    GET_FILES_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def error(self) -> Global___UploadError:
         """A refusal."""
@@ -588,6 +677,10 @@ class UploadResponse(_message.Message):
     def complete_upload(self) -> Global___CompleteUploadResponse:
         """To CompleteUploadRequest."""
 
+    @_builtins.property
+    def get_files(self) -> Global___GetFilesResponse:
+        """To GetFilesRequest."""
+
     def __init__(
         self,
         *,
@@ -598,12 +691,13 @@ class UploadResponse(_message.Message):
         complete_file: Global___CompleteFileResponse | None = ...,
         verify_file: Global___VerifyFileResponse | None = ...,
         complete_upload: Global___CompleteUploadResponse | None = ...,
+        get_files: Global___GetFilesResponse | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["begin_file", b"begin_file", "begin_upload", b"begin_upload", "complete_file", b"complete_file", "complete_upload", b"complete_upload", "error", b"error", "get_parts", b"get_parts", "response", b"response", "verify_file", b"verify_file"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["begin_file", b"begin_file", "begin_upload", b"begin_upload", "complete_file", b"complete_file", "complete_upload", b"complete_upload", "error", b"error", "get_files", b"get_files", "get_parts", b"get_parts", "response", b"response", "verify_file", b"verify_file"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["begin_file", b"begin_file", "begin_upload", b"begin_upload", "complete_file", b"complete_file", "complete_upload", b"complete_upload", "error", b"error", "get_parts", b"get_parts", "response", b"response", "verify_file", b"verify_file"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["begin_file", b"begin_file", "begin_upload", b"begin_upload", "complete_file", b"complete_file", "complete_upload", b"complete_upload", "error", b"error", "get_files", b"get_files", "get_parts", b"get_parts", "response", b"response", "verify_file", b"verify_file"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_response: _TypeAlias = _typing.Literal["error", "begin_upload", "begin_file", "get_parts", "complete_file", "verify_file", "complete_upload"]  # noqa: Y015
+    _WhichOneofReturnType_response: _TypeAlias = _typing.Literal["error", "begin_upload", "begin_file", "get_parts", "complete_file", "verify_file", "complete_upload", "get_files"]  # noqa: Y015
     _WhichOneofArgType_response: _TypeAlias = _typing.Literal["response", b"response"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_response) -> _WhichOneofReturnType_response | None: ...
 
