@@ -192,7 +192,7 @@ def test_a_wrong_configuration_fails_once_with_the_line(robot: SystemdRobot) -> 
         assert robot.property("bridge", "ActiveState") == "failed"
         assert robot.property("bridge", "ExecMainStatus") == "2"
         # An upgrade is refused while it is so; what runs, runs on.
-        refused = robot.run("scripts/install-robot", "--ros", "wheels", check=False)
+        refused = robot.run("/robot-gateway/scripts/install-robot", check=False)
         assert refused.returncode == 1
         assert f"{path} is wrong for this version" in refused.stderr
     finally:
@@ -202,6 +202,6 @@ def test_a_wrong_configuration_fails_once_with_the_line(robot: SystemdRobot) -> 
 
 def test_done_again_it_changes_nothing(robot: SystemdRobot) -> None:
     before = {program: robot.pid(program) for program in PROGRAMS}
-    done = robot.run("scripts/install-robot", "--ros", "wheels")
+    done = robot.run("/robot-gateway/scripts/install-robot")
     assert done.stderr == "install-robot: up to date\n"
     assert {program: robot.pid(program) for program in PROGRAMS} == before
