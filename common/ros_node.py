@@ -14,6 +14,7 @@ from typing import Any
 
 from common.errors import UserError
 from common.ros_environment import check_domain
+from common.ros_transport import chosen_transport
 
 # Programs import this module before others that need rclpy, so that its absence ends in this error.
 try:
@@ -105,14 +106,7 @@ def ros_node(name: str, *, parameters: bool = False) -> Iterator[Any]:
         UserError: the environment names an impossible domain, or the middleware can't start.
     """
     check_domain()
-    context = Context()
-    try:
-        context.init(args=[], initialize_logging=False)
-    except RuntimeError as error:
-        raise UserError(
-            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION in the environment"
-        ) from error
-    try:
+    with chosen_transport(), _started_context() as context:
         node = Node(
             name,
             context=context,
@@ -125,6 +119,19 @@ def ros_node(name: str, *, parameters: bool = False) -> Iterator[Any]:
             yield node
         finally:
             node.destroy_node()
+
+
+@contextmanager
+def _started_context() -> Iterator[Context]:
+    context = Context()
+    try:
+        context.init(args=[], initialize_logging=False)
+    except RuntimeError as error:
+        raise UserError(
+            f"ROS 2 can't start: {error}", "Check ROS_DOMAIN_ID and RMW_IMPLEMENTATION in the environment"
+        ) from error
+    try:
+        yield context
     finally:
         context.shutdown()
         context.destroy()

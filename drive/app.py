@@ -9,6 +9,7 @@ from types import FrameType
 from typing import Final
 
 from common.ros_node import ros_node
+from common.ros_transport import use_udp
 from drive.base import VelocityPublisher, base
 from drive.config import DriveSettings
 from drive.endpoint import Endpoint
@@ -16,7 +17,6 @@ from drive.guard import Guard, worker_heartbeats, worker_kills, worker_stops
 from drive.machine import OnLoss, State
 from drive.real_time import lock_memory, raise_priority
 from drive.stop_file import StopFile, Stops, read_stops
-from drive.transport import use_udp
 from drive.values import Latch
 from drive.wire import welcome
 from drive.worker import Worker, new_instance_id

@@ -14,6 +14,7 @@ from bridge.rpc.client import newest_state
 from common.config import load
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
+from common.start_command import start_command
 from console.client import GatewayClient
 
 
@@ -42,7 +43,7 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
             "bridge",
             f"no bridge answers at {settings.socket}: {error.code().name}",
             "The fleet hears nothing of this robot",
-            "Start it: robot-bridge serve",
+            f"Start it: {start_command('robot-bridge')}",
         )
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from common.bind import bracketed
 from common.findings import Finding, good, note, wrong
+from common.start_command import start_command
 
 _TIMEOUT_S: Final = 1.0
 
@@ -22,7 +23,7 @@ class Service:
         name: for people.
         kind: of its Unix socket.
         key: of the configuration, with its socket.
-        command: starts it.
+        program: its command.
         without_it: what does not work then.
     """
 
@@ -30,7 +31,7 @@ class Service:
     name: str
     kind: socket.SocketKind
     key: str
-    command: str
+    program: str
     without_it: str
 
 
@@ -39,7 +40,7 @@ PREVIEW: Final = Service(
     name="the preview service",
     kind=socket.SOCK_STREAM,
     key="preview.socket",
-    command="robot-preview serve",
+    program="robot-preview",
     without_it="Without it there is a status, but no video",
 )
 DRIVE: Final = Service(
@@ -47,7 +48,7 @@ DRIVE: Final = Service(
     name="the drive program",
     kind=socket.SOCK_SEQPACKET,
     key="teleop.socket",
-    command="robot-drive serve",
+    program="robot-drive",
     without_it="Without it no one can drive",
 )
 RECORDER: Final = Service(
@@ -55,7 +56,7 @@ RECORDER: Final = Service(
     name="the recorder",
     kind=socket.SOCK_STREAM,
     key="recording.socket",
-    command="robot-recorder serve",
+    program="robot-recorder",
     without_it="Without it recordings can't be started, stopped or copied",
 )
 BRIDGE: Final = Service(
@@ -63,7 +64,7 @@ BRIDGE: Final = Service(
     name="the bridge",
     kind=socket.SOCK_STREAM,
     key="bridge.socket",
-    command="robot-bridge serve",
+    program="robot-bridge",
     without_it="Without it nothing is sent to the fleet; the robot works",
 )
 
@@ -79,7 +80,7 @@ def operator_endpoint(host: str, port: int) -> Finding:
         with socket.create_connection((reachable, port), timeout=_TIMEOUT_S):
             return good("grpc", f"a server listens at {address}")
     except ConnectionRefusedError:
-        why, remedy = "The gateway is not running", "Type: robot-gateway serve"
+        why, remedy = "The gateway is not running", f"Type: {start_command('robot-gateway')}"
         return note("grpc", f"no server listens at {address}", why, remedy)
     except OSError as error:
         return wrong(
@@ -97,11 +98,14 @@ def service_endpoint(service: Service, path: Path) -> Finding:
             probe.settimeout(_TIMEOUT_S)
             probe.connect(str(path))
     except FileNotFoundError:
-        what, remedy = f"{path} does not exist", f"Start {service.name}: {service.command}"
+        what, remedy = f"{path} does not exist", f"Start {service.name}: {start_command(service.program)}"
         if not path.parent.is_dir():
             remedy = f"Create the directory {path.parent}, or share it with the container of {service.name}"
     except ConnectionRefusedError:
-        what, remedy = f"{path} is left over from a program that ended", f"Start {service.name} again"
+        what, remedy = (
+            f"{path} is left over from a program that ended",
+            f"Start {service.name} again: {start_command(service.program)}",
+        )
     except PermissionError:
         what, remedy = f"this user may not use {path}", _permission_remedy(path)
     except OSError as error:

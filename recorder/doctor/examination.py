@@ -9,6 +9,7 @@ import grpc
 from common.config import load
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
+from common.start_command import start_command
 from recorder.config import RecorderSettings
 from recorder.doctor.judgement import folder_findings, preset_findings, program_findings
 from recorder.rpc.client import newest_state
@@ -35,7 +36,7 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
             "recorder",
             f"no recorder answers at {settings.socket}: {error.code().name}",
             "Nothing is recorded",
-            "Start it: robot-recorder serve",
+            f"Start it: {start_command('robot-recorder')}",
         )
     if (tap := settings.video.socket) is None:
         yield note(

@@ -107,7 +107,7 @@ def test_the_operators_endpoint() -> None:
 @pytest.mark.parametrize("service", [PREVIEW, DRIVE, RECORDER, BRIDGE], ids=lambda service: service.check)
 def test_the_endpoint_of_a_service(tmp_path: Path, service: Service) -> None:
     path = tmp_path / "service.sock"
-    assert service.command in service_endpoint(service, path).remedy
+    assert f"{service.program} serve" in service_endpoint(service, path).remedy
     assert f"directory {tmp_path / 'gone'}" in service_endpoint(service, tmp_path / "gone/a.sock").remedy
     with socket.socket(socket.AF_UNIX, service.kind) as server:
         server.bind(str(path))

@@ -1,15 +1,23 @@
-"""How Fast DDS carries the velocities: over UDP, never through shared memory.
+"""How Fast DDS carries messages: over UDP where its shared memory does not do.
 
-The shared-memory transport of Fast DDS 2.14 waits for up to a second for the port of a process that has just
-joined or ended (SharedMemGlobal::open_port_internal), and holds a lock meanwhile that each message of this
-process needs. A node that starts anywhere on the robot would stop the robot.
+Two reasons, both of Fast DDS 2.14. Its segments in /dev/shm are writable for their owner alone, and a reader
+has to write to those of a publisher: between nodes of two users nothing arrives, and no error says so. And it
+waits for up to a second for the port of a process that has just joined or ended
+(SharedMemGlobal::open_port_internal), and holds a lock meanwhile that each message of this process needs: a
+node that starts anywhere on the robot would stop a robot that is being driven.
 """
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
-from common.errors import UserError
+from common.errors import ExitCode, UserError
+
+VARIABLE: Final = "ROBOT_ROS_TRANSPORT"
+"""Set to "udp" where the robot's own nodes run as other users. Otherwise the middleware decides."""
 
 _CHOSEN: Final = ("FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables by which others choose transports; their choice counts."""
@@ -68,3 +76,29 @@ def use_udp(directory: Path) -> None:
         ) from error
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(profiles)
     os.environ[_RANGE] = "SYSTEM_DEFAULT"
+
+
+@contextmanager
+def chosen_transport() -> Iterator[None]:
+    """Has the nodes that are made in the block use UDP if the environment asks for it.
+
+    Raises:
+        UserError: the environment asks for something else, or there is no room for a file of profiles.
+    """
+    chosen = os.environ.get(VARIABLE, "").strip().lower()
+    if not chosen:
+        yield
+        return
+    if chosen != "udp":
+        raise UserError(f"{VARIABLE} is '{chosen}'", "Set it to udp, or to nothing", exit_code=ExitCode.USAGE)
+    before = {name: os.environ.get(name) for name in (*_CHOSEN, _RANGE)}
+    with TemporaryDirectory(prefix="fastdds-") as directory:
+        use_udp(Path(directory))
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
