@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import UserError
-from release_program import git
+from release_program import git, sbom
 from release_program.changelog import section
 from release_program.distributions import DISTRIBUTIONS
 from release_program.environments import install
-from release_program.packages import build
+from release_program.packages import build, stage
 from release_program.preconditions import Facts, refusals
 from release_program.sums import write_sums
 from release_program.wheelhouse import download
@@ -79,19 +79,26 @@ def _make(version: str, commit: git.Commit, output: Path, pythons: tuple[str, ..
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".release-", dir=output.parent) as scratch:
         made, work = Path(scratch) / "made", Path(scratch) / "work"
-        for folder in ("wheels", "sdists"):
+        for folder in ("wheels", "sdists", "sbom"):
             (made / folder).mkdir(parents=True)
         archived = made / f"robot-gateway-{version}.tar.gz"
         git.archive(_ROOT, commit, archived.name.removesuffix(".tar.gz"), archived)
         tree = git.export(archived, work / "tree")
         _say("building wheels and sdists")
         for distribution in DISTRIBUTIONS:
-            build(distribution, tree, made / "sdists", made / "wheels", commit.epoch_s)
+            stage(distribution, tree, work / "sources" / distribution.name)
+            build(work / "sources" / distribution.name, made / "sdists", made / "wheels", commit.epoch_s)
         _say(f"downloading what they need on Python {', '.join(pythons)}")
         download(tree / "requirements/console.txt", pythons, made / "wheels", commit.epoch_s)
-        _say("installing them without a registry")
+        _say("installing them without a registry, and listing what was installed")
         for distribution in DISTRIBUTIONS:
-            install(distribution, version, made / "wheels", work / distribution.name)
+            interpreter = install(distribution, version, made / "wheels", work / distribution.name)
+            sbom.write_of_environment(
+                interpreter,
+                work / "sources" / distribution.name / "pyproject.toml",
+                made / "sbom" / f"{distribution.stem}-{version}.cdx.json",
+                commit.epoch_s,
+            )
         _write_texts(made, tree, version, commit)
         write_sums(made)
         made.rename(output)

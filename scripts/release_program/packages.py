@@ -14,12 +14,11 @@ from release_program.running import run
 _BUILD_WITHIN_S: Final = 300.0
 
 
-def build(distribution: Distribution, tree: Path, sdists: Path, wheels: Path, epoch_s: int) -> None:
+def build(staged: Path, sdists: Path, wheels: Path, epoch_s: int) -> None:
     """Builds the sdist of a distribution into `sdists`, and from it the wheel into `wheels`.
 
     Args:
-        distribution: which.
-        tree: the source tree, with committed files and no others.
+        staged: the source tree that `stage` has written.
         sdists: a directory.
         wheels: a directory.
         epoch_s: the time that all files get: seconds since 1970 (https://reproducible-builds.org/specs/source-date-epoch).
@@ -28,8 +27,7 @@ def build(distribution: Distribution, tree: Path, sdists: Path, wheels: Path, ep
         UserError: the build failed.
     """
     with tempfile.TemporaryDirectory(prefix="robot-release-") as scratch:
-        staged, built = Path(scratch) / "source", Path(scratch) / "built"
-        stage(distribution, tree, staged)
+        built = Path(scratch)
         run(
             *(sys.executable, "-P", "-m", "build", "--no-isolation", "--outdir", built, staged),
             within_s=_BUILD_WITHIN_S,
@@ -47,7 +45,16 @@ def files_of(distribution: Distribution, tree: Path) -> frozenset[SourceFile]:
 
 
 def stage(distribution: Distribution, tree: Path, target: Path) -> None:
-    """Writes the source tree of a distribution, with a pyproject.toml of its own."""
+    """Writes the source tree of a distribution, with a pyproject.toml of its own.
+
+    Args:
+        distribution: which.
+        tree: the project's source tree, with committed files and no others.
+        target: a new directory.
+    """
+    for boundary in (".git", ".hg"):
+        # Hatchling would take the .gitignore of whatever repository this is in, and looks for it up to here.
+        (target / boundary).mkdir(parents=True)
     files = files_of(distribution, tree)
     for file in files:
         destination = target / file.installed

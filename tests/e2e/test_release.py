@@ -93,6 +93,31 @@ def test_it_names_its_version_its_commit_and_what_is_new(made: Path, repository:
     assert f"robot-gateway-{VERSION}.tar.gz" in (made / "INSTALL.md").read_text()
 
 
+def test_the_sbom_lists_what_is_installed_with_licences_and_dependencies(made: Path) -> None:
+    boms = {
+        name: json.loads((made / f"sbom/robot_gateway_{name}-{VERSION}.cdx.json").read_text())
+        for name in ("client", "console")
+    }
+    for name, bom in boms.items():
+        assert (bom["bomFormat"], bom["specVersion"]) == ("CycloneDX", "1.6")
+        main = bom["metadata"]["component"]
+        assert (main["name"], main["version"]) == (f"robot-gateway-{name}", VERSION)
+        assert bom["metadata"]["timestamp"] == "2026-01-02T03:04:05+00:00"
+        assert "/tmp" not in json.dumps(bom)  # noqa: S108  # of the computer that made it
+        edges = {edge["ref"]: edge.get("dependsOn", []) for edge in bom["dependencies"]}
+        assert any(other.startswith("grpcio") for others in edges.values() for other in others)
+    listed = {
+        name: {component["name"].lower().replace("_", "-"): component for component in bom["components"]}
+        for name, bom in boms.items()
+    }
+    assert {"grpcio", "protobuf", "tomlkit"} <= listed["client"].keys()
+    assert not {"pyside6-essentials", "typer", "pip", "setuptools"} & listed["client"].keys()
+    assert {"pyside6-essentials", "typer", "nkeys", "robot-gateway-client"} <= listed["console"].keys()
+    wheels = {wheel.name.split("-")[0].lower().replace("_", "-") for wheel in (made / "wheels").iterdir()}
+    assert listed["console"].keys() - wheels == set()
+    assert "Apache-2.0" in json.dumps(listed["client"]["grpcio"]["licenses"])
+
+
 def test_the_client_installs_and_imports_without_network_gstreamer_and_qt(made: Path, tmp_path: Path) -> None:
     tools = fresh_environment(tmp_path / "environment")
     installed = alone(
