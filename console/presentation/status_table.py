@@ -46,6 +46,7 @@ from console.presentation.value_style import (
     of_compute,
     of_network,
     of_number,
+    of_text,
     of_video,
 )
 
@@ -213,8 +214,19 @@ def _objects(view: View) -> Iterator[Row]:
 def _numbers(view: View) -> Iterator[Row]:
     for each in view.status.numbers:
         row = view.measured("", each, number_text(each), of_number(each))
-        # Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example.
-        yield replace(row, label=sentence(each.title) if view.compact else each.title)
+        yield replace(row, label=_title(each.title, view))
+
+
+def _texts(view: View) -> Iterator[Row]:
+    for each in view.status.texts:
+        row = view.measured("", each, UNKNOWN if each.text is None else each.text, of_text(each))
+        # The robot's own words: unlike a number and its unit they may be broken anywhere.
+        yield replace(row, label=_title(each.title, view), text=row.text.replace("\u00a0", " "))
+
+
+def _title(title: str, view: View) -> str:
+    """Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example."""
+    return sentence(title) if view.compact else title
 
 
 def _access(view: View) -> Iterator[Row]:
@@ -448,6 +460,7 @@ TABLE: Final[tuple[Rows, ...]] = (
     ),
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
     _numbers,
+    _texts,
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
     _recording,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
-from console.client.results import NumberLevel, RecorderState
+from console.client.results import NumberLevel, RecorderState, TextLevel
 from console.presentation.severity_style import SeverityStyle
 
 
@@ -70,6 +70,13 @@ NUMBER_LEVELS: Final[Mapping[NumberLevel, Judgement]] = {
     NumberLevel.ERROR_HIGH: Judgement(SeverityStyle.BAD, "TOO HIGH"),
 }
 """Total. A level from a newer gateway reads UNKNOWN, and is no reason for an alarm."""
+TEXT_LEVELS: Final[Mapping[TextLevel, Judgement]] = {
+    TextLevel.UNKNOWN: GOOD,
+    TextLevel.GOOD: GOOD,
+    TextLevel.WARNING: Judgement(SeverityStyle.WARNING, "WARNING"),
+    TextLevel.ERROR: Judgement(SeverityStyle.BAD, "ERROR"),
+}
+"""Total, as above."""
 SHORT_ROOM_S: Final = 3600
 """For recordings, at the present rate: less counts as short for the recorder, too. It is never worse than a
 warning, because the recorder may go on for ever by deleting the oldest."""
@@ -115,6 +122,13 @@ def of_number(number: results.NumberValue) -> Judgement:
     if number.value is None:
         return Judgement(SeverityStyle.WARNING, "UNKNOWN")
     return NUMBER_LEVELS[number.level]
+
+
+def of_text(text: results.TextValue) -> Judgement:
+    """Returns the robot's own judgement, by the levels of its configuration."""
+    if text.text is None:
+        return Judgement(SeverityStyle.WARNING, "UNKNOWN")
+    return TEXT_LEVELS[text.level]
 
 
 def of_video(measured: results.PreviewMeasurement) -> Judgement:

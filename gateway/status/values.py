@@ -103,6 +103,17 @@ class Number:
     value: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text that the configuration names: one printable line of bounded length.
+
+    Attributes:
+        text: None where the newest message holds none: a list that is too short.
+    """
+
+    text: str | None
+
+
 class DiagnosticLevel(Enum):
     """Level of a diagnostic status (REP-107, diagnostic_msgs/DiagnosticStatus)."""
 

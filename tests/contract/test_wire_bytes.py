@@ -372,7 +372,8 @@ ADDITIONS = [
         + sub(18, text(4, "exploring"))
         + sub(19, text(1, "odometry"))
         + sub(20, uint(3, 61_000))
-        + sub(23, text(1, "cell")),
+        + sub(23, text(1, "cell"))
+        + sub(24, text(1, "gripper")),
         {
             "insecure": True,
             "faults": [fault_pb2.Fault(id="a"), fault_pb2.Fault(id="b")],
@@ -380,6 +381,26 @@ ADDITIONS = [
             "sources": [source_pb2.SourceStatus(name="odometry")],
             "gateway": gateway_info_pb2.GatewayFacts(uptime_ms=61_000),
             "numbers": [value_pb2.NumberStatus(label="cell")],
+            "texts": [value_pb2.TextStatus(label="gripper")],
+        },
+    ),
+    Case(
+        value_pb2.TextStatus,
+        text(1, "gripper")
+        + text(2, "Gripper")
+        + uint(3, 1)
+        + uint(4, 1)
+        + uint(5, 40)
+        + text(6, "jam")
+        + uint(7, 3),
+        {
+            "label": "gripper",
+            "title": "Gripper",
+            "available": True,
+            "stale": True,
+            "age_ms": 40,
+            "text": "jam",
+            "level": value_pb2.TEXT_LEVEL_ERROR,
         },
     ),
     Case(

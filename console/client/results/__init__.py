@@ -102,4 +102,4 @@ from console.client.results.status import (
     TeleopState,
     Vision,
 )
-from console.client.results.value import NumberLevel, NumberValue
+from console.client.results.value import NumberLevel, NumberValue, TextLevel, TextValue

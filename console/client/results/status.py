@@ -10,7 +10,7 @@ from console.client.results.platform import Platform
 from console.client.results.preview import PreviewStatus
 from console.client.results.recording import RecordingStatus
 from console.client.results.sample import Sample, Source
-from console.client.results.value import NumberValue
+from console.client.results.value import NumberValue, TextValue
 
 
 class HealthState(Enum):
@@ -168,6 +168,8 @@ class SystemStatus:
     """None where the robot is not set up for a fleet."""
     numbers: tuple[NumberValue, ...]
     """Numbers that the robot's configuration names."""
+    texts: tuple[TextValue, ...]
+    """Texts that the robot's configuration names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

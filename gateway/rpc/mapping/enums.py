@@ -60,6 +60,11 @@ NUMBER_LEVELS: Final = {
     for side in Side
 }
 """Of numbers beyond a limit."""
+TEXT_LEVELS: Final = {
+    severity: value_pb2.TextLevel.Value(f"TEXT_LEVEL_{severity.name}")
+    for severity in (Severity.WARNING, Severity.ERROR)
+}
+"""Of texts that are bad."""
 CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
 TELEOP_STATES: Final = {False: states_pb2.TELEOP_DISABLED, True: states_pb2.TELEOP_ENABLED}
 DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")

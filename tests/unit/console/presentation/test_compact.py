@@ -95,3 +95,16 @@ def test_numbers_of_the_configuration(message: overlay_pb2.OverlaySnapshot) -> N
     assert rows["Old"] == Row("Old", "STALE", SeverityStyle.WARNING, "1", "9.0 s")
     assert rows["Never"] == Row("Never", "no data", SeverityStyle.QUIET, "")
     assert [row.label for row in table_rows(replace(view(message), compact=False))].count("cell 3") == 1
+
+
+def test_texts_of_the_configuration(message: overlay_pb2.OverlaySnapshot) -> None:
+    add = message.status.texts.add
+    add(title="gripper", available=True, text="holds a bottle, firmly", level=value_pb2.TEXT_LEVEL_GOOD)
+    add(title="arm", available=True, text="jammed", level=value_pb2.TEXT_LEVEL_ERROR)
+    add(title="lamp", available=True, text="", level=value_pb2.TEXT_LEVEL_WARNING)
+    add(title="list", available=True)
+    rows = by_label(view(message))
+    assert rows["Gripper"] == Row("Gripper", "fresh", SeverityStyle.GOOD, "holds a bottle, firmly")
+    assert rows["Arm"] == Row("Arm", "ERROR", SeverityStyle.BAD, "jammed")
+    assert (rows["Lamp"].mark, rows["Lamp"].text) == ("WARNING", "")
+    assert rows["List"] == Row("List", "UNKNOWN", SeverityStyle.WARNING, "-")

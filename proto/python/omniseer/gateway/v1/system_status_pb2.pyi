@@ -53,6 +53,7 @@ class SystemStatus(_message.Message):
     RECORDING_FIELD_NUMBER: _builtins.int
     CLOUD_FIELD_NUMBER: _builtins.int
     NUMBERS_FIELD_NUMBER: _builtins.int
+    TEXTS_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -116,6 +117,10 @@ class SystemStatus(_message.Message):
     def numbers(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.NumberStatus]:
         """Numbers of the robot's own, in the order of its configuration."""
 
+    @_builtins.property
+    def texts(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.TextStatus]:
+        """Texts of the robot's own, in the order of its configuration."""
+
     def __init__(
         self,
         *,
@@ -135,10 +140,11 @@ class SystemStatus(_message.Message):
         recording: _recording_pb2.RecordingStatus | None = ...,
         cloud: _cloud_pb2.CloudStatus | None = ...,
         numbers: _abc.Iterable[_value_pb2.NumberStatus] | None = ...,
+        texts: _abc.Iterable[_value_pb2.TextStatus] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "numbers", b"numbers", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "numbers", b"numbers", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "texts", b"texts", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -24,7 +24,7 @@ from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.limit import Limit
-from gateway.status.meaning import NumberMeaning
+from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
@@ -59,6 +59,7 @@ from gateway.status.sources import (
     ROS_SOURCES,
     VISION,
     number_source,
+    text_source,
 )
 from gateway.status.teleop import DriveInhibit, DrivePhase
 from gateway.status.values import (
@@ -71,6 +72,7 @@ from gateway.status.values import (
     Network,
     Number,
     Received,
+    Text,
     Velocity,
     Vision,
 )
@@ -182,6 +184,9 @@ CELL = number_source(
 )
 
 
+GRIPPER = text_source("gripper", "Gripper", TextMeaning())
+
+
 def everything() -> Snapshot:
     """Every value known, none of them zero, all of them stale by a known age."""
     at_s = NOW_S - 10
@@ -212,6 +217,7 @@ def everything() -> Snapshot:
             DIAGNOSTICS: Received(Diagnostics(()), at_s),
             ONBOARD_BATTERY: Received(Battery(True, 12.0, 70.0, True), at_s),
             CELL: Received(Number(3.25), at_s),
+            GRIPPER: Received(Text("open"), at_s),
         }
     )
     return take(
@@ -219,7 +225,7 @@ def everything() -> Snapshot:
         # All of them are stale but the one that is required.
         rules=Rules(
             {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES}
-            | {DIAGNOSTICS: FRESH, CELL: STALE},
+            | {DIAGNOSTICS: FRESH, CELL: STALE, GRIPPER: STALE},
             3000,
         ),
         board=board,
