@@ -11,6 +11,7 @@ from typing import Any, Final, TypeAlias
 from console.client import results
 from console.client.results import (
     FaultSeverity,
+    FixStatus,
     Freshness,
     PreviewProfile,
     PreviewState,
@@ -46,6 +47,8 @@ from console.presentation.value_style import (
     of_compute,
     of_network,
     of_number,
+    of_orientation,
+    of_position,
     of_text,
     of_video,
 )
@@ -368,6 +371,27 @@ def _network(network: results.Network, compact: bool) -> str:
     )
 
 
+def _position(position: results.Position, compact: bool) -> str:
+    latitude, longitude = position.latitude_deg, position.longitude_deg
+    if latitude is None or longitude is None:
+        return UNKNOWN if position.available else ""
+    accuracy, altitude = position.horizontal_accuracy_m, position.altitude_m
+    return joined(
+        f"{latitude:.6f}°",
+        f"{longitude:.6f}°",
+        "" if accuracy is None else f"± {quantity(accuracy, 'm')}",
+        "" if compact or altitude is None else f"altitude {quantity(altitude, 'm')}",
+        "" if compact or position.fix is FixStatus.UNKNOWN else position.fix.value.upper(),
+    )
+
+
+def _attitude(orientation: results.Orientation, _compact: bool) -> str:
+    angles = {"roll": orientation.roll_deg, "pitch": orientation.pitch_deg, "yaw": orientation.yaw_deg}
+    if orientation.roll_deg is None:
+        return UNKNOWN if orientation.available else ""
+    return joined(*(f"{name} {signed(angle, 1)}°" for name, angle in angles.items()))
+
+
 def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     picture_age_ms = measured.worst_picture_age_ms
@@ -459,6 +483,8 @@ TABLE: Final[tuple[Rows, ...]] = (
         optional=True,
     ),
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
+    _measured("position", lambda status: status.position, _position, of_position, optional=True),
+    _measured("attitude", lambda status: status.orientation, _attitude, of_orientation, optional=True),
     _numbers,
     _texts,
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),

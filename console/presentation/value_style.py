@@ -117,6 +117,16 @@ def of_network(network: results.Network) -> Judgement:
     return WIFI_DBM.judge(network.wifi_signal_dbm)
 
 
+def of_position(position: results.Position) -> Judgement:
+    """Judges whether there is a position at all."""
+    return GOOD if position.latitude_deg is not None else Judgement(SeverityStyle.WARNING, "NO FIX")
+
+
+def of_orientation(orientation: results.Orientation) -> Judgement:
+    """Judges whether the angles are known."""
+    return GOOD if orientation.roll_deg is not None else Judgement(SeverityStyle.WARNING, "UNKNOWN")
+
+
 def of_number(number: results.NumberValue) -> Judgement:
     """Returns the robot's own judgement, by the limits of its configuration."""
     if number.value is None:

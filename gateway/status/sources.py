@@ -20,6 +20,8 @@ from gateway.status.values import (
     Mode,
     Network,
     Number,
+    Orientation,
+    Position,
     Text,
     Velocity,
     Vision,
@@ -102,6 +104,8 @@ DIAGNOSTICS: Final = SourceSpec(
     in_change_key=False,
 )
 MODE: Final = SourceSpec("mode", Mode, stale_after_ms=_DAY_MS, quiet=True)
+POSITION: Final = SourceSpec("position", Position, stale_after_ms=3000)
+ORIENTATION: Final = SourceSpec("orientation", Orientation)
 EFFECTIVE_COMMAND: Final = SourceSpec("effective_command", Velocity, stale_after_ms=500, quiet=True)
 """Output of the robot's command mux."""
 MUX_INPUTS: Final = {
@@ -130,6 +134,8 @@ ROS_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     BATTERY,
     DIAGNOSTICS,
     MODE,
+    POSITION,
+    ORIENTATION,
     EFFECTIVE_COMMAND,
     *MUX_INPUTS.values(),
 )

@@ -45,6 +45,7 @@ from console.client.results.overlay import (
     WatchedStatus,
 )
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
+from console.client.results.pose import FixStatus, Orientation, Position
 from console.client.results.preview import (
     Encoder,
     KeyFrameAnswer,

@@ -48,7 +48,7 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         (
             "sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]",
             "key 'sources.0.kind' is 'smell', expected: one of odometry, vision, detections, battery, "
-            "diagnostics, mode, effective_command, mux_input",
+            "diagnostics, mode, position, orientation, effective_command, mux_input",
         ),
         ("sources: [{kind: compute, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
         ("grpc: {host: 0.0.0.0}", "anyone on that network"),
