@@ -20,7 +20,8 @@ MODE: Final = SourceSettings(kind="mode", topic="/mode", type="std_msgs/msg/Stri
 OTHER_DETECTIONS: Final = SourceSettings(
     kind="detections", topic="/d", type="vision_msgs/msg/Detection2DArray", stale_after_ms=500
 )
-NUMBERS: Final = (
+GENERIC: Final = (
+    SourceSettings(kind="text", label="name", topic="/n", type="std_msgs/msg/String", field="data"),
     SourceSettings(
         kind="number", label="cell", topic="/b", type="sensor_msgs/msg/BatteryState", field="cell_voltage[1]"
     ),
@@ -32,7 +33,7 @@ NUMBERS: Final = (
         field="status[1].level",
     ),
 )
-SOURCES: Final = (*DEFAULT_SOURCES, MODE, OTHER_DETECTIONS, *NUMBERS)
+SOURCES: Final = (*DEFAULT_SOURCES, MODE, OTHER_DETECTIONS, *GENERIC)
 """One of each type that has a reader, and of the generic kinds."""
 _RULES: Final = Rules(
     {source.spec: SourceRule(source.stale_after_ms, source.required) for source in SOURCES}, 3000

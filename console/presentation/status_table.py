@@ -11,6 +11,7 @@ from typing import Any, Final, TypeAlias
 from console.client import results
 from console.client.results import (
     FaultSeverity,
+    FixStatus,
     Freshness,
     PreviewProfile,
     PreviewState,
@@ -46,6 +47,9 @@ from console.presentation.value_style import (
     of_compute,
     of_network,
     of_number,
+    of_orientation,
+    of_position,
+    of_text,
     of_video,
 )
 
@@ -213,8 +217,19 @@ def _objects(view: View) -> Iterator[Row]:
 def _numbers(view: View) -> Iterator[Row]:
     for each in view.status.numbers:
         row = view.measured("", each, number_text(each), of_number(each))
-        # Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example.
-        yield replace(row, label=sentence(each.title) if view.compact else each.title)
+        yield replace(row, label=_title(each.title, view))
+
+
+def _texts(view: View) -> Iterator[Row]:
+    for each in view.status.texts:
+        row = view.measured("", each, UNKNOWN if each.text is None else each.text, of_text(each))
+        # The robot's own words: unlike a number and its unit they may be broken anywhere.
+        yield replace(row, label=_title(each.title, view), text=row.text.replace("\u00a0", " "))
+
+
+def _title(title: str, view: View) -> str:
+    """Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example."""
+    return sentence(title) if view.compact else title
 
 
 def _access(view: View) -> Iterator[Row]:
@@ -356,6 +371,27 @@ def _network(network: results.Network, compact: bool) -> str:
     )
 
 
+def _position(position: results.Position, compact: bool) -> str:
+    latitude, longitude = position.latitude_deg, position.longitude_deg
+    if latitude is None or longitude is None:
+        return UNKNOWN if position.available else ""
+    accuracy, altitude = position.horizontal_accuracy_m, position.altitude_m
+    return joined(
+        f"{latitude:.6f}°",
+        f"{longitude:.6f}°",
+        "" if accuracy is None else f"± {quantity(accuracy, 'm')}",
+        "" if compact or altitude is None else f"altitude {quantity(altitude, 'm')}",
+        "" if compact or position.fix is FixStatus.UNKNOWN else position.fix.value.upper(),
+    )
+
+
+def _attitude(orientation: results.Orientation, _compact: bool) -> str:
+    angles = {"roll": orientation.roll_deg, "pitch": orientation.pitch_deg, "yaw": orientation.yaw_deg}
+    if orientation.roll_deg is None:
+        return UNKNOWN if orientation.available else ""
+    return joined(*(f"{name} {signed(angle, 1)}°" for name, angle in angles.items()))
+
+
 def _video(measured: results.PreviewMeasurement, compact: bool, target_kbps: int = 0) -> str:
     rtt_ms, loss_percent = measured.worst_rtt_ms, measured.worst_loss_percent
     picture_age_ms = measured.worst_picture_age_ms
@@ -447,7 +483,10 @@ TABLE: Final[tuple[Rows, ...]] = (
         optional=True,
     ),
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
+    _measured("position", lambda status: status.position, _position, of_position, optional=True),
+    _measured("attitude", lambda status: status.orientation, _attitude, of_orientation, optional=True),
     _numbers,
+    _texts,
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),
     _teleop,
     _recording,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from console.client import results
-from console.client.results import NumberLevel, RecorderState
+from console.client.results import NumberLevel, RecorderState, TextLevel
 from console.presentation.severity_style import SeverityStyle
 
 
@@ -70,6 +70,13 @@ NUMBER_LEVELS: Final[Mapping[NumberLevel, Judgement]] = {
     NumberLevel.ERROR_HIGH: Judgement(SeverityStyle.BAD, "TOO HIGH"),
 }
 """Total. A level from a newer gateway reads UNKNOWN, and is no reason for an alarm."""
+TEXT_LEVELS: Final[Mapping[TextLevel, Judgement]] = {
+    TextLevel.UNKNOWN: GOOD,
+    TextLevel.GOOD: GOOD,
+    TextLevel.WARNING: Judgement(SeverityStyle.WARNING, "WARNING"),
+    TextLevel.ERROR: Judgement(SeverityStyle.BAD, "ERROR"),
+}
+"""Total, as above."""
 SHORT_ROOM_S: Final = 3600
 """For recordings, at the present rate: less counts as short for the recorder, too. It is never worse than a
 warning, because the recorder may go on for ever by deleting the oldest."""
@@ -110,11 +117,28 @@ def of_network(network: results.Network) -> Judgement:
     return WIFI_DBM.judge(network.wifi_signal_dbm)
 
 
+def of_position(position: results.Position) -> Judgement:
+    """Judges whether there is a position at all."""
+    return GOOD if position.latitude_deg is not None else Judgement(SeverityStyle.WARNING, "NO FIX")
+
+
+def of_orientation(orientation: results.Orientation) -> Judgement:
+    """Judges whether the angles are known."""
+    return GOOD if orientation.roll_deg is not None else Judgement(SeverityStyle.WARNING, "UNKNOWN")
+
+
 def of_number(number: results.NumberValue) -> Judgement:
     """Returns the robot's own judgement, by the limits of its configuration."""
     if number.value is None:
         return Judgement(SeverityStyle.WARNING, "UNKNOWN")
     return NUMBER_LEVELS[number.level]
+
+
+def of_text(text: results.TextValue) -> Judgement:
+    """Returns the robot's own judgement, by the levels of its configuration."""
+    if text.text is None:
+        return Judgement(SeverityStyle.WARNING, "UNKNOWN")
+    return TEXT_LEVELS[text.level]
 
 
 def of_video(measured: results.PreviewMeasurement) -> Judgement:

@@ -59,6 +59,8 @@ class FaultSettings(Section):
     battery_percent: LowerLimit = LowerLimit(raise_at=20, clear_at=25)
     """Charge of the robot's battery and of the computer's."""
     wifi_signal_dbm: LowerLimit = LowerLimit(raise_at=-75, clear_at=-70)
+    tilt_deg: UpperLimit = UpperLimit(raise_at=30, clear_at=25)
+    """Angle between the robot's vertical axis and the world's, of a source of kind orientation."""
     expiry_days: float = Field(default=14, ge=0, le=3650)
     """How long before its end of validity a certificate is a fault."""
     hub_offline_s: float = Field(default=600, ge=0, le=31_536_000)

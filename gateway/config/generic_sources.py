@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator
 
 from gateway.config.faults import LowerLimit, UpperLimit
+from gateway.status.fault import Severity
+from gateway.status.meaning import TextMeaning
 
 MOST_GENERIC: Final = 64
 """Generic sources of one gateway: each is a subscription, and a row for the operator."""
@@ -14,22 +16,21 @@ _LABEL: Final = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _LONGEST_PATH: Final = 200
 _MOST_STEPS: Final = 16
 _PATH: Final = re.compile(r"[A-Za-z]\w*(\[\d{1,5}\])?(\.[A-Za-z]\w*(\[\d{1,5}\])?)*", re.ASCII)
+LONGEST_TEXT: Final = 300
+MOST_WORDS: Final = 64
+"""Names of numbers, and texts with a level, of one source."""
 _LONGEST_TITLE: Final = 40
 _LONGEST_UNIT: Final = 12
 _LONGEST_REMEDY: Final = 200
 
+_BOTH: Final = frozenset({"number", "text"})
+_NUMBER: Final = frozenset({"number"})
+_TEXT: Final = frozenset({"text"})
 KINDS_OF_KEY: Final[Mapping[str, frozenset[str]]] = {
-    "title": frozenset({"number"}),
-    "field": frozenset({"number"}),
-    "unit": frozenset({"number"}),
-    "scale": frozenset({"number"}),
-    "offset": frozenset({"number"}),
-    "decimals": frozenset({"number"}),
-    "warning_below": frozenset({"number"}),
-    "error_below": frozenset({"number"}),
-    "warning_above": frozenset({"number"}),
-    "error_above": frozenset({"number"}),
-    "remedy": frozenset({"number"}),
+    **dict.fromkeys(("title", "field", "remedy"), _BOTH),
+    **dict.fromkeys(("unit", "scale", "offset", "decimals"), _NUMBER),
+    **dict.fromkeys(("warning_below", "error_below", "warning_above", "error_above"), _NUMBER),
+    **dict.fromkeys(("max_length", "names", "levels", "other_level"), _TEXT),
 }
 """Keys that only some kinds have; with another kind they would do nothing."""
 
@@ -56,6 +57,13 @@ FieldPath = Annotated[str, AfterValidator(_path)]
 Title = Annotated[str, _printable(_LONGEST_TITLE)]
 Unit = Annotated[str, _printable(_LONGEST_UNIT)]
 Remedy = Annotated[str, _printable(_LONGEST_REMEDY)]
+Word = Annotated[str, _printable(LONGEST_TEXT)]
+Level = Literal["good", "warning", "error"]
+_SEVERITIES: Final[Mapping[Level, Severity | None]] = {
+    "good": None,
+    "warning": Severity.WARNING,
+    "error": Severity.ERROR,
+}
 
 
 def check_generic_label(kind: str, label: str | None) -> None:
@@ -108,3 +116,18 @@ def check_order(
         raise ValueError(
             f"no value is good: low values are good from {max(below):g} on, high ones up to {min(above):g}"
         )
+
+
+def text_meaning(levels: Mapping[str, Level], other: Level, remedy: str) -> TextMeaning:
+    """Returns the levels in the form that the fault rules take."""
+    listed = tuple((text, _SEVERITIES[level]) for text, level in levels.items())
+    return TextMeaning(listed, _SEVERITIES[other], remedy)
+
+
+def check_words(levels: Mapping[str, Level], max_length: int) -> None:
+    """Raises ValueError if a text with a level can't come, because texts are cut before it ends."""
+    for text in levels:
+        if len(text) > max_length:
+            raise ValueError(
+                f"levels has '{text}', but texts are cut to max_length ({max_length}) characters"
+            )

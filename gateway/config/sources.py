@@ -1,6 +1,7 @@
 """`sources`: the ROS 2 topics that the gateway reads."""
 
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -8,16 +9,22 @@ from pydantic import AfterValidator, Field, model_validator
 from common.config import Section
 from gateway.config.faults import LowerLimit, UpperLimit
 from gateway.config.generic_sources import (
+    LONGEST_TEXT,
+    MOST_WORDS,
     FieldPath,
+    Level,
     Remedy,
     Title,
     Unit,
+    Word,
     check_generic_label,
     check_keys,
     check_order,
+    check_words,
+    text_meaning,
 )
 from gateway.status.meaning import NumberMeaning
-from gateway.status.sources import GENERIC_KINDS, ROS_SOURCES, SourceSpec, number_source
+from gateway.status.sources import GENERIC_KINDS, ROS_SOURCES, SourceSpec, number_source, text_source
 from gateway.status.values import CommandSource
 
 KINDS: Final = tuple(dict.fromkeys(spec.kind for spec in (*ROS_SOURCES, *GENERIC_KINDS)))
@@ -92,11 +99,23 @@ class SourceSettings(Section):
     remedy: Remedy = ""
     """What operators should do beyond a limit."""
 
+    max_length: int = Field(default=80, ge=1, le=LONGEST_TEXT)
+    """Characters of a text that are kept."""
+    names: Mapping[int, Word] = Field(default={}, max_length=MOST_WORDS)
+    """Texts of the numbers of an integer field, as the constants of its message type have them."""
+    levels: Mapping[Word, Level] = Field(default={}, max_length=MOST_WORDS)
+    """How bad texts are, each exactly as it is shown."""
+    other_level: Level = "good"
+    """How bad every other text is."""
+
     @property
     def spec(self) -> SourceSpec[Any]:
         """The entry of the table of sources; of a generic kind the one that belongs to this label."""
-        if self.kind in _GENERIC:
+        if self.kind == "number":
             return number_source(self.label or "", self.title, self._meaning())
+        if self.kind == "text":
+            meaning = text_meaning(self.levels, self.other_level, self.remedy)
+            return text_source(self.label or "", self.title, meaning)
         return _SPECS[self.kind, self.label]
 
     @property
@@ -125,6 +144,7 @@ class SourceSettings(Section):
         changed = {name: value for name, value in self if value != defaults[name]}
         check_keys(self.kind, changed)
         check_order((self.error_below, self.warning_below), (self.error_above, self.warning_above))
+        check_words(self.levels, self.max_length)
         if not self.scale:
             raise ValueError("scale must not be 0: every value would be the same")
         return self

@@ -27,7 +27,7 @@ from gateway.rpc.responses.export_stream import ExportStream
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.cloud import CloudState, CloudView
 from gateway.status.fault import Severity
-from gateway.status.meaning import NumberMeaning
+from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.preview import PreviewState, PreviewView
 from gateway.status.recording import RecorderState, RecorderView
 from gateway.status.snapshot import Snapshot
@@ -94,6 +94,7 @@ class GatewayCollector(InstantCollector):
         yield from self._streams()
         yield from _sources(now)
         yield _numbers(now)
+        yield _texts(now)
         yield _faults(now)
         yield from _preview(now.preview)
         failures = self.preview_link.failures
@@ -207,6 +208,20 @@ def _numbers(now: Snapshot) -> Metric:
         if sample.value.value is not None:
             family.add_metric((source.spec.name, meaning.unit), sample.value.value)
     return family
+
+
+def _texts(now: Snapshot) -> Metric:
+    """How bad the configuration's texts are, as far as they can be relied on."""
+    levels = {}
+    for source in now.sources:
+        meaning, sample = source.spec.meaning, now[source.spec]
+        if not isinstance(meaning, TextMeaning) or sample.value is None or sample.freshness.stale:
+            continue
+        if sample.value.text is not None:
+            severity = meaning.severity(sample.value.text)
+            levels[source.spec.name] = severity.rank if severity else 0
+    what = "Texts that the configuration names: 0 good, 1 warning, 2 error; absent while stale or unknown."
+    return _gauges("text_level", what, "source", levels)
 
 
 def _faults(now: Snapshot) -> Metric:

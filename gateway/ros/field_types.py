@@ -1,23 +1,15 @@
 """Whether a message type has the field that a generic source names, and of which kind that is."""
 
-from collections.abc import Callable
 from typing import Any, Final
 
 from common.ros_node import message_class
 from gateway.config import SourceSettings
 from gateway.ros.field_path import steps_of
 
-_NUMBERS: Final = frozenset(
-    {
-        "boolean",
-        "octet",
-        "char",
-        "float",
-        "double",
-        "long double",
-        *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
-    }
+_INTEGERS: Final = frozenset(
+    {"boolean", "octet", "char", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
 )
+_NUMBERS: Final = _INTEGERS | {"float", "double", "long double"}
 """Names of the basic types of IDL that count as numbers; a boolean is 0 or 1."""
 
 
@@ -35,8 +27,13 @@ def check_field(message_type: Any, source: SourceSettings) -> None:
     if source.field is None:
         return
     kind = _kind_at(message_type, source.type, source.field)
-    expected, noun = _EXPECTED[source.kind]
-    if not expected(kind):
+    if source.kind == "number":
+        fits, noun = _is_number(kind), "number"
+    elif source.names:
+        fits, noun = _is_integer(kind), "integer, which 'names' is for"
+    else:
+        fits, noun = _is_string(kind), "text (an integer is one with 'names')"
+    if not fits:
         raise FieldMissingError(f"{source.type}: {source.field} is {_described(kind)}, which is no {noun}")
 
 
@@ -87,6 +84,14 @@ def _is_number(kind: Any) -> bool:
     return getattr(kind, "typename", None) in _NUMBERS
 
 
+def _is_integer(kind: Any) -> bool:
+    return getattr(kind, "typename", None) in _INTEGERS
+
+
+def _is_string(kind: Any) -> bool:
+    return not any(hasattr(kind, name) for name in ("typename", "value_type", "namespaced_name"))
+
+
 def _described(kind: Any) -> str:
     """Returns a type in words."""
     if hasattr(kind, "value_type"):
@@ -96,7 +101,3 @@ def _described(kind: Any) -> str:
 
 def _name(kind: Any) -> str:
     return _message_name(kind) if _is_message(kind) else str(getattr(kind, "typename", "string"))
-
-
-_EXPECTED: Final[dict[str, tuple[Callable[[Any], bool], str]]] = {"number": (_is_number, "number")}
-"""What a field must be by the kind of the source, and the word for it."""

@@ -74,5 +74,30 @@ class NumberMeaning:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class TextMeaning:
+    """What is known of a text.
+
+    Attributes:
+        levels: severities of texts, None of those that are good.
+        other: severity of every other text; None if they are good.
+        remedy: what to do about a bad one; empty for a general sentence.
+    """
+
+    levels: tuple[tuple[str, Severity | None], ...] = ()
+    other: Severity | None = None
+    remedy: str = ""
+
+    def severity(self, text: str) -> Severity | None:
+        """Returns how bad a text is; None if it is good."""
+        return dict(self.levels).get(text, self.other)
+
+    def is_listed(self, text: str) -> bool:
+        """Whether the configuration has a level of exactly this text."""
+        return any(text == listed for listed, _ in self.levels)
+
+
 ANY_NUMBER: Final = NumberMeaning()
 """Of a number without unit and limits."""
+ANY_TEXT: Final = TextMeaning()
+"""Of a text of which every value is good."""

@@ -1,7 +1,7 @@
 """The table of sources: board, snapshot, change detection and configuration take every entry as it is.
 
-Generic kinds (`number`) have one entry: the configuration makes a source of each label. A new kind also needs
-a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
+Generic kinds (`number`, `text`) have one entry: the configuration makes a source of each label. A new kind
+also needs a value type, a reader, a field of the schema and its mapping: docs/adding-a-source.md.
 """
 
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, Final, Generic, TypeVar
 
-from gateway.status.meaning import NumberMeaning
+from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.values import (
     MAX_COMPONENTS,
     Battery,
@@ -20,6 +20,9 @@ from gateway.status.values import (
     Mode,
     Network,
     Number,
+    Orientation,
+    Position,
+    Text,
     Velocity,
     Vision,
 )
@@ -55,7 +58,7 @@ class SourceSpec(Generic[ValueT]):
     value_type: type[ValueT]
     label: str | None = None
     title: str = ""
-    meaning: NumberMeaning | None = None
+    meaning: NumberMeaning | TextMeaning | None = None
     stale_after_ms: int = 1000
     queue_depth: int = 1
     max_items: int | None = None
@@ -101,6 +104,8 @@ DIAGNOSTICS: Final = SourceSpec(
     in_change_key=False,
 )
 MODE: Final = SourceSpec("mode", Mode, stale_after_ms=_DAY_MS, quiet=True)
+POSITION: Final = SourceSpec("position", Position, stale_after_ms=3000)
+ORIENTATION: Final = SourceSpec("orientation", Orientation)
 EFFECTIVE_COMMAND: Final = SourceSpec("effective_command", Velocity, stale_after_ms=500, quiet=True)
 """Output of the robot's command mux."""
 MUX_INPUTS: Final = {
@@ -129,6 +134,8 @@ ROS_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (
     BATTERY,
     DIAGNOSTICS,
     MODE,
+    POSITION,
+    ORIENTATION,
     EFFECTIVE_COMMAND,
     *MUX_INPUTS.values(),
 )
@@ -137,7 +144,9 @@ PLATFORM_SOURCES: Final[tuple[SourceSpec[Any], ...]] = (COMPUTE, NETWORK, ONBOAR
 """Those that the platform sampler writes, from the operating system."""
 NUMBER: Final = SourceSpec("number", Number, stale_after_ms=5000)
 """Stands for the kind; the sources of this kind are those of the configuration, see `number_source`."""
-GENERIC_KINDS: Final[tuple[SourceSpec[Any], ...]] = (NUMBER,)
+TEXT: Final = SourceSpec("text", Text, stale_after_ms=5000)
+"""The same of texts, see `text_source`."""
+GENERIC_KINDS: Final[tuple[SourceSpec[Any], ...]] = (NUMBER, TEXT)
 """Kinds of which the configuration makes sources, each with a label: a field of any message type."""
 SOURCES: Final = (*ROS_SOURCES, *PLATFORM_SOURCES)
 """Every source. The health summary names the first one in this order that is missing."""
@@ -148,3 +157,9 @@ SOURCES: Final = (*ROS_SOURCES, *PLATFORM_SOURCES)
 def number_source(label: str, title: str, meaning: NumberMeaning) -> SourceSpec[Number]:
     """Returns the source of a number; the same one whenever the arguments are equal."""
     return SourceSpec("number", Number, label, title, meaning, stale_after_ms=NUMBER.stale_after_ms)
+
+
+@cache
+def text_source(label: str, title: str, meaning: TextMeaning) -> SourceSpec[Text]:
+    """Returns the source of a text; the same one whenever the arguments are equal."""
+    return SourceSpec("text", Text, label, title, meaning, stale_after_ms=TEXT.stale_after_ms)

@@ -3,6 +3,7 @@
 Unknown values are None. Numbers are finite: the readers discard NaN and infinity.
 """
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum
 from typing import Final, Generic, Self, TypeVar
@@ -92,6 +93,59 @@ class Mode:
     name: str
 
 
+class Fix(Enum):
+    """How a satellite receiver found its position."""
+
+    NONE = "none"
+    """It has none."""
+    FIX = "fix"
+    SBAS = "sbas"
+    """With corrections from a satellite (EGNOS, WAAS)."""
+    GBAS = "gbas"
+    """With corrections from a station on the ground (differential GPS, RTK)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Position on the earth, in WGS 84.
+
+    Attributes:
+        fix: None if the receiver does not report it.
+        latitude_deg: positive is north; None without a position, as longitude is.
+        longitude_deg: positive is east.
+        altitude_m: above the ellipsoid.
+        horizontal_accuracy_m: distance root mean square (DRMS), the root of the two variances' sum.
+        vertical_accuracy_m: standard deviation.
+    """
+
+    fix: Fix | None
+    latitude_deg: float | None
+    longitude_deg: float | None
+    altitude_m: float | None
+    horizontal_accuracy_m: float | None
+    vertical_accuracy_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """Orientation of the robot's body, as rotations about fixed axes x, y, z in this order (REP-103).
+
+    All three are None where the sensor has no estimate.
+    """
+
+    roll_deg: float | None
+    pitch_deg: float | None
+    yaw_deg: float | None
+
+    @property
+    def tilt_deg(self) -> float | None:
+        """Angle between the body's vertical axis and that of the world, 0 to 180."""
+        if self.roll_deg is None or self.pitch_deg is None:
+            return None
+        cosine = math.cos(math.radians(self.roll_deg)) * math.cos(math.radians(self.pitch_deg))
+        return math.degrees(math.acos(cosine))
+
+
 @dataclass(frozen=True, slots=True)
 class Number:
     """A number that the configuration names: a field of any message, in the unit of the configuration.
@@ -101,6 +155,17 @@ class Number:
     """
 
     value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text that the configuration names: one printable line of bounded length.
+
+    Attributes:
+        text: None where the newest message holds none: a list that is too short.
+    """
+
+    text: str | None
 
 
 class DiagnosticLevel(Enum):

@@ -19,6 +19,7 @@ from omniseer.gateway.v1 import (
     gateway_info_pb2,
     overlay_pb2,
     platform_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     robot_gateway_pb2,
@@ -372,7 +373,10 @@ ADDITIONS = [
         + sub(18, text(4, "exploring"))
         + sub(19, text(1, "odometry"))
         + sub(20, uint(3, 61_000))
-        + sub(23, text(1, "cell")),
+        + sub(23, text(1, "cell"))
+        + sub(24, text(1, "gripper"))
+        + sub(25, uint(4, 4))
+        + sub(26, flt(4, 1.5)),
         {
             "insecure": True,
             "faults": [fault_pb2.Fault(id="a"), fault_pb2.Fault(id="b")],
@@ -380,6 +384,63 @@ ADDITIONS = [
             "sources": [source_pb2.SourceStatus(name="odometry")],
             "gateway": gateway_info_pb2.GatewayFacts(uptime_ms=61_000),
             "numbers": [value_pb2.NumberStatus(label="cell")],
+            "texts": [value_pb2.TextStatus(label="gripper")],
+            "position": pose_pb2.PositionStatus(fix=pose_pb2.FIX_STATUS_GBAS),
+            "orientation": pose_pb2.OrientationStatus(roll_deg=1.5),
+        },
+    ),
+    Case(
+        pose_pb2.PositionStatus,
+        uint(1, 1)
+        + uint(2, 1)
+        + uint(3, 40)
+        + uint(4, 2)
+        + dbl(5, 48.1234567)
+        + dbl(6, -11.5)
+        + flt(7, 520.25)
+        + flt(8, 1.5)
+        + flt(9, 2.5),
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 40,
+            "fix": pose_pb2.FIX_STATUS_FIX,
+            "latitude_deg": 48.1234567,
+            "longitude_deg": -11.5,
+            "altitude_m": 520.25,
+            "horizontal_accuracy_m": 1.5,
+            "vertical_accuracy_m": 2.5,
+        },
+    ),
+    Case(
+        pose_pb2.OrientationStatus,
+        uint(1, 1) + uint(2, 1) + uint(3, 40) + flt(4, 1.5) + flt(5, -2.5) + flt(6, 170.25),
+        {
+            "available": True,
+            "stale": True,
+            "age_ms": 40,
+            "roll_deg": 1.5,
+            "pitch_deg": -2.5,
+            "yaw_deg": 170.25,
+        },
+    ),
+    Case(
+        value_pb2.TextStatus,
+        text(1, "gripper")
+        + text(2, "Gripper")
+        + uint(3, 1)
+        + uint(4, 1)
+        + uint(5, 40)
+        + text(6, "jam")
+        + uint(7, 3),
+        {
+            "label": "gripper",
+            "title": "Gripper",
+            "available": True,
+            "stale": True,
+            "age_ms": 40,
+            "text": "jam",
+            "level": value_pb2.TEXT_LEVEL_ERROR,
         },
     ),
     Case(

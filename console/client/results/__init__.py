@@ -45,6 +45,7 @@ from console.client.results.overlay import (
     WatchedStatus,
 )
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
+from console.client.results.pose import FixStatus, Orientation, Position
 from console.client.results.preview import (
     Encoder,
     KeyFrameAnswer,
@@ -102,4 +103,4 @@ from console.client.results.status import (
     TeleopState,
     Vision,
 )
-from console.client.results.value import NumberLevel, NumberValue
+from console.client.results.value import NumberLevel, NumberValue, TextLevel, TextValue

@@ -7,10 +7,11 @@ from console.client.results.cloud import CloudStatus
 from console.client.results.driving import DriveInhibit, DrivePhase, StopLatch
 from console.client.results.fault import Fault
 from console.client.results.platform import Platform
+from console.client.results.pose import Orientation, Position
 from console.client.results.preview import PreviewStatus
 from console.client.results.recording import RecordingStatus
 from console.client.results.sample import Sample, Source
-from console.client.results.value import NumberValue
+from console.client.results.value import NumberValue, TextValue
 
 
 class HealthState(Enum):
@@ -166,8 +167,12 @@ class SystemStatus:
     """None where the robot is not set up for recording."""
     cloud: CloudStatus | None
     """None where the robot is not set up for a fleet."""
+    position: Position
+    orientation: Orientation
     numbers: tuple[NumberValue, ...]
     """Numbers that the robot's configuration names."""
+    texts: tuple[TextValue, ...]
+    """Texts that the robot's configuration names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,29 @@ class NumberLevel(Enum):
     ERROR_HIGH = "error_high"
 
 
+class TextLevel(Enum):
+    """How bad a text is, by the robot's configuration."""
+
+    UNKNOWN = "unknown"
+    """There is no text."""
+    GOOD = "good"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextValue(Sample):
+    """A text that the robot's configuration names."""
+
+    label: str
+    """Short and stable: "gripper"; its source is "text.gripper"."""
+    title: str
+    """Its name for people."""
+    text: str | None
+    """One line. None also where the newest message holds no text."""
+    level: TextLevel
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NumberValue(Sample):
     """A number that the robot's configuration names. Limits are None where there is no such limit."""

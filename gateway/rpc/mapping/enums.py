@@ -22,10 +22,12 @@ from gateway.status.recording import (
 )
 from gateway.status.source_view import SourceState
 from gateway.status.teleop import DriveInhibit, DrivePhase
+from gateway.status.values import Fix
 from omniseer.gateway.v1 import (
     cloud_pb2,
     event_pb2,
     fault_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     source_pb2,
@@ -54,12 +56,18 @@ DELIVERIES: Final = _or_none(Delivery, preview_pb2.PictureDelivery, "PICTURE_DEL
 HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")
 SEVERITIES: Final = _by_name(Severity, fault_pb2.FaultSeverity, "FAULT_SEVERITY")
 SOURCE_STATES: Final = _by_name(SourceState, source_pb2.SourceState, "SOURCE_STATE")
+FIXES: Final = _by_name(Fix, pose_pb2.FixStatus, "FIX_STATUS")
 NUMBER_LEVELS: Final = {
     (severity, side): value_pb2.NumberLevel.Value(f"NUMBER_LEVEL_{severity.name}_{side.name}")
     for severity in (Severity.WARNING, Severity.ERROR)
     for side in Side
 }
 """Of numbers beyond a limit."""
+TEXT_LEVELS: Final = {
+    severity: value_pb2.TextLevel.Value(f"TEXT_LEVEL_{severity.name}")
+    for severity in (Severity.WARNING, Severity.ERROR)
+}
+"""Of texts that are bad."""
 CONTROL_RESULTS: Final = _by_name(ControlResult, event_pb2.ControlResult, "CONTROL_RESULT")
 TELEOP_STATES: Final = {False: states_pb2.TELEOP_DISABLED, True: states_pb2.TELEOP_ENABLED}
 DRIVE_PHASES: Final = _by_name(DrivePhase, teleop_pb2.DrivePhase, "DRIVE_PHASE")

@@ -10,6 +10,7 @@ from gateway.rpc.mapping.faults import fill_fault
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.rpc.mapping.info import gateway_facts
 from gateway.rpc.mapping.platform import platform_status
+from gateway.rpc.mapping.pose import orientation_status, position_status
 from gateway.rpc.mapping.preview import preview_status
 from gateway.rpc.mapping.recording import recording_status
 from gateway.rpc.mapping.teleop import teleop_status
@@ -26,6 +27,8 @@ from gateway.status.sources import (
     MODE,
     MUX_INPUTS,
     ODOMETRY,
+    ORIENTATION,
+    POSITION,
     VISION,
 )
 from gateway.status.values import Detection, Detections, Mode, Velocity, Vision
@@ -53,6 +56,8 @@ def system_status(snapshot: Snapshot, recipient: Recipient) -> system_status_pb2
         platform=platform_status(snapshot),
         effective_command=_command(snapshot.command),
         mission=_mission(snapshot[MODE]),
+        position=position_status(snapshot[POSITION]),
+        orientation=orientation_status(snapshot[ORIENTATION]),
         insecure=snapshot.identity.insecure,
         gateway=gateway_facts(snapshot.gateway),
         teleop=teleop_status(snapshot.teleop, snapshot.at_s) if snapshot.teleop else None,

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.faults.no_value import no_value_fault
 from gateway.status.freshness import Sample
 from gateway.status.meaning import NumberMeaning, Side, Violation
 from gateway.status.snapshot import Snapshot
-from gateway.status.source_view import SourceView
 from gateway.status.sources import SourceSpec
 from gateway.status.values import Number
 
@@ -26,7 +26,8 @@ def number_faults(snapshot: Snapshot) -> Iterator[Condition]:
         if isinstance(meaning, NumberMeaning):
             sample = snapshot[source.spec]
             yield from _limit(source.spec, meaning, sample, snapshot.faults)
-            yield from _no_value(source, sample)
+            if sample.value and sample.value.value is None:
+                yield from no_value_fault(source, "a number", "it sends NaN, infinity, or a list too short")
 
 
 def violation_of(
@@ -68,15 +69,3 @@ def _limit(
         f"{spec.display_name} is {word}: {limit} {beyond}",
         meaning.remedy or f"Check {spec.display_name} on the robot; its configuration has the limits",
     )
-
-
-def _no_value(source: SourceView, sample: Sample[Number]) -> Iterator[Condition]:
-    if sample.freshness.fresh and sample.value is not None and sample.value.value is None:
-        name = source.spec.display_name
-        yield Condition(
-            f"{source.spec.name}.no_value",
-            Severity.ERROR if source.required else Severity.WARNING,
-            name,
-            f"{name} arrives without a number: it is unknown, and no fault beyond a limit",
-            "Check its sensor and the program that publishes it: it sends NaN, infinity, or a list too short",
-        )

@@ -1,4 +1,4 @@
-"""Faults of the robot's computer and batteries, found by limits with hysteresis: noise raises no events."""
+"""Faults of computer, batteries and attitude, found by limits with hysteresis: noise raises no events."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from gateway.status.fault import Condition, Severity
 from gateway.status.freshness import Sample
 from gateway.status.limit import Limit
 from gateway.status.snapshot import Snapshot
-from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY
+from gateway.status.sources import BATTERY, COMPUTE, NETWORK, ONBOARD_BATTERY, ORIENTATION
 from gateway.status.values import Battery
 
 _COMPUTER: Final = "computer"
@@ -17,13 +17,14 @@ _COOL_DOWN: Final = "Check fan and dust, reduce the load (preview profile), let 
 
 @dataclass(frozen=True, slots=True)
 class PlatformLimits:
-    """The limits of the robot's computer and batteries."""
+    """The limits of the robot's computer, batteries and attitude."""
 
     temperature_c: Limit
     memory_percent: Limit
     disk_percent: Limit
     battery_percent: Limit
     wifi_signal_dbm: Limit
+    tilt_deg: Limit
 
 
 def platform_faults(
@@ -94,6 +95,17 @@ def _checks(snapshot: Snapshot, limits: PlatformLimits) -> Iterator[tuple[float 
             "network",
             f"the Wi-Fi signal is weak: {limits.wifi_signal_dbm.raise_at:g} dBm or less",
             "Move the robot closer to the access point, or select a smaller preview profile",
+        ),
+    )
+    orientation = snapshot[ORIENTATION].value if snapshot[ORIENTATION].freshness.fresh else None
+    yield (
+        orientation.tilt_deg if orientation else None,
+        limits.tilt_deg,
+        _warning(
+            "orientation.tilt",
+            "orientation",
+            f"the robot is tilted: {limits.tilt_deg.raise_at:g}° or more",
+            "Stop it before it falls; if it stands level, check how its IMU is mounted, or faults.tilt_deg",
         ),
     )
     charge = f"is low: {limits.battery_percent.raise_at:g} % or less"

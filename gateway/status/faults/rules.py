@@ -10,9 +10,11 @@ from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.driving import driving_faults
 from gateway.status.faults.numbers import number_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
+from gateway.status.faults.position import position_faults
 from gateway.status.faults.preview import preview_faults
 from gateway.status.faults.recording import recording_faults
 from gateway.status.faults.sources import sampler_fault, source_faults
+from gateway.status.faults.texts import text_faults
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import DIAGNOSTICS
 
@@ -60,6 +62,8 @@ def conditions(
     yield from cloud_faults(
         snapshot.cloud, snapshot.at_s, offline_after_s=rules.hub_offline_s, settled=settled
     )
+    yield from position_faults(snapshot)
     yield from number_faults(snapshot)
+    yield from text_faults(snapshot)
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

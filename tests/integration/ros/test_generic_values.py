@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +12,12 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, JointState, Temperature
-from std_msgs.msg import Bool, Byte, Float64MultiArray, UInt64
+from std_msgs.msg import Bool, Byte, Float64MultiArray, String, UInt64
 
 from common.findings import Verdict
 from gateway.config import SourceSettings
 from gateway.ros.doctor import ros_findings
+from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.intake import intake
 from gateway.status.board import Board
 from omniseer.gateway.v1 import source_pb2, value_pb2
@@ -82,6 +84,51 @@ def test_a_field_of_any_type(
     assert not board.undecodable
 
 
+TEXTS: list[tuple[str, str, Any, dict[str, Any], str | None]] = [
+    ("std_msgs/msg/String", "data", String(data="two\n\x1b[31mlines"), {}, "two \ufffd[31mlines"),
+    ("std_msgs/msg/String", "data", String(data="x" * 500_000), {"max_length": 4}, "xxx\u2026"),
+    ("sensor_msgs/msg/JointState", "name[1]", JointState(name=["a", "b"]), {}, "b"),
+    ("sensor_msgs/msg/JointState", "name[2]", JointState(name=["a", "b"]), {}, None),
+    ("diagnostic_msgs/msg/DiagnosticArray", "status[1].values[0].value", diagnostics(b"\0"), {}, "b"),
+    (
+        "sensor_msgs/msg/BatteryState",
+        "power_supply_health",
+        BatteryState(power_supply_health=3),
+        {"names": {3: "dead"}},
+        "dead",
+    ),
+    ("std_msgs/msg/Bool", "data", Bool(data=True), {"names": {0: "off", 1: "on"}}, "on"),
+]
+
+
+@pytest.mark.parametrize("case", TEXTS, ids=lambda case: f"{case[0]}-{case[1]}")
+def test_a_text_of_any_type(talker: Talker, case: tuple[str, str, Any, dict[str, Any], str | None]) -> None:
+    type_name, field, message, more, expected = case
+    source = SourceSettings(**number("x", type_name, field, **more) | {"kind": "text"})
+    board = Board()
+    with intake((source,), board) as running:
+        talker.say(running, source.topic, message)
+        wait_until(lambda: board[source.spec] is not None, "the text")
+    received = board[source.spec]
+    assert received
+    assert received.value.text == expected
+
+
+@pytest.mark.parametrize(
+    ("field", "more", "words"),
+    [
+        ("voltage", {}, "is of type float, which is no text (an integer is one with 'names')"),
+        ("voltage", {"names": {0: "a"}}, "is of type float, which is no integer, which 'names' is for"),
+        ("location", {"names": {0: "a"}}, "is of type string, which is no integer"),
+        ("header", {}, "is of type std_msgs/msg/Header, which is no text"),
+    ],
+)
+def test_a_field_that_is_no_text(field: str, more: dict[str, Any], words: str) -> None:
+    source = SourceSettings(**number("x", "sensor_msgs/msg/BatteryState", field, **more) | {"kind": "text"})
+    with pytest.raises(FieldMissingError, match=re.escape(words)):
+        check_field(BatteryState, source)
+
+
 MISSING = [
     ("sensor_msgs/msg/Temperature", "temp", "has no field 'temp'; it has header, temperature, variance"),
     ("sensor_msgs/msg/Temperature", "header.frame_id", "is of type string, which is no number"),
@@ -127,6 +174,14 @@ SOURCES = [
         error_above={"raise_at": 95, "clear_at": 90},
         remedy="Let it cool down",
     ),
+    {
+        "kind": "text",
+        "label": "gripper",
+        "topic": "/gripper",
+        "type": "std_msgs/msg/String",
+        "field": "data",
+        "levels": {"jammed": "error"},
+    },
     number("broken", "sensor_msgs/msg/Temperature", "temp"),
 ]
 
@@ -185,6 +240,21 @@ def test_from_the_configuration_to_the_operator(talker: Talker, tmp_path: Path) 
             ),
             "the event of the end",
         )
+
+        said = talker.publisher("/gripper", String)
+
+        def jammed() -> bool:
+            said.publish(String(data="jammed"))
+            return bool(gateway.status().texts[0].level == value_pb2.TEXT_LEVEL_ERROR)
+
+        wait_until(jammed, "the text")
+        assert gateway.status().texts[0].text == "jammed"
+        wait_until(
+            lambda: "error: gripper: jammed" in {event.message for event in gateway.overlay().events},
+            "the event of the text",
+        )
+        table = robotctl(*target, "status", COLUMNS="200").stdout
+        assert any("gripper" in line and "ERROR" in line and "jammed" in line for line in table.splitlines())
 
         broken = gateway.source("number.broken")
         assert broken.state == source_pb2.SOURCE_STATE_FIELD_MISSING

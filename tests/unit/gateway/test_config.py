@@ -7,6 +7,7 @@ from gateway.config import DEFAULT_SOURCES, GatewaySettings, load_settings
 
 NUMBER = "{kind: number, topic: /a, type: n/msg/O, label: x"
 """A source of this kind, without its field and its end."""
+TEXT = "{kind: text, topic: /a, type: n/msg/O, label: x, field: a"
 
 
 def load(tmp_path: Path, text: str) -> GatewaySettings:
@@ -47,7 +48,7 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         (
             "sources: [{kind: smell, topic: /x, type: a/msg/B, stale_after_ms: 1}]",
             "key 'sources.0.kind' is 'smell', expected: one of odometry, vision, detections, battery, "
-            "diagnostics, mode, effective_command, mux_input",
+            "diagnostics, mode, position, orientation, effective_command, mux_input",
         ),
         ("sources: [{kind: compute, topic: /x, type: a/msg/B, stale_after_ms: 1}]", "sources.0.kind"),
         ("grpc: {host: 0.0.0.0}", "anyone on that network"),
@@ -64,11 +65,11 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         ),
         (
             "sources: [{kind: mux_input, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
-            "only sources of kind mux_input (keyboard, autonomy, navigation) and number (any) have a label",
+            "sources of kind mux_input (keyboard, autonomy, navigation) and number, text (any) have a label",
         ),
         (
             "sources: [{kind: mode, label: keyboard, topic: /a, type: n/msg/O, stale_after_ms: 1}]",
-            "and number (any) have a label",
+            "and number, text (any) have a label",
         ),
         (
             "sources: [{kind: odometry, topic: my odom, type: nav_msgs/msg/Odometry}]",
@@ -86,6 +87,11 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
             "has a label of its own",
         ),
         (f'sources: [{NUMBER}, field: a, unit: "\\e[1m"}}]', "expected: printable text"),
+        (f"sources: [{TEXT}, scale: 2}}]", "has no key 'scale'"),
+        (f"sources: [{TEXT}, levels: {{jammed: bad}}}}]", "levels.jammed"),
+        (f"sources: [{TEXT}, max_length: 3, levels: {{jammed: error}}}}]", "texts are cut to max_length (3)"),
+        (f"sources: [{TEXT}, names: {{x: jammed}}}}]", "a whole number"),
+        (f"sources: [{NUMBER}, field: a, levels: {{jammed: error}}}}]", "has no key 'levels'"),
         (f"sources: [{NUMBER}, field: a, scale: 0}}]", "scale must not be 0"),
         (f"sources: [{NUMBER}, field: a, scale: .nan}}]", "a finite number"),
         (

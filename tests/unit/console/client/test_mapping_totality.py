@@ -57,6 +57,7 @@ from omniseer.gateway.v1 import (
     gateway_info_pb2,
     overlay_pb2,
     platform_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     robot_gateway_pb2,
@@ -77,6 +78,7 @@ FILES: Final = (
     gateway_info_pb2,
     overlay_pb2,
     platform_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     robot_gateway_pb2,
@@ -105,7 +107,9 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.GapReason, event_pb2.EventGapReason),
         (results.PreviewState, states_pb2.PreviewState),
         (results.SourceState, source_pb2.SourceState),
+        (results.FixStatus, pose_pb2.FixStatus),
         (results.NumberLevel, value_pb2.NumberLevel),
+        (results.TextLevel, value_pb2.TextLevel),
         (results.FaultSeverity, fault_pb2.FaultSeverity),
         (results.HealthState, states_pb2.RobotHealthState),
         (results.TeleopState, states_pb2.TeleopState),
@@ -200,6 +204,14 @@ INLINED: Final = {
 }
 """Submessages without an object of their own: their fields stand in the result of the message around them."""
 
+POSITION_PARTS: Final = (
+    "latitude_deg",
+    "longitude_deg",
+    "altitude_m",
+    "horizontal_accuracy_m",
+    "vertical_accuracy_m",
+)
+ANGLES: Final = ("roll_deg", "pitch_deg", "yaw_deg")
 NUMBER_LIMITS: Final = ("error_below", "warning_below", "warning_above", "error_above")
 PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     "VisionStatus.available": (
@@ -226,8 +238,14 @@ PRESENCE: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "EffectiveCommand.available": ("age_ms", "vx_mps", "vy_mps", "wz_rad_s", "active_source"),
     "MissionStatus.available": ("age_ms", "mode"),
+    "PositionStatus.available": ("age_ms", *POSITION_PARTS),
+    **{f"PositionStatus.{name}": (name,) for name in POSITION_PARTS},
+    "OrientationStatus.available": ("age_ms", *ANGLES),
+    **{f"OrientationStatus.{name}": (name,) for name in ANGLES},
     "NumberStatus.available": ("age_ms", "value", "decimals", *NUMBER_LIMITS),
     "NumberStatus.value": ("value",),
+    "TextStatus.available": ("age_ms", "text"),
+    "TextStatus.text": ("text",),
     "NumberStatus.decimals": ("decimals",),
     **{f"NumberStatus.{name}": (name,) for name in NUMBER_LIMITS},
     "SourceStatus.available": ("age_ms",),

@@ -7,7 +7,7 @@ import pytest
 from console.client.mapping.methods import GET_OVERLAY_SNAPSHOT
 from console.presentation.severity_style import SeverityStyle
 from console.presentation.status_table import Row, View, table_rows
-from omniseer.gateway.v1 import overlay_pb2, source_pb2, value_pb2
+from omniseer.gateway.v1 import overlay_pb2, pose_pb2, source_pb2, value_pb2
 from omniseer.gateway.v1 import states_pb2 as states
 from tests.support.gateway_double import healthy_status
 
@@ -95,3 +95,34 @@ def test_numbers_of_the_configuration(message: overlay_pb2.OverlaySnapshot) -> N
     assert rows["Old"] == Row("Old", "STALE", SeverityStyle.WARNING, "1", "9.0 s")
     assert rows["Never"] == Row("Never", "no data", SeverityStyle.QUIET, "")
     assert [row.label for row in table_rows(replace(view(message), compact=False))].count("cell 3") == 1
+
+
+def test_texts_of_the_configuration(message: overlay_pb2.OverlaySnapshot) -> None:
+    add = message.status.texts.add
+    add(title="gripper", available=True, text="holds a bottle, firmly", level=value_pb2.TEXT_LEVEL_GOOD)
+    add(title="arm", available=True, text="jammed", level=value_pb2.TEXT_LEVEL_ERROR)
+    add(title="lamp", available=True, text="", level=value_pb2.TEXT_LEVEL_WARNING)
+    add(title="list", available=True)
+    rows = by_label(view(message))
+    assert rows["Gripper"] == Row("Gripper", "fresh", SeverityStyle.GOOD, "holds a bottle, firmly")
+    assert rows["Arm"] == Row("Arm", "ERROR", SeverityStyle.BAD, "jammed")
+    assert (rows["Lamp"].mark, rows["Lamp"].text) == ("WARNING", "")
+    assert rows["List"] == Row("List", "UNKNOWN", SeverityStyle.WARNING, "-")
+
+
+def test_position_and_attitude(message: overlay_pb2.OverlaySnapshot) -> None:
+    assert not {"Position", "Attitude"} & set(by_label(view(message))), "this robot reports neither"
+    status = message.status
+    status.position.available = status.orientation.available = True
+    rows = by_label(view(message))
+    assert (rows["Position"].mark, rows["Position"].text) == ("NO FIX", "-")
+    assert (rows["Attitude"].mark, rows["Attitude"].text) == ("UNKNOWN", "-")
+    position, attitude = status.position, status.orientation
+    position.latitude_deg, position.longitude_deg, position.horizontal_accuracy_m = 48.1234567, -11.5, 1.5
+    attitude.roll_deg, attitude.pitch_deg, attitude.yaw_deg = 1.5, -2.5, 170
+    position.fix, position.altitude_m = pose_pb2.FIX_STATUS_GBAS, 520
+    rows = by_label(view(message))
+    assert rows["Position"].text == "48.123457°, -11.500000°, ±\u00a01.5\u00a0m"
+    assert rows["Attitude"].text == "roll\u00a0+1.5°, pitch\u00a0-2.5°, yaw\u00a0+170.0°"
+    full = by_label(replace(view(message), compact=False))
+    assert full["position"].text == "48.123457°, -11.500000°, ± 1.5 m, altitude 520.0 m, GBAS"

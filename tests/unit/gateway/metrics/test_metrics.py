@@ -22,7 +22,7 @@ from gateway.rpc.interceptors.stats import MethodStats, Stats
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
 from gateway.status.fault import Condition, Fault, Severity
-from gateway.status.meaning import NumberMeaning
+from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
@@ -36,8 +36,8 @@ from gateway.status.preview import (
     Stream,
 )
 from gateway.status.snapshot import Identity, Rules, Runtime, Snapshot, SourceRule, take
-from gateway.status.sources import ODOMETRY, VISION, number_source
-from gateway.status.values import Number, Received, Velocity
+from gateway.status.sources import ODOMETRY, VISION, SourceSpec, number_source, text_source
+from gateway.status.values import Number, Received, Text, Velocity
 from tests.support.cloud_views import uploading_view
 from tests.support.drive_views import stopped_view
 from tests.support.eventually import eventually
@@ -191,19 +191,27 @@ def test_the_robot_and_its_sources() -> None:
     assert shown["robot_gateway_faults", "severity=info"] == 0
 
 
-def test_the_numbers_of_the_configuration_that_can_be_relied_on() -> None:
+def test_the_values_of_the_configuration_that_can_be_relied_on() -> None:
     fresh, stale, unknown, missing = (
         number_source(label, "", NumberMeaning(unit="°C"))
         for label in ("fresh", "stale", "unknown", "missing")
     )
+    gripper, lamp, door = (
+        text_source(label, "", TextMeaning((("jammed", Severity.ERROR),)))
+        for label in ("gripper", "lamp", "door")
+    )
+    sources: tuple[SourceSpec[Any], ...] = (fresh, stale, unknown, missing, gripper, lamp, door)
     now = take(
         identity=Identity("lab", "1.2.3", insecure=False),
-        rules=Rules(dict.fromkeys((fresh, stale, unknown, missing), SourceRule(1000, False)), 3000),
+        rules=Rules(dict.fromkeys(sources, SourceRule(1000, False)), 3000),
         board=Board(
             {
                 fresh: Received(Number(0.0), NOW_S),
                 stale: Received(Number(7.0), NOW_S - 2),
                 unknown: Received(Number(None), NOW_S),
+                gripper: Received(Text("jammed"), NOW_S),
+                lamp: Received(Text("on"), NOW_S),
+                door: Received(Text("jammed"), NOW_S - 2),
             }
         ),
         preview=PREVIEW,
@@ -213,6 +221,8 @@ def test_the_numbers_of_the_configuration_that_can_be_relied_on() -> None:
     shown = values(Stats(), now)
     numbers = {labels: value for (name, labels), value in shown.items() if name == "robot_gateway_number"}
     assert numbers == {"source=number.fresh unit=°C": 0.0}
+    levels = {labels: value for (name, labels), value in shown.items() if name == "robot_gateway_text_level"}
+    assert levels == {"source=text.gripper": 2, "source=text.lamp": 0}
 
 
 def test_the_running_preview() -> None:

@@ -10,7 +10,7 @@ import pytest
 from gateway.config import SourceSettings
 from gateway.ros.field_path import Step, steps_of, value_at
 from gateway.ros.readers import reader_for
-from gateway.status.values import Number
+from gateway.status.values import Number, Text
 
 
 def number(message: Any, field: str, **more: Any) -> float | None:
@@ -70,3 +70,40 @@ def test_smaller_differences_than_are_shown_are_none() -> None:
     assert number(SimpleNamespace(x=20.04), "x", decimals=1) == number(
         SimpleNamespace(x=19.96), "x", decimals=1
     )
+
+
+def text(message: Any, field: str = "data", **more: Any) -> str | None:
+    settings = SourceSettings(
+        kind="text", label="x", topic="/t", type="any_msgs/msg/Any", field=field, **more
+    )
+    value = reader_for(settings)(message, settings)
+    assert isinstance(value, Text)
+    return value.text
+
+
+@pytest.mark.parametrize(
+    ("raw", "expected"),
+    [
+        ("open", "open"),
+        ("  open\n", "open"),
+        ("", ""),
+        ("two\nlines", "two lines"),
+        ("\x1b[2Jgone\x00", "\ufffd[2Jgone\ufffd"),
+        ("\udcff", "\ufffd"),
+        ("a" * 80, "a" * 80),
+        ("a" * 1_000_000, "a" * 79 + "\u2026"),
+    ],
+)
+def test_a_text_is_one_printable_line(raw: str, expected: str) -> None:
+    assert text(SimpleNamespace(data=raw)) == expected
+
+
+def test_names_of_numbers() -> None:
+    names = {0: "open", 1: "closed", 255: "jammed"}
+    assert [text(SimpleNamespace(data=raw), names=names) for raw in (0, True, b"\xff", 7)] == [
+        "open",
+        "closed",
+        "jammed",
+        "7",
+    ]
+    assert text(SimpleNamespace(data=[]), "data[0]", names=names) is None

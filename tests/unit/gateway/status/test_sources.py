@@ -18,7 +18,7 @@ from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.mapping.status import NOT_MAPPED, overlay_snapshot
 from gateway.status.board import Board
 from gateway.status.change import change_key
-from gateway.status.meaning import ANY_NUMBER
+from gateway.status.meaning import ANY_NUMBER, ANY_TEXT
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState
 from gateway.status.sources import (
@@ -31,6 +31,7 @@ from gateway.status.sources import (
     SOURCES,
     SourceSpec,
     number_source,
+    text_source,
 )
 from gateway.status.values import Received
 from tests.support.filled_values import filled_value
@@ -42,7 +43,10 @@ RECIPIENT = Recipient("10.0.0.1", sees_passphrase=False)
 NO_CHANGE = {DETECTIONS, DIAGNOSTICS, *MUX_INPUTS.values()}
 """Sources whose values alone change nothing that the status shows."""
 
-OF_THE_CONFIGURATION = {"number": number_source("one", "", ANY_NUMBER)}
+OF_THE_CONFIGURATION: dict[str, SourceSpec[Any]] = {
+    "number": number_source("one", "", ANY_NUMBER),
+    "text": text_source("one", "", ANY_TEXT),
+}
 """A source of each generic kind."""
 by_name = pytest.mark.parametrize(
     "spec", [*SOURCES, *OF_THE_CONFIGURATION.values()], ids=lambda spec: spec.name
@@ -109,6 +113,8 @@ def test_a_value_has_a_field_in_the_contract_unless_the_source_is_named(spec: So
     for message in (without, given):
         if spec.name.startswith("number."):
             assert message.status.numbers[0].HasField("value") == (message is given)
+        if spec.name.startswith("text."):
+            assert message.status.texts[0].HasField("text") == (message is given)
         message.status.ClearField("sources")
         message.status.ClearField("effective_command")
     assert (without == given) == (spec in NOT_MAPPED)

@@ -11,6 +11,7 @@ from omniseer.gateway.v1 import cloud_pb2 as _cloud_pb2
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
 from omniseer.gateway.v1 import gateway_info_pb2 as _gateway_info_pb2
 from omniseer.gateway.v1 import platform_pb2 as _platform_pb2
+from omniseer.gateway.v1 import pose_pb2 as _pose_pb2
 from omniseer.gateway.v1 import preview_pb2 as _preview_pb2
 from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 from omniseer.gateway.v1 import source_pb2 as _source_pb2
@@ -53,6 +54,9 @@ class SystemStatus(_message.Message):
     RECORDING_FIELD_NUMBER: _builtins.int
     CLOUD_FIELD_NUMBER: _builtins.int
     NUMBERS_FIELD_NUMBER: _builtins.int
+    TEXTS_FIELD_NUMBER: _builtins.int
+    POSITION_FIELD_NUMBER: _builtins.int
+    ORIENTATION_FIELD_NUMBER: _builtins.int
     gateway_name: _builtins.str
     """The configured name of this robot's gateway."""
     gateway_version: _builtins.str
@@ -116,6 +120,18 @@ class SystemStatus(_message.Message):
     def numbers(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.NumberStatus]:
         """Numbers of the robot's own, in the order of its configuration."""
 
+    @_builtins.property
+    def texts(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.TextStatus]:
+        """Texts of the robot's own, in the order of its configuration."""
+
+    @_builtins.property
+    def position(self) -> _pose_pb2.PositionStatus:
+        """Where the robot is."""
+
+    @_builtins.property
+    def orientation(self) -> _pose_pb2.OrientationStatus:
+        """How the robot stands."""
+
     def __init__(
         self,
         *,
@@ -135,10 +151,13 @@ class SystemStatus(_message.Message):
         recording: _recording_pb2.RecordingStatus | None = ...,
         cloud: _cloud_pb2.CloudStatus | None = ...,
         numbers: _abc.Iterable[_value_pb2.NumberStatus] | None = ...,
+        texts: _abc.Iterable[_value_pb2.TextStatus] | None = ...,
+        position: _pose_pb2.PositionStatus | None = ...,
+        orientation: _pose_pb2.OrientationStatus | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "platform", b"platform", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "gateway", b"gateway", "health", b"health", "mission", b"mission", "orientation", b"orientation", "platform", b"platform", "position", b"position", "preview", b"preview", "recording", b"recording", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "numbers", b"numbers", "platform", b"platform", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "vision", b"vision"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cloud", b"cloud", "effective_command", b"effective_command", "faults", b"faults", "gateway", b"gateway", "gateway_name", b"gateway_name", "gateway_version", b"gateway_version", "health", b"health", "insecure", b"insecure", "mission", b"mission", "numbers", b"numbers", "orientation", b"orientation", "platform", b"platform", "position", b"position", "preview", b"preview", "recording", b"recording", "sources", b"sources", "teleop", b"teleop", "texts", b"texts", "vision", b"vision"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

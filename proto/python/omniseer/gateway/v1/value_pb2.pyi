@@ -53,6 +53,34 @@ NUMBER_LEVEL_ERROR_HIGH: NumberLevel.ValueType  # 5
 """At the upper limit of an error, or above."""
 Global___NumberLevel: _TypeAlias = NumberLevel  # noqa: Y015
 
+class _TextLevel:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _TextLevelEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_TextLevel.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    TEXT_LEVEL_UNSPECIFIED: _TextLevel.ValueType  # 0
+    """Not known: no text was received."""
+    TEXT_LEVEL_GOOD: _TextLevel.ValueType  # 1
+    """Good, or without any level."""
+    TEXT_LEVEL_WARNING: _TextLevel.ValueType  # 2
+    """A warning."""
+    TEXT_LEVEL_ERROR: _TextLevel.ValueType  # 3
+    """An error."""
+
+class TextLevel(_TextLevel, metaclass=_TextLevelEnumTypeWrapper):
+    """How bad a text is, by the robot's configuration."""
+
+TEXT_LEVEL_UNSPECIFIED: TextLevel.ValueType  # 0
+"""Not known: no text was received."""
+TEXT_LEVEL_GOOD: TextLevel.ValueType  # 1
+"""Good, or without any level."""
+TEXT_LEVEL_WARNING: TextLevel.ValueType  # 2
+"""A warning."""
+TEXT_LEVEL_ERROR: TextLevel.ValueType  # 3
+"""An error."""
+Global___TextLevel: _TypeAlias = TextLevel  # noqa: Y015
+
 @_typing.final
 class NumberStatus(_message.Message):
     """A number that the robot's configuration names."""
@@ -147,3 +175,53 @@ class NumberStatus(_message.Message):
     def WhichOneof(self, oneof_group: _WhichOneofArgType__warning_below) -> _WhichOneofReturnType__warning_below | None: ...
 
 Global___NumberStatus: _TypeAlias = NumberStatus  # noqa: Y015
+
+@_typing.final
+class TextStatus(_message.Message):
+    """A text that the robot's configuration names."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LABEL_FIELD_NUMBER: _builtins.int
+    TITLE_FIELD_NUMBER: _builtins.int
+    AVAILABLE_FIELD_NUMBER: _builtins.int
+    STALE_FIELD_NUMBER: _builtins.int
+    AGE_MS_FIELD_NUMBER: _builtins.int
+    TEXT_FIELD_NUMBER: _builtins.int
+    LEVEL_FIELD_NUMBER: _builtins.int
+    label: _builtins.str
+    """Short and stable: "gripper". SystemStatus.sources has its state as "text.gripper"."""
+    title: _builtins.str
+    """Its name for people: "Gripper"."""
+    available: _builtins.bool
+    """Whether a message with it has been received."""
+    stale: _builtins.bool
+    """Whether the newest message is older than the limit configured for it."""
+    age_ms: _builtins.int
+    """Age of the newest message, in ms. 0 when none was received."""
+    text: _builtins.str
+    """The text in the robot's own words: one printable line, cut to the configured length. Unset: none was received,
+    or the newest message holds none.
+    """
+    level: Global___TextLevel.ValueType
+    """How bad it is; that of the last known text while no newer one comes."""
+    def __init__(
+        self,
+        *,
+        label: _builtins.str = ...,
+        title: _builtins.str = ...,
+        available: _builtins.bool = ...,
+        stale: _builtins.bool = ...,
+        age_ms: _builtins.int = ...,
+        text: _builtins.str | None = ...,
+        level: Global___TextLevel.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_text", b"_text", "text", b"text"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_text", b"_text", "age_ms", b"age_ms", "available", b"available", "label", b"label", "level", b"level", "stale", b"stale", "text", b"text", "title", b"title"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__text: _TypeAlias = _typing.Literal["text"]  # noqa: Y015
+    _WhichOneofArgType__text: _TypeAlias = _typing.Literal["_text", b"_text"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__text) -> _WhichOneofReturnType__text | None: ...
+
+Global___TextStatus: _TypeAlias = TextStatus  # noqa: Y015

@@ -41,6 +41,8 @@ from gateway.status.sources import (
     NETWORK,
     ODOMETRY,
     ONBOARD_BATTERY,
+    ORIENTATION,
+    POSITION,
     SOURCES,
     VISION,
     SourceSpec,
@@ -51,13 +53,16 @@ from gateway.status.values import (
     Compute,
     Detection,
     Detections,
+    Fix,
     Mode,
     Network,
+    Orientation,
+    Position,
     Received,
     Velocity,
     Vision,
 )
-from omniseer.gateway.v1 import fault_pb2, preview_pb2, source_pb2, states_pb2, teleop_pb2
+from omniseer.gateway.v1 import fault_pb2, pose_pb2, preview_pb2, source_pb2, states_pb2, teleop_pb2
 from tests.support.drive_views import stopped_view
 
 NOW_S = 1000.0
@@ -78,6 +83,8 @@ VALUES: dict[SourceSpec[Any], tuple[Any, float]] = {
     MUX_INPUTS[CommandSource.KEYBOARD]: (COMMAND, 0.375),
     COMPUTE: (Compute(40.5, 60.5, True, 81, 162, 50.25), 0.625),
     NETWORK: (Network("an interface", True, -61, 63), 0.875),
+    POSITION: (Position(Fix.GBAS, 48.5, 11.25, 520.25, 1.75, 2.125), 0.1875),
+    ORIENTATION: (Orientation(1.375, -2.375, 90.375), 0.4375),
     ONBOARD_BATTERY: (Battery(True, 12.5, 70.5, True), 0.0625),
 }
 LIMIT_MS = 1000
@@ -166,6 +173,19 @@ PLACES: dict[str, Any] = {
     "effective_command.vy_mps": -0.25,
     "effective_command.wz_rad_s": 0.75,
     "effective_command.active_source": "keyboard",
+    "position.available": True,
+    "position.age_ms": 187,
+    "position.fix": pose_pb2.FIX_STATUS_GBAS,
+    "position.latitude_deg": 48.5,
+    "position.longitude_deg": 11.25,
+    "position.altitude_m": 520.25,
+    "position.horizontal_accuracy_m": 1.75,
+    "position.vertical_accuracy_m": 2.125,
+    "orientation.available": True,
+    "orientation.age_ms": 437,
+    "orientation.roll_deg": 1.375,
+    "orientation.pitch_deg": -2.375,
+    "orientation.yaw_deg": 90.375,
     "mission.available": True,
     "mission.age_ms": 125,
     "mission.mode": "a mode",
@@ -475,7 +495,9 @@ def test_numbers_and_texts_are_unique() -> None:
         for path, value in PLACES.items()
         if type(value) is not bool
         and path not in DERIVED
-        and not path.endswith((".state", ".severity", ".profile", ".transport", ".container", ".codec"))
+        and not path.endswith(
+            (".state", ".severity", ".profile", ".transport", ".container", ".codec", ".fix")
+        )
     )
     assert [value for value, count in values.items() if count > 1] == []
 

@@ -24,7 +24,7 @@ from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.limit import Limit
-from gateway.status.meaning import NumberMeaning
+from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
     Codec,
@@ -56,9 +56,12 @@ from gateway.status.sources import (
     NETWORK,
     ODOMETRY,
     ONBOARD_BATTERY,
+    ORIENTATION,
+    POSITION,
     ROS_SOURCES,
     VISION,
     number_source,
+    text_source,
 )
 from gateway.status.teleop import DriveInhibit, DrivePhase
 from gateway.status.values import (
@@ -67,10 +70,14 @@ from gateway.status.values import (
     Detection,
     Detections,
     Diagnostics,
+    Fix,
     Mode,
     Network,
     Number,
+    Orientation,
+    Position,
     Received,
+    Text,
     Velocity,
     Vision,
 )
@@ -79,6 +86,7 @@ from omniseer.gateway.v1 import (
     event_pb2,
     fault_pb2,
     overlay_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     robot_gateway_pb2,
@@ -102,6 +110,7 @@ FAULT = Condition("odometry.stale", Severity.ERROR, "odometry", "it stopped", "l
         (PreviewState, enums.PREVIEW_STATES, states_pb2.PreviewState),
         (Profile, enums.PROFILES, preview_pb2.PreviewProfile),
         (Codec, enums.CODECS, preview_pb2.VideoCodec),
+        (Fix, enums.FIXES, pose_pb2.FixStatus),
         (SourceState, enums.SOURCE_STATES, source_pb2.SourceState),
         (Severity, enums.SEVERITIES, fault_pb2.FaultSeverity),
         (HealthState, enums.HEALTH_STATES, states_pb2.RobotHealthState),
@@ -182,6 +191,9 @@ CELL = number_source(
 )
 
 
+GRIPPER = text_source("gripper", "Gripper", TextMeaning())
+
+
 def everything() -> Snapshot:
     """Every value known, none of them zero, all of them stale by a known age."""
     at_s = NOW_S - 10
@@ -212,6 +224,9 @@ def everything() -> Snapshot:
             DIAGNOSTICS: Received(Diagnostics(()), at_s),
             ONBOARD_BATTERY: Received(Battery(True, 12.0, 70.0, True), at_s),
             CELL: Received(Number(3.25), at_s),
+            POSITION: Received(Position(Fix.SBAS, 48.5, 11.5, 520.0, 1.5, 2.5), at_s),
+            ORIENTATION: Received(Orientation(1.5, -2.5, 90.5), at_s),
+            GRIPPER: Received(Text("open"), at_s),
         }
     )
     return take(
@@ -219,7 +234,7 @@ def everything() -> Snapshot:
         # All of them are stale but the one that is required.
         rules=Rules(
             {spec: SourceRule(1000, required=False) for spec in ROS_SOURCES}
-            | {DIAGNOSTICS: FRESH, CELL: STALE},
+            | {DIAGNOSTICS: FRESH, CELL: STALE, GRIPPER: STALE},
             3000,
         ),
         board=board,

@@ -26,6 +26,8 @@ from gateway.status.sources import (
     NETWORK,
     ODOMETRY,
     ONBOARD_BATTERY,
+    ORIENTATION,
+    POSITION,
     SOURCES,
     SourceSpec,
 )
@@ -35,8 +37,11 @@ from gateway.status.values import (
     DiagnosticItem,
     DiagnosticLevel,
     Diagnostics,
+    Fix,
     Mode,
     Network,
+    Orientation,
+    Position,
     Received,
     Velocity,
 )
@@ -339,3 +344,27 @@ def test_limits_without_a_gap_are_refused_with_both_numbers() -> None:
     with pytest.raises(ValidationError, match=r"clear_at \(10\) must be above raise_at \(20\)"):
         LowerLimit(raise_at=20, clear_at=10)
     assert FaultSettings().platform_limits() == LIMITS
+
+
+def test_a_tilted_robot_with_hysteresis() -> None:
+    def tilted(roll_deg: float | None, *active: str) -> set[str]:
+        of = board()
+        of[ORIENTATION] = Received(Orientation(roll_deg, 0.0 if roll_deg is not None else None, 0.0), NOW_S)
+        return set(found(snapshot(of, orientation=False), frozenset(active)))
+
+    assert tilted(29.0) == set()
+    assert tilted(-31.0) == {"orientation.tilt"}
+    assert tilted(27.0, "orientation.tilt") == {"orientation.tilt"}
+    assert tilted(None, "orientation.tilt") == {"orientation.tilt"}, "not known to stand level again"
+    assert tilted(24.0, "orientation.tilt") == set()
+
+
+@pytest.mark.parametrize(("required", "severity"), [(False, Severity.WARNING), (True, Severity.ERROR)])
+def test_a_receiver_without_a_position(required: bool, severity: Severity) -> None:
+    of = board()
+    of[POSITION] = Received(Position(Fix.NONE, None, None, None, None, None), NOW_S)
+    assert {each.fault_id: each.severity for each in found(snapshot(of, position=required)).values()} == {
+        "position.no_fix": severity
+    }
+    of[POSITION] = Received(Position(None, 48.0, 11.0, None, None, None), NOW_S)
+    assert found(snapshot(of, position=required)) == {}

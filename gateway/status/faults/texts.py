@@ -1,0 +1,57 @@
+"""Faults of the texts that the configuration names: those to which it gives a severity."""
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from gateway.status.fault import Condition, Fault, Severity
+from gateway.status.faults.no_value import no_value_fault
+from gateway.status.freshness import Sample
+from gateway.status.meaning import TextMeaning
+from gateway.status.snapshot import Snapshot
+from gateway.status.sources import SourceSpec
+from gateway.status.values import Text
+
+_OTHER: Final = "other"
+_LONGEST_SLUG: Final = 40
+
+
+def text_faults(snapshot: Snapshot) -> Iterator[Condition]:
+    """Yields the present conditions. An unknown or stale text neither raises a fault nor clears one."""
+    for source in snapshot.sources:
+        meaning = source.spec.meaning
+        if isinstance(meaning, TextMeaning):
+            sample = snapshot[source.spec]
+            yield from text_conditions(source.spec, meaning, sample, snapshot.faults)
+            if sample.value and sample.value.text is None:
+                yield from no_value_fault(source, "a text", "it sends a list too short")
+
+
+def text_conditions(
+    spec: SourceSpec[Text], meaning: TextMeaning, sample: Sample[Text], faults: tuple[Fault, ...]
+) -> Iterator[Condition]:
+    """Yields the condition of the newest text; of one that is unknown or stale, those of its faults."""
+    text = sample.value.text if sample.value and sample.freshness.fresh else None
+    beginning = f"{spec.name}.value."
+    if text is None:
+        for fault in faults:
+            if fault.active and fault.condition.fault_id.startswith(beginning):
+                yield fault.condition
+    elif severity := meaning.severity(text):
+        yield Condition(
+            # Texts that are not listed share an id, so that their number is bounded.
+            f"{beginning}{_slug(text) if meaning.is_listed(text) else _OTHER}",
+            severity,
+            spec.display_name,
+            f"{spec.display_name}: {text or 'an empty text'}",
+            meaning.remedy or f"Check {spec.display_name} on the robot; its configuration has the levels",
+        )
+
+
+def worst_severity(conditions: Iterator[Condition]) -> Severity | None:
+    """Returns the most severe one of the conditions' severities; None if there are none."""
+    return max((each.severity for each in conditions), key=lambda severity: severity.rank, default=None)
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")[:_LONGEST_SLUG] or "unnamed"
