@@ -46,6 +46,8 @@ from console.client.results.overlay import (
 )
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.preview import (
+    Camera,
+    CameraState,
     Encoder,
     KeyFrameAnswer,
     PictureDelivery,

@@ -25,6 +25,8 @@ from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.health import HealthState
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
+    Camera,
+    CameraState,
     Codec,
     Counters,
     Encoder,
@@ -184,6 +186,11 @@ def everything() -> Snapshot:
         measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),
         counters=Counters(4, 3, 2, 1, 6),
         passphrase="a-passphrase",
+        wanted_camera="front",
+        cameras=(
+            Camera("front", CameraState.FAILED, "unplugged", "rear"),
+            Camera("rear", CameraState.LIVE),
+        ),
     )
     board = Board(
         {
