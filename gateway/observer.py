@@ -15,7 +15,7 @@ from gateway.status.event import (
 from gateway.status.fault import Fault, Severity
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.tracker import Changes, FaultTracker
-from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
+from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile, live_camera
 from gateway.status.recording_events import RecordingEvents
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import MODE
@@ -39,7 +39,7 @@ class Observer:
         self._tracker = tracker
         self._rules = rules
         self._started_s: float | None = None
-        self._preview: tuple[PreviewState, Profile | None] | None = None
+        self._preview: tuple[PreviewState, Profile | None, str] | None = None
         self._encoder: Encoder | None = None
         self._mode = ""
         self._recordings = RecordingEvents()
@@ -70,7 +70,11 @@ class Observer:
         if preview.state not in _SETTLED:
             return
         # While the preview is off, its profile is only that of the next start.
-        settled = (preview.state, preview.profile if preview.state is PreviewState.RUNNING else None)
+        running = preview.state is PreviewState.RUNNING
+        live = live_camera(preview.cameras)
+        if running and live is None and preview.cameras:
+            return  # A fallback is on its way; the camera that failed is a fault of its own.
+        settled = (preview.state, preview.profile if running else None, live.name if running and live else "")
         if settled != self._preview:
             self._preview = settled
             yield _preview_changed(preview)
@@ -108,10 +112,13 @@ def _preview_changed(preview: PreviewView) -> Event:
         # Without a sentence: the overlay already has the one of the fault.
         faulted = PreviewChanged(preview.state, preview.profile, preview.last_error)
         return Event(Severity.ERROR, _PREVIEW, f"preview faulted: {preview.last_error}", faulted)
-    sentence = "preview off"
+    sentence, live = "preview off", live_camera(preview.cameras)
     if preview.state is PreviewState.RUNNING:
         sentence = f"preview running, {preview.profile.value if preview.profile else '?'}"
-    changed = PreviewChanged(preview.state, preview.profile, "")
+        if live and len(preview.cameras) > 1:
+            sentence += f", camera {live.name}"
+    running = preview.state is PreviewState.RUNNING
+    changed = PreviewChanged(preview.state, preview.profile, "", live.name if running and live else "")
     return Event(Severity.INFO, _PREVIEW, sentence, changed, sentence)
 
 

@@ -31,6 +31,8 @@ from console.client.exporting import ExportedRecording, ExportOptions, ExportPro
 from console.client.mapping.methods import DesiredPreview
 from console.client.options import Backoff, ClientOptions
 from console.client.results import (
+    Camera,
+    CameraState,
     CaughtUp,
     CloudState,
     CloudStatus,

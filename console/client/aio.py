@@ -118,19 +118,26 @@ class AsyncGatewayClient:
         self,
         profile: results.PreviewProfile = results.PreviewProfile.UNKNOWN,
         *,
+        camera: str = "",
         settle_within_s: float = 10.0,
     ) -> results.PreviewChange:
-        """Turns the preview on, or changes its profile, and waits until frames leave or the start failed.
+        """Turns the preview on, or changes its profile or camera, and waits until frames leave.
 
         Args:
             profile: UNKNOWN keeps the current one.
+            camera: Name of one of `PreviewStatus.cameras`. Empty keeps the current one.
             settle_within_s: How long to wait for that; 0 returns the gateway's first answer.
 
         Returns:
             The gateway's message and the newest preview status: RUNNING, FAULTED (see `last_error`), or
-            still STARTING when time ran out.
+            still STARTING when time ran out. A camera that fails leaves it RUNNING with the one before, or
+            with its fallback (`PreviewStatus.live_camera`).
+
+        Raises:
+            InvalidRequest: There is no such camera; the text has the names.
         """
-        return await self.set_preview(DesiredPreview(True, profile), settle_within_s=settle_within_s)
+        desired = DesiredPreview(True, profile, camera)
+        return await self.set_preview(desired, settle_within_s=settle_within_s)
 
     async def disable_preview(self, *, settle_within_s: float = 10.0) -> results.PreviewChange:
         """Turns the preview off and waits until its port is free; 0 returns the gateway's first answer."""

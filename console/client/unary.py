@@ -17,7 +17,7 @@ from console.client.mapping.methods import (
     preview_request,
 )
 from console.client.options import ClientOptions
-from console.client.results import PreviewChange, PreviewProfile, PreviewState, PreviewStatus
+from console.client.results import CameraState, PreviewChange, PreviewProfile, PreviewState, PreviewStatus
 
 ResultT = TypeVar("ResultT")
 
@@ -107,5 +107,8 @@ def _settled(preview: PreviewStatus, request: DesiredPreview) -> bool:
     if not request.enabled:
         return preview.state is PreviewState.DISABLED
     if preview.state is PreviewState.RUNNING:
+        camera = preview.camera(request.camera)
+        if camera and camera.state not in (CameraState.LIVE, CameraState.FAILED):
+            return False
         return request.profile in (PreviewProfile.UNKNOWN, preview.profile)
     return preview.state is PreviewState.FAULTED

@@ -10,6 +10,7 @@ from typing import Any, Final, TypeAlias
 
 from console.client import results
 from console.client.results import (
+    CameraState,
     FaultSeverity,
     FixStatus,
     Freshness,
@@ -54,6 +55,7 @@ from console.presentation.value_style import (
 )
 
 _MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
+_CAMERA_IN_USE: Final = (CameraState.LIVE, CameraState.STARTING)
 _REMARKABLE_AGE_MS: Final = 2000
 _UNREADABLE: Final = (
     SourceState.QOS_MISMATCH,
@@ -168,6 +170,8 @@ def preview_rows(preview: results.PreviewStatus, look: Look = _NOW) -> Iterator[
         yield Row("", "fallback", SeverityStyle.WARNING, reason)
     if preview.bitrate_reason:
         yield Row("", "bit rate", SeverityStyle.WARNING, preview.bitrate_reason)
+    if len(preview.cameras) > 1:
+        yield from _cameras(preview)
     if preview.measured.available:
         text = _video(preview.measured, False, preview.target_bitrate_kbps)
         yield look.measured("stream", preview.measured, text, of_video(preview.measured))
@@ -175,6 +179,22 @@ def preview_rows(preview: results.PreviewStatus, look: Look = _NOW) -> Iterator[
         encryption = "encrypted" if preview.endpoint.encrypted else ""
         latency = f"latency {preview.endpoint.latency_ms} ms"
         yield Row("", "watch", SeverityStyle.QUIET, joined(preview.endpoint.uri, latency, encryption))
+
+
+def _cameras(preview: results.PreviewStatus) -> Iterator[Row]:
+    """Yields the cameras: those that work in one row, each of the others in a row of its own."""
+    working = [camera for camera in preview.cameras if camera.state is not CameraState.FAILED]
+    shown = (
+        f"{camera.name} ({camera.state.value})" if camera.state in _CAMERA_IN_USE else camera.name
+        for camera in working
+    )
+    if working:
+        yield Row("", "cameras", SeverityStyle.QUIET, joined(*shown))
+    for camera in preview.cameras:
+        if camera.state is CameraState.FAILED:
+            wanted = "wanted; " if camera.name == preview.wanted_camera else ""
+            style = SeverityStyle.WARNING if wanted else SeverityStyle.QUIET
+            yield Row("", "camera", style, f"{camera.name}: {wanted}{camera.error}")
 
 
 def health_summary(status: results.SystemStatus) -> str:

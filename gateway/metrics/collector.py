@@ -28,7 +28,7 @@ from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.cloud import CloudState, CloudView
 from gateway.status.fault import Severity
 from gateway.status.meaning import NumberMeaning, TextMeaning
-from gateway.status.preview import PreviewState, PreviewView
+from gateway.status.preview import CameraState, PreviewState, PreviewView
 from gateway.status.recording import RecorderState, RecorderView
 from gateway.status.snapshot import Snapshot
 from gateway.status.teleop import DrivePhase, TeleopView
@@ -233,6 +233,10 @@ def _preview(preview: PreviewView) -> Iterator[Metric]:
     states = {each.value: float(preview.state is each) for each in PreviewState}
     yield _gauges("preview_state", "1 for the state it is in.", "state", states)
     yield _gauge("preview_reachable", "1 while its service answers.", preview.service_reachable)
+    works = {each.name: float(each.state is not CameraState.FAILED) for each in preview.cameras}
+    yield _gauges("preview_camera_works", "0 if it is missing or failed when last used.", "camera", works)
+    live = {each.name: float(each.state is CameraState.LIVE) for each in preview.cameras}
+    yield _gauges("preview_camera_live", "1 for the camera that is shown.", "camera", live)
     counters = preview.counters
     yield _counter("preview_starts", "Pipelines started.", counters.starts)
     yield _counter("preview_restarts", "Those of them after a fault.", counters.restarts)

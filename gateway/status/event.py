@@ -41,11 +41,16 @@ class FaultCleared:
 
 @dataclass(frozen=True, slots=True)
 class PreviewChanged:
-    """The preview settled in another state, or with another profile."""
+    """The preview settled in another state, with another profile, or shows another camera.
+
+    Attributes:
+        camera: the live one; empty unless it runs.
+    """
 
     state: PreviewState
     profile: Profile | None
     last_error: str
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True)

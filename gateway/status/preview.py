@@ -100,6 +100,41 @@ class Counters:
     viewers_refused: int = 0
 
 
+class CameraState(Enum):
+    """What is known of a camera."""
+
+    READY = "ready"
+    STARTING = "starting"
+    LIVE = "live"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera of the robot.
+
+    Attributes:
+        state: None if the preview service reports one that this gateway does not know.
+        error: why it has failed and what to do; empty unless it has.
+        fallback: name of the camera that takes its place while it fails; empty for none.
+    """
+
+    name: str
+    state: CameraState | None
+    error: str = ""
+    fallback: str = ""
+
+
+def camera_called(name: str, cameras: tuple[Camera, ...]) -> Camera | None:
+    """Returns the camera of a name; None if there is none."""
+    return next((camera for camera in cameras if camera.name == name), None)
+
+
+def live_camera(cameras: tuple[Camera, ...]) -> Camera | None:
+    """Returns the camera whose frames are the stream's; None if there is none."""
+    return next((camera for camera in cameras if camera.state is CameraState.LIVE), None)
+
+
 @dataclass(frozen=True, slots=True)
 class PreviewView:
     """The state of the preview for clients. Any change makes a new object.
@@ -111,6 +146,8 @@ class PreviewView:
         stream: None while no pipeline exists; so is `encoder`.
         measured: None before the first measurement of this run.
         passphrase: of this session; empty if the stream is not encrypted.
+        wanted_camera: the one to be live, as far as it works; empty while the service does not answer, or if
+            it is older than this gateway. Then there are no `cameras` either.
     """
 
     state: PreviewState
@@ -123,6 +160,8 @@ class PreviewView:
     measured: Received[Measurement] | None
     counters: Counters
     passphrase: str = field(default="", repr=False)
+    wanted_camera: str = ""
+    cameras: tuple[Camera, ...] = ()
 
     def newest_capture_ns(self, now_ns: int) -> int | None:
         """Returns an upper bound of when the newest picture that has left by now was captured.

@@ -31,6 +31,7 @@ NEEDS_NO_AGE = {
     "StreamEndpoint": _SERVICE,
     "EncoderStatus": _SERVICE,
     "VideoFormat": _SERVICE,
+    "Camera": _SERVICE,
     "PreviewCounters": "counted by the gateway itself",
     "Fault": "a verdict of the gateway's own with an age, found again five times a second",
     "GatewayFacts": _ITSELF,

@@ -119,8 +119,8 @@ CASES = [
     ),
     Case(
         robot_gateway_pb2.SetPreviewModeRequest,
-        uint(1, 1) + uint(2, 3),
-        {"enabled": True, "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY},
+        uint(1, 1) + uint(2, 3) + text(3, "rear"),
+        {"enabled": True, "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY, "camera": "rear"},
     ),
     Case(
         robot_gateway_pb2.SetPreviewModeResponse,
@@ -623,7 +623,9 @@ ADDITIONS = [
         + sub(20, uint(6, 2))
         + sub(21, uint(1, 3))
         + uint(22, 1)
-        + text(23, "RTT 180 ms"),
+        + text(23, "RTT 180 ms")
+        + text(24, "rear")
+        + sub(25, text(1, "rear")),
         {
             "endpoint": preview_pb2.StreamEndpoint(port=7100),
             "encoder": preview_pb2.EncoderStatus(name="x264"),
@@ -633,6 +635,18 @@ ADDITIONS = [
             "counters": preview_pb2.PreviewCounters(starts=3),
             "service_reachable": True,
             "bitrate_reason": "RTT 180 ms",
+            "wanted_camera": "rear",
+            "cameras": [preview_pb2.Camera(name="rear")],
+        },
+    ),
+    Case(
+        preview_pb2.Camera,
+        text(1, "rear") + uint(2, 4) + text(3, "unplugged") + text(4, "front"),
+        {
+            "name": "rear",
+            "state": preview_pb2.CAMERA_STATE_FAILED,
+            "error": "unplugged",
+            "fallback": "front",
         },
     ),
     Case(
@@ -938,11 +952,12 @@ ADDITIONS = [
     Case(event_pb2.FaultCleared, sub(1, text(1, "a")), {"fault": fault_pb2.Fault(id="a")}),
     Case(
         event_pb2.PreviewStateChanged,
-        uint(1, 5) + uint(2, 3) + text(3, "no camera"),
+        uint(1, 5) + uint(2, 3) + text(3, "no camera") + text(4, "rear"),
         {
             "state": states_pb2.PREVIEW_FAULTED,
             "profile": preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY,
             "last_error": "no camera",
+            "camera": "rear",
         },
     ),
     Case(

@@ -43,10 +43,11 @@ class Operator:
     async def overlay(self) -> Any:
         return await self.stub.GetOverlaySnapshot(GetOverlaySnapshotRequest(), timeout=5)
 
-    async def switch(self, enabled: bool, profile: Any = None, timeout_s: float | None = 10) -> Any:
-        return await self.stub.SetPreviewMode(
-            SetPreviewModeRequest(enabled=enabled, profile=profile), timeout=timeout_s
-        )
+    async def switch(
+        self, enabled: bool, profile: Any = None, timeout_s: float | None = 10, camera: str = ""
+    ) -> Any:
+        request = SetPreviewModeRequest(enabled=enabled, profile=profile, camera=camera)
+        return await self.stub.SetPreviewMode(request, timeout=timeout_s)
 
 
 @asynccontextmanager

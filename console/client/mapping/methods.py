@@ -28,10 +28,11 @@ ResultT = TypeVar("ResultT")
 
 @dataclass(frozen=True, slots=True)
 class DesiredPreview:
-    """Desired state of the preview. UNKNOWN keeps the current profile."""
+    """Desired state of the preview. UNKNOWN keeps the current profile, an empty name the current camera."""
 
     enabled: bool
     profile: PreviewProfile = PreviewProfile.UNKNOWN
+    camera: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,8 @@ NO_FIELDS: Final = b""
 def preview_request(desired: DesiredPreview) -> bytes:
     """Returns the request of SetPreviewMode."""
     profile = enums.number(desired.profile, preview_pb2.PreviewProfile.DESCRIPTOR)
-    return wire.SetPreviewModeRequest(enabled=desired.enabled, profile=profile).SerializeToString()
+    request = wire.SetPreviewModeRequest(enabled=desired.enabled, profile=profile, camera=desired.camera)
+    return request.SerializeToString()
 
 
 def key_frame_request(newest_pts: int | None) -> bytes:

@@ -47,6 +47,8 @@ from console.client.results.overlay import (
 from console.client.results.platform import Battery, Compute, Network, Platform, Power
 from console.client.results.pose import FixStatus, Orientation, Position
 from console.client.results.preview import (
+    Camera,
+    CameraState,
     Encoder,
     KeyFrameAnswer,
     PictureDelivery,

@@ -53,11 +53,13 @@ class EventPosition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewEvent:
-    """The preview has settled in another state or changed its profile."""
+    """The preview has settled in another state, or changed its profile or its camera."""
 
     state: PreviewState
     profile: PreviewProfile
     last_error: str
+    camera: str = ""
+    """The live one. Empty unless the preview runs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

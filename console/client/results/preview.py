@@ -156,6 +156,32 @@ class PreviewCounters:
     """Connections refused because as many viewers as configured were connected."""
 
 
+class CameraState(Enum):
+    """What is known of a camera. None is opened to find out."""
+
+    UNKNOWN = "unknown"
+    READY = "ready"
+    """It is there, and delivered when it was last used, or has not been used yet."""
+    STARTING = "starting"
+    """It is being started, to become the live one."""
+    LIVE = "live"
+    """Its frames are the stream's."""
+    FAILED = "failed"
+    """It is missing, or failed when it was last used; `Camera.error` has the reason."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """A camera of the robot, or another source of video."""
+
+    name: str
+    state: CameraState
+    error: str
+    """Why it has failed, and the remedy. Empty unless it has."""
+    fallback: str
+    """Name of the camera that takes its place while it fails. Empty for none."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreviewStatus:
     """Status of the live preview."""
@@ -179,6 +205,19 @@ class PreviewStatus:
     counters: PreviewCounters
     service_reachable: bool
     """Whether the preview service answers the gateway."""
+    wanted_camera: str = ""
+    """Name of the camera that was chosen last; live as far as it works. Empty for robots older than this."""
+    cameras: tuple[Camera, ...] = ()
+    """In the order of the robot's configuration; at most one is LIVE."""
+
+    def camera(self, name: str) -> Camera | None:
+        """Returns the camera of a name; None if there is none."""
+        return next((camera for camera in self.cameras if camera.name == name), None)
+
+    @property
+    def live_camera(self) -> Camera | None:
+        """The camera whose frames are the stream's; None while there is none, or the robot does not say."""
+        return next((camera for camera in self.cameras if camera.state is CameraState.LIVE), None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import Final
 from gateway.links.preview.counters import CounterTotals
 from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Reconciler
-from gateway.status.preview import PreviewState, PreviewView, Profile
+from gateway.status.preview import CameraState, PreviewState, PreviewView, Profile, camera_called
 from gateway.status.values import Received
 
 PreviewReconciler = Reconciler[PreviewSpec, PreviewReport, PreviewView]
@@ -40,12 +40,17 @@ class PreviewModel:
         enabled = report.state in _ENABLED
         # Before its first request the service reports its default profile, which no operator chose.
         chosen = report.profile if report.applied_revision else None
-        spec = replace(spec, enabled=enabled, profile=chosen or spec.profile)
+        spec = replace(spec, enabled=enabled, profile=chosen or spec.profile, camera=report.wanted_camera)
         plain = report.stream is not None and not report.stream.encrypted
         return spec, enabled and not plain
 
     def adapt(self, spec: PreviewSpec, report: PreviewReport) -> PreviewSpec:
-        """Gives an enabled preview a passphrase, or none, depending on where its listener is reached."""
+        """Gives an enabled preview a passphrase, or none, depending on where its listener is reached.
+
+        A camera that the service does not have, because its configuration has changed, is wanted no more.
+        """
+        if report.cameras and spec.camera and camera_called(spec.camera, report.cameras) is None:
+            spec = replace(spec, camera="")
         address = report.listener.address if report.listener else ""
         encrypted = spec.enabled and self._encrypts(address)
         if encrypted == bool(spec.passphrase):
@@ -59,11 +64,13 @@ class PreviewModel:
         self._totals.take(report.instance_id, report.counters)
 
     def settled(self, spec: PreviewSpec, report: PreviewReport) -> bool:
-        """A switch of the profile is settled when the stream has it."""
+        """A switch of profile or camera is settled when the stream has it, or the camera has failed."""
         if not spec.enabled:
             return report.state is PreviewState.DISABLED
         if report.state is PreviewState.RUNNING:
-            return _profile_in_force(spec, report) is spec.profile
+            wanted = camera_called(spec.camera, report.cameras)
+            shown = wanted is None or wanted.state in {CameraState.LIVE, CameraState.FAILED}
+            return shown and _profile_in_force(spec, report) is spec.profile
         return report.state is PreviewState.FAULTED
 
     def take_change(self, reconciler: PreviewReconciler) -> None:
@@ -91,6 +98,8 @@ class PreviewModel:
             measured=Received(measured, last.at_s) if last and measured else None,
             counters=self._totals.total,
             passphrase=spec.passphrase,
+            wanted_camera=current.wanted_camera if current else "",
+            cameras=current.cameras if current else (),
         )
 
 

@@ -2,7 +2,16 @@
 
 from dataclasses import dataclass, field
 
-from gateway.status.preview import Counters, Encoder, Listener, Measurement, PreviewState, Profile, Stream
+from gateway.status.preview import (
+    Camera,
+    Counters,
+    Encoder,
+    Listener,
+    Measurement,
+    PreviewState,
+    Profile,
+    Stream,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,25 +22,30 @@ class PreviewSpec:
         profile: None if none was ever chosen, which an enabled preview always has.
         passphrase: of the session, from enable to disable; empty for a stream that is not encrypted, and
             until the service has reported where its listener is reached.
+        camera: empty if none was ever chosen.
     """
 
     enabled: bool = False
     profile: Profile | None = None
     passphrase: str = field(default="", repr=False)
+    camera: str = ""
 
-    def switched(self, *, enabled: bool, profile: Profile | None) -> "PreviewSpec":
+    def switched(self, *, enabled: bool, profile: Profile | None, camera: str = "") -> "PreviewSpec":
         """Returns the spec of a request after this one.
 
-        Without a profile the present one stays, else BALANCED.
+        Without a profile the present one stays, else BALANCED; without a camera the present one stays.
         """
+        camera = camera or self.camera
         profile = profile or self.profile
         if not enabled:
-            return PreviewSpec(enabled=False, profile=profile)
+            return PreviewSpec(enabled=False, profile=profile, camera=camera)
         passphrase = self.passphrase if self.enabled else ""
-        return PreviewSpec(enabled=True, profile=profile or Profile.BALANCED, passphrase=passphrase)
+        profile = profile or Profile.BALANCED
+        return PreviewSpec(enabled=True, profile=profile, passphrase=passphrase, camera=camera)
 
     def __str__(self) -> str:
-        return f"on, {self.profile_name}" if self.enabled else "off"
+        camera = f", camera {self.camera}" if self.camera else ""
+        return f"on, {self.profile_name}{camera}" if self.enabled else "off"
 
     @property
     def profile_name(self) -> str:
@@ -53,3 +67,5 @@ class PreviewReport:
     encoder: Encoder | None
     measurement: Measurement | None
     counters: Counters
+    wanted_camera: str = ""
+    cameras: tuple[Camera, ...] = ()

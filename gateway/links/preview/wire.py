@@ -15,6 +15,8 @@ from gateway.links.reconciler import Desired
 from gateway.links.watch import LinkLostError
 from gateway.links.wire_values import same_fields
 from gateway.status.preview import (
+    Camera,
+    CameraState,
     Codec,
     Counters,
     Encoder,
@@ -36,6 +38,7 @@ _FEEDBACK_DEADLINE_S: Final = 0.5
 STATES: Final = {pb.LifecycleState.Value(f"LIFECYCLE_STATE_{state.name}"): state for state in PreviewState}
 PROFILES: Final = {profile: pb.Profile.Value(f"PROFILE_{profile.name}") for profile in Profile}
 CODECS: Final = {pb.Codec.Value(f"CODEC_{codec.name}"): codec for codec in Codec}
+CAMERA_STATES: Final = {pb.CameraState.Value(f"CAMERA_STATE_{state.name}"): state for state in CameraState}
 _PROFILE_OF: Final[Mapping[int, Profile]] = {number: profile for profile, number in PROFILES.items()}
 
 
@@ -97,7 +100,9 @@ class PreviewClient:
 def to_wire(desired: Desired[PreviewSpec]) -> pb.ApplyDesiredStateRequest:
     """Returns the request that applies `desired`."""
     spec = desired.spec
-    state = pb.DesiredState(revision=desired.revision, enabled=spec.enabled, passphrase=spec.passphrase)
+    state = pb.DesiredState(
+        revision=desired.revision, enabled=spec.enabled, passphrase=spec.passphrase, camera=spec.camera
+    )
     if spec.profile:
         state.profile = PROFILES[spec.profile]
     return pb.ApplyDesiredStateRequest(desired=state)
@@ -128,4 +133,8 @@ def from_wire(message: pb.ActualState) -> PreviewReport:
         if message.HasField("measurement")
         else None,
         counters=same_fields(Counters, message.counters),
+        wanted_camera=message.wanted_camera,
+        cameras=tuple(
+            same_fields(Camera, camera, state=CAMERA_STATES.get(camera.state)) for camera in message.cameras
+        ),
     )

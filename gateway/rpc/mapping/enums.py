@@ -12,7 +12,7 @@ from gateway.status.fault import Severity
 from gateway.status.health import HealthState
 from gateway.status.meaning import Side
 from gateway.status.pictures import Delivery
-from gateway.status.preview import Codec, PreviewState, Profile
+from gateway.status.preview import CameraState, Codec, PreviewState, Profile
 from gateway.status.recording import (
     RecorderState,
     RecordingChange,
@@ -51,6 +51,7 @@ def _or_none(domain: type[_MemberT], wire: Any, prefix: str) -> Mapping[_MemberT
 
 PREVIEW_STATES: Final = _by_name(PreviewState, states_pb2.PreviewState, "PREVIEW")
 PROFILES: Final = _or_none(Profile, preview_pb2.PreviewProfile, "PREVIEW_PROFILE")
+CAMERA_STATES: Final = _or_none(CameraState, preview_pb2.CameraState, "CAMERA_STATE")
 CODECS: Final = _or_none(Codec, preview_pb2.VideoCodec, "VIDEO_CODEC")
 DELIVERIES: Final = _or_none(Delivery, preview_pb2.PictureDelivery, "PICTURE_DELIVERY")
 HEALTH_STATES: Final = _by_name(HealthState, states_pb2.RobotHealthState, "ROBOT_HEALTH")

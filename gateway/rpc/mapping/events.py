@@ -76,7 +76,10 @@ def _cleared(detail: FaultCleared, at_s: float) -> pb.FaultCleared:
 
 def _preview(detail: PreviewChanged, _at_s: float) -> pb.PreviewStateChanged:
     return pb.PreviewStateChanged(
-        state=PREVIEW_STATES[detail.state], profile=PROFILES[detail.profile], last_error=detail.last_error
+        state=PREVIEW_STATES[detail.state],
+        profile=PROFILES[detail.profile],
+        last_error=detail.last_error,
+        camera=detail.camera,
     )
 
 

@@ -4,11 +4,11 @@ from dataclasses import asdict
 
 from common.bind import bracketed
 from gateway.rpc.calls.recipient import Recipient
-from gateway.rpc.mapping.enums import CODECS, PREVIEW_STATES, PROFILES, delivery_from
+from gateway.rpc.mapping.enums import CAMERA_STATES, CODECS, PREVIEW_STATES, PROFILES, delivery_from
 from gateway.rpc.mapping.freshness import freshness_fields
 from gateway.status.freshness import Sample
 from gateway.status.pictures import PictureReport, Pictures
-from gateway.status.preview import Encoder, Listener, Measurement, PreviewView, Stream
+from gateway.status.preview import Camera, Encoder, Listener, Measurement, PreviewView, Stream
 from omniseer.gateway.v1 import preview_pb2 as pb
 from omniseer.gateway.v1.robot_gateway_pb2 import ReportPictureRequest
 
@@ -34,6 +34,14 @@ def preview_status(
         counters=pb.PreviewCounters(**asdict(preview.counters)),
         service_reachable=preview.service_reachable,
         bitrate_reason=stream.bitrate_reason if stream else "",
+        wanted_camera=preview.wanted_camera,
+        cameras=[_camera(camera) for camera in preview.cameras],
+    )
+
+
+def _camera(camera: Camera) -> pb.Camera:
+    return pb.Camera(
+        name=camera.name, state=CAMERA_STATES[camera.state], error=camera.error, fallback=camera.fallback
     )
 
 

@@ -41,7 +41,10 @@ class PreviewService:
         """Returns when the preview has settled, or when the settle time or the caller's deadline ends."""
         profile = profile_from(request.profile) if request.enabled else None
         message = await self.control.set_mode(
-            enabled=request.enabled, profile=profile, remaining_s=call.remaining_s()
+            enabled=request.enabled,
+            profile=profile,
+            remaining_s=call.remaining_s(),
+            camera=request.camera if request.enabled else "",
         )
         now = self.state.snapshot()
         preview = preview_status(now.preview, now.preview_measured, now.pictures, self.recipients.of(call))

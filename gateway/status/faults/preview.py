@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from gateway.status.fault import Condition, Severity
-from gateway.status.preview import PreviewState, PreviewView
+from gateway.status.preview import CameraState, PreviewState, PreviewView, camera_called, live_camera
 
 UNREACHABLE: Final = "preview.unreachable"
 FAULTED: Final = "preview.faulted"
 FALLBACK: Final = "preview.fallback"
+CAMERA: Final = "preview.camera"
 _COMPONENT: Final = "preview"
 
 
@@ -40,6 +41,16 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
             _COMPONENT,
             "the preview does not work" + (f": {preview.last_error}" if preview.last_error else ""),
             "The robot retries by itself; to retry at once type: robotctl preview on",
+        )
+    wanted, live = camera_called(preview.wanted_camera, preview.cameras), live_camera(preview.cameras)
+    if preview.state is PreviewState.RUNNING and wanted and wanted.state is CameraState.FAILED:
+        instead = f", and camera {live.name} is shown instead" if live else ""
+        yield Condition(
+            CAMERA,
+            Severity.WARNING,
+            _COMPONENT,
+            f"camera {wanted.name} does not work{instead}: {wanted.error}",
+            f"The robot retries by itself; to retry at once type: robotctl preview on --camera {wanted.name}",
         )
     encoder = preview.encoder
     if encoder and encoder.fallback_reason:

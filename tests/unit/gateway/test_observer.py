@@ -4,7 +4,7 @@ from typing import Any
 from gateway.status.board import Board
 from gateway.status.event import EncoderFallback, Event, FaultRaised, PreviewChanged
 from gateway.status.fault import Severity
-from gateway.status.preview import Encoder, PreviewState, PreviewView, Profile
+from gateway.status.preview import Camera, CameraState, Encoder, PreviewState, PreviewView, Profile
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.sources import MODE, ODOMETRY, SourceSpec
 from gateway.status.values import Mode, Received, Velocity
@@ -81,6 +81,33 @@ def test_each_settled_state_of_the_preview_is_an_event_of_its_own() -> None:
     off = PreviewChanged(PreviewState.DISABLED, Profile.BALANCED, "")
     assert changes(PreviewState.DISABLED, Profile.BALANCED) == [off]
     assert changes(PreviewState.DISABLED, low) == [], "the profile of the next preview is no news"
+
+
+def test_another_live_camera_is_news_and_a_failed_one_a_fault() -> None:
+    observer = new_observer(startup_grace_s=60)
+    observer.observe(snapshot(Board()))
+
+    def seen(*states: CameraState, wanted: str = "front") -> list[str]:
+        names = ("front", "rear")
+        cameras = tuple(Camera(*each, "ended") for each in zip(names, states, strict=True))
+        running = replace(OFF, state=PreviewState.RUNNING, wanted_camera=wanted, cameras=cameras)
+        return sentences(observer.observe(snapshot(Board(), running)))
+
+    live, ready, starting, failed = (
+        CameraState.LIVE,
+        CameraState.READY,
+        CameraState.STARTING,
+        CameraState.FAILED,
+    )
+    assert seen(live, ready) == ["preview running, balanced, camera front"]
+    assert seen(live, starting, wanted="rear") == []
+    assert seen(ready, live, wanted="rear") == ["preview running, balanced, camera rear"]
+    assert seen(live, ready) == ["preview running, balanced, camera front"]
+    assert seen(failed, starting) == ["warning: camera front does not work: ended"]
+    assert seen(failed, live) == ["preview running, balanced, camera rear"]
+    cleared = "cleared: camera front does not work, and camera rear is shown instead: ended"
+    assert seen(live, ready) == [cleared, "preview running, balanced, camera front"]
+    assert seen(live, failed) == [], "one that no one wants is no fault"
 
 
 def test_what_a_fault_tells_programs() -> None:

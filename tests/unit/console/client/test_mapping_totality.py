@@ -115,6 +115,7 @@ ENUM_MAPPINGS: Final[Mapping[str, Callable[[int], Enum]]] = {
         (results.TeleopState, states_pb2.TeleopState),
         (results.PreviewProfile, preview_pb2.PreviewProfile),
         (results.PictureDelivery, preview_pb2.PictureDelivery),
+        (results.CameraState, preview_pb2.CameraState),
         (results.VideoCodec, preview_pb2.VideoCodec),
         (results.StreamTransport, preview_pb2.StreamTransport),
         (results.StreamContainer, preview_pb2.StreamContainer),
@@ -611,10 +612,11 @@ def test_the_tables_name_only_fields_of_answers() -> None:
 
 def test_every_field_of_a_preview_request_is_set() -> None:
     request = robot_gateway_pb2.SetPreviewModeRequest.FromString(
-        preview_request(DesiredPreview(True, PreviewProfile.HIGH_QUALITY))
+        preview_request(DesiredPreview(True, PreviewProfile.HIGH_QUALITY, "rear"))
     )
     assert request.enabled
     assert request.profile == preview_pb2.PREVIEW_PROFILE_HIGH_QUALITY
+    assert request.camera == "rear"
     assert {field.name for field, _ in request.ListFields()} == set(request.DESCRIPTOR.fields_by_name)
 
 

@@ -6,7 +6,16 @@ from typing import Any, TypeVar
 
 import pytest
 
-from console.client import Backoff, ClientOptions, PreviewChange, PreviewProfile, PreviewState, SystemStatus
+from console.client import (
+    Backoff,
+    Camera,
+    CameraState,
+    ClientOptions,
+    PreviewChange,
+    PreviewProfile,
+    PreviewState,
+    SystemStatus,
+)
 from console.client.errors import DeadlineExceeded, GatewayError, Refused, Unreachable
 from console.client.mapping.methods import (
     GET_SYSTEM_STATUS,
@@ -160,6 +169,25 @@ async def test_when_a_request_is_settled(
         preview_change(state, profile=profile),
         with_preview(state, profile),
     )
+    assert (len(stage.sends) == 1) is settled
+
+
+@pytest.mark.parametrize(
+    ("state", "settled"),
+    [
+        (CameraState.LIVE, True),
+        (CameraState.FAILED, True),
+        (CameraState.STARTING, False),
+        (CameraState.READY, False),
+    ],
+)
+async def test_when_a_request_for_a_camera_is_settled(state: CameraState, settled: bool) -> None:
+    stage = Stage()
+    change, status = preview_change(PreviewState.RUNNING), with_preview(PreviewState.RUNNING)
+    camera = Camera(name="rear", state=state, error="", fallback="")
+    change = replace(change, preview=replace(change.preview, cameras=(camera,)))
+    status = replace(status, preview=replace(status.preview, cameras=(camera,)))
+    await stage.play(stage.calls.set_preview(DesiredPreview(True, camera="rear"), 0.05), change, status)
     assert (len(stage.sends) == 1) is settled
 
 

@@ -29,19 +29,19 @@ from omniseer.gateway.v1 import recording_pb2 as omniseer_dot_gateway_dot_v1_dot
 from omniseer.gateway.v1 import states_pb2 as omniseer_dot_gateway_dot_v1_dot_states__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fomniseer/gateway/v1/event.proto\x12\x13omniseer.gateway.v1\x1a\x1fomniseer/gateway/v1/cloud.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a!omniseer/gateway/v1/preview.proto\x1a#omniseer/gateway/v1/recording.proto\x1a omniseer/gateway/v1/states.proto\"1\n\rEventPosition\x12\x0e\n\x06run_id\x18\x01 \x01(\t\x12\x10\n\x08sequence\x18\x02 \x01(\x04\"\x9d\x07\n\x05\x45vent\x12\x0e\n\x06run_id\x18\x01 \x01(\t\x12\x10\n\x08sequence\x18\x02 \x01(\x04\x12\x14\n\x0cmonotonic_ns\x18\x03 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x34\n\x08severity\x18\x05 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverity\x12\x11\n\tcomponent\x18\x06 \x01(\t\x12\x0f\n\x07message\x18\x07 \x01(\t\x12\x38\n\x0c\x66\x61ult_raised\x18\x08 \x01(\x0b\x32 .omniseer.gateway.v1.FaultRaisedH\x00\x12:\n\rfault_cleared\x18\t \x01(\x0b\x32!.omniseer.gateway.v1.FaultClearedH\x00\x12I\n\x15preview_state_changed\x18\n \x01(\x0b\x32(.omniseer.gateway.v1.PreviewStateChangedH\x00\x12@\n\x10\x65ncoder_fallback\x18\x0b \x01(\x0b\x32$.omniseer.gateway.v1.EncoderFallbackH\x00\x12:\n\rclient_joined\x18\x0c \x01(\x0b\x32!.omniseer.gateway.v1.ClientJoinedH\x00\x12\x36\n\x0b\x63lient_left\x18\r \x01(\x0b\x32\x1f.omniseer.gateway.v1.ClientLeftH\x00\x12<\n\x0e\x63ontrol_action\x18\x0e \x01(\x0b\x32\".omniseer.gateway.v1.ControlActionH\x00\x12\x43\n\x12robot_mode_changed\x18\x0f \x01(\x0b\x32%.omniseer.gateway.v1.RobotModeChangedH\x00\x12M\n\x17recording_state_changed\x18\x10 \x01(\x0b\x32*.omniseer.gateway.v1.RecordingStateChangedH\x00\x12\x45\n\x13\x63loud_state_changed\x18\x11 \x01(\x0b\x32&.omniseer.gateway.v1.CloudStateChangedH\x00\x12K\n\x16recording_copy_changed\x18\x12 \x01(\x0b\x32).omniseer.gateway.v1.RecordingCopyChangedH\x00\x42\t\n\x07payload\"8\n\x0b\x46\x61ultRaised\x12)\n\x05\x66\x61ult\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.Fault\"9\n\x0c\x46\x61ultCleared\x12)\n\x05\x66\x61ult\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.Fault\"\x91\x01\n\x13PreviewStateChanged\x12\x30\n\x05state\x18\x01 \x01(\x0e\x32!.omniseer.gateway.v1.PreviewState\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile\x12\x12\n\nlast_error\x18\x03 \x01(\t\"B\n\x0f\x45ncoderFallback\x12\x0f\n\x07running\x18\x01 \x01(\t\x12\x0e\n\x06wanted\x18\x02 \x01(\t\x12\x0e\n\x06reason\x18\x03 \x01(\t\",\n\x0c\x43lientJoined\x12\x0f\n\x07\x61\x64\x64ress\x18\x01 \x01(\t\x12\x0b\n\x03who\x18\x02 \x01(\t\"*\n\nClientLeft\x12\x0f\n\x07\x61\x64\x64ress\x18\x01 \x01(\t\x12\x0b\n\x03who\x18\x02 \x01(\t\"\x92\x01\n\rControlAction\x12\x0b\n\x03who\x18\x01 \x01(\t\x12\x0f\n\x07\x61\x64\x64ress\x18\x02 \x01(\t\x12\x0e\n\x06method\x18\x03 \x01(\t\x12\x0f\n\x07request\x18\x04 \x01(\t\x12\x32\n\x06result\x18\x05 \x01(\x0e\x32\".omniseer.gateway.v1.ControlResult\x12\x0e\n\x06\x61nswer\x18\x06 \x01(\t\" \n\x10RobotModeChanged\x12\x0c\n\x04mode\x18\x01 \x01(\t\"\x8b\x01\n\x08\x45ventGap\x12\x33\n\x06reason\x18\x01 \x01(\x0e\x32#.omniseer.gateway.v1.EventGapReason\x12\x14\n\x0cmissed_count\x18\x02 \x01(\x04\x12\x34\n\x08position\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\"\xc5\x02\n\x15RecordingStateChanged\x12\x34\n\x06\x63hange\x18\x01 \x01(\x0e\x32$.omniseer.gateway.v1.RecordingChange\x12\x14\n\x0crecording_id\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12\x30\n\x04kind\x18\x04 \x01(\x0e\x32\".omniseer.gateway.v1.RecordingKind\x12\x32\n\x05state\x18\x05 \x01(\x0e\x32#.omniseer.gateway.v1.RecordingState\x12=\n\x0bstop_reason\x18\x06 \x01(\x0e\x32(.omniseer.gateway.v1.RecordingStopReason\x12\x1a\n\rmessages_lost\x18\x07 \x01(\x04H\x00\x88\x01\x01\x42\x10\n\x0e_messages_lost\"W\n\x11\x43loudStateChanged\x12.\n\x05state\x18\x01 \x01(\x0e\x32\x1f.omniseer.gateway.v1.CloudState\x12\x12\n\nlast_error\x18\x02 \x01(\t\"m\n\x14RecordingCopyChanged\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\r\n\x05label\x18\x02 \x01(\t\x12\x30\n\x04\x63opy\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy*\x83\x01\n\rControlResult\x12\x1e\n\x1a\x43ONTROL_RESULT_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x43ONTROL_RESULT_ACCEPTED\x10\x01\x12\x1a\n\x16\x43ONTROL_RESULT_REFUSED\x10\x02\x12\x19\n\x15\x43ONTROL_RESULT_FAILED\x10\x03*u\n\x0e\x45ventGapReason\x12 \n\x1c\x45VENT_GAP_REASON_UNSPECIFIED\x10\x00\x12#\n\x1f\x45VENT_GAP_REASON_NO_LONGER_KEPT\x10\x01\x12\x1c\n\x18\x45VENT_GAP_REASON_NEW_RUN\x10\x02*\xb0\x01\n\x0fRecordingChange\x12 \n\x1cRECORDING_CHANGE_UNSPECIFIED\x10\x00\x12\x1c\n\x18RECORDING_CHANGE_STARTED\x10\x01\x12\x1a\n\x16RECORDING_CHANGE_ENDED\x10\x02\x12&\n\"RECORDING_CHANGE_SNAPSHOT_COMPLETE\x10\x03\x12\x19\n\x15RECORDING_CHANGE_LOSS\x10\x04\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1fomniseer/gateway/v1/event.proto\x12\x13omniseer.gateway.v1\x1a\x1fomniseer/gateway/v1/cloud.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a!omniseer/gateway/v1/preview.proto\x1a#omniseer/gateway/v1/recording.proto\x1a omniseer/gateway/v1/states.proto\"1\n\rEventPosition\x12\x0e\n\x06run_id\x18\x01 \x01(\t\x12\x10\n\x08sequence\x18\x02 \x01(\x04\"\x9d\x07\n\x05\x45vent\x12\x0e\n\x06run_id\x18\x01 \x01(\t\x12\x10\n\x08sequence\x18\x02 \x01(\x04\x12\x14\n\x0cmonotonic_ns\x18\x03 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x34\n\x08severity\x18\x05 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverity\x12\x11\n\tcomponent\x18\x06 \x01(\t\x12\x0f\n\x07message\x18\x07 \x01(\t\x12\x38\n\x0c\x66\x61ult_raised\x18\x08 \x01(\x0b\x32 .omniseer.gateway.v1.FaultRaisedH\x00\x12:\n\rfault_cleared\x18\t \x01(\x0b\x32!.omniseer.gateway.v1.FaultClearedH\x00\x12I\n\x15preview_state_changed\x18\n \x01(\x0b\x32(.omniseer.gateway.v1.PreviewStateChangedH\x00\x12@\n\x10\x65ncoder_fallback\x18\x0b \x01(\x0b\x32$.omniseer.gateway.v1.EncoderFallbackH\x00\x12:\n\rclient_joined\x18\x0c \x01(\x0b\x32!.omniseer.gateway.v1.ClientJoinedH\x00\x12\x36\n\x0b\x63lient_left\x18\r \x01(\x0b\x32\x1f.omniseer.gateway.v1.ClientLeftH\x00\x12<\n\x0e\x63ontrol_action\x18\x0e \x01(\x0b\x32\".omniseer.gateway.v1.ControlActionH\x00\x12\x43\n\x12robot_mode_changed\x18\x0f \x01(\x0b\x32%.omniseer.gateway.v1.RobotModeChangedH\x00\x12M\n\x17recording_state_changed\x18\x10 \x01(\x0b\x32*.omniseer.gateway.v1.RecordingStateChangedH\x00\x12\x45\n\x13\x63loud_state_changed\x18\x11 \x01(\x0b\x32&.omniseer.gateway.v1.CloudStateChangedH\x00\x12K\n\x16recording_copy_changed\x18\x12 \x01(\x0b\x32).omniseer.gateway.v1.RecordingCopyChangedH\x00\x42\t\n\x07payload\"8\n\x0b\x46\x61ultRaised\x12)\n\x05\x66\x61ult\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.Fault\"9\n\x0c\x46\x61ultCleared\x12)\n\x05\x66\x61ult\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.Fault\"\xa1\x01\n\x13PreviewStateChanged\x12\x30\n\x05state\x18\x01 \x01(\x0e\x32!.omniseer.gateway.v1.PreviewState\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile\x12\x12\n\nlast_error\x18\x03 \x01(\t\x12\x0e\n\x06\x63\x61mera\x18\x04 \x01(\t\"B\n\x0f\x45ncoderFallback\x12\x0f\n\x07running\x18\x01 \x01(\t\x12\x0e\n\x06wanted\x18\x02 \x01(\t\x12\x0e\n\x06reason\x18\x03 \x01(\t\",\n\x0c\x43lientJoined\x12\x0f\n\x07\x61\x64\x64ress\x18\x01 \x01(\t\x12\x0b\n\x03who\x18\x02 \x01(\t\"*\n\nClientLeft\x12\x0f\n\x07\x61\x64\x64ress\x18\x01 \x01(\t\x12\x0b\n\x03who\x18\x02 \x01(\t\"\x92\x01\n\rControlAction\x12\x0b\n\x03who\x18\x01 \x01(\t\x12\x0f\n\x07\x61\x64\x64ress\x18\x02 \x01(\t\x12\x0e\n\x06method\x18\x03 \x01(\t\x12\x0f\n\x07request\x18\x04 \x01(\t\x12\x32\n\x06result\x18\x05 \x01(\x0e\x32\".omniseer.gateway.v1.ControlResult\x12\x0e\n\x06\x61nswer\x18\x06 \x01(\t\" \n\x10RobotModeChanged\x12\x0c\n\x04mode\x18\x01 \x01(\t\"\x8b\x01\n\x08\x45ventGap\x12\x33\n\x06reason\x18\x01 \x01(\x0e\x32#.omniseer.gateway.v1.EventGapReason\x12\x14\n\x0cmissed_count\x18\x02 \x01(\x04\x12\x34\n\x08position\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\"\xc5\x02\n\x15RecordingStateChanged\x12\x34\n\x06\x63hange\x18\x01 \x01(\x0e\x32$.omniseer.gateway.v1.RecordingChange\x12\x14\n\x0crecording_id\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12\x30\n\x04kind\x18\x04 \x01(\x0e\x32\".omniseer.gateway.v1.RecordingKind\x12\x32\n\x05state\x18\x05 \x01(\x0e\x32#.omniseer.gateway.v1.RecordingState\x12=\n\x0bstop_reason\x18\x06 \x01(\x0e\x32(.omniseer.gateway.v1.RecordingStopReason\x12\x1a\n\rmessages_lost\x18\x07 \x01(\x04H\x00\x88\x01\x01\x42\x10\n\x0e_messages_lost\"W\n\x11\x43loudStateChanged\x12.\n\x05state\x18\x01 \x01(\x0e\x32\x1f.omniseer.gateway.v1.CloudState\x12\x12\n\nlast_error\x18\x02 \x01(\t\"m\n\x14RecordingCopyChanged\x12\x14\n\x0crecording_id\x18\x01 \x01(\t\x12\r\n\x05label\x18\x02 \x01(\t\x12\x30\n\x04\x63opy\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.RecordingCopy*\x83\x01\n\rControlResult\x12\x1e\n\x1a\x43ONTROL_RESULT_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x43ONTROL_RESULT_ACCEPTED\x10\x01\x12\x1a\n\x16\x43ONTROL_RESULT_REFUSED\x10\x02\x12\x19\n\x15\x43ONTROL_RESULT_FAILED\x10\x03*u\n\x0e\x45ventGapReason\x12 \n\x1c\x45VENT_GAP_REASON_UNSPECIFIED\x10\x00\x12#\n\x1f\x45VENT_GAP_REASON_NO_LONGER_KEPT\x10\x01\x12\x1c\n\x18\x45VENT_GAP_REASON_NEW_RUN\x10\x02*\xb0\x01\n\x0fRecordingChange\x12 \n\x1cRECORDING_CHANGE_UNSPECIFIED\x10\x00\x12\x1c\n\x18RECORDING_CHANGE_STARTED\x10\x01\x12\x1a\n\x16RECORDING_CHANGE_ENDED\x10\x02\x12&\n\"RECORDING_CHANGE_SNAPSHOT_COMPLETE\x10\x03\x12\x19\n\x15RECORDING_CHANGE_LOSS\x10\x04\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.event_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_CONTROLRESULT']._serialized_start=2484
-  _globals['_CONTROLRESULT']._serialized_end=2615
-  _globals['_EVENTGAPREASON']._serialized_start=2617
-  _globals['_EVENTGAPREASON']._serialized_end=2734
-  _globals['_RECORDINGCHANGE']._serialized_start=2737
-  _globals['_RECORDINGCHANGE']._serialized_end=2913
+  _globals['_CONTROLRESULT']._serialized_start=2500
+  _globals['_CONTROLRESULT']._serialized_end=2631
+  _globals['_EVENTGAPREASON']._serialized_start=2633
+  _globals['_EVENTGAPREASON']._serialized_end=2750
+  _globals['_RECORDINGCHANGE']._serialized_start=2753
+  _globals['_RECORDINGCHANGE']._serialized_end=2929
   _globals['_EVENTPOSITION']._serialized_start=228
   _globals['_EVENTPOSITION']._serialized_end=277
   _globals['_EVENT']._serialized_start=280
@@ -51,23 +51,23 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_FAULTCLEARED']._serialized_start=1265
   _globals['_FAULTCLEARED']._serialized_end=1322
   _globals['_PREVIEWSTATECHANGED']._serialized_start=1325
-  _globals['_PREVIEWSTATECHANGED']._serialized_end=1470
-  _globals['_ENCODERFALLBACK']._serialized_start=1472
-  _globals['_ENCODERFALLBACK']._serialized_end=1538
-  _globals['_CLIENTJOINED']._serialized_start=1540
-  _globals['_CLIENTJOINED']._serialized_end=1584
-  _globals['_CLIENTLEFT']._serialized_start=1586
-  _globals['_CLIENTLEFT']._serialized_end=1628
-  _globals['_CONTROLACTION']._serialized_start=1631
-  _globals['_CONTROLACTION']._serialized_end=1777
-  _globals['_ROBOTMODECHANGED']._serialized_start=1779
-  _globals['_ROBOTMODECHANGED']._serialized_end=1811
-  _globals['_EVENTGAP']._serialized_start=1814
-  _globals['_EVENTGAP']._serialized_end=1953
-  _globals['_RECORDINGSTATECHANGED']._serialized_start=1956
-  _globals['_RECORDINGSTATECHANGED']._serialized_end=2281
-  _globals['_CLOUDSTATECHANGED']._serialized_start=2283
-  _globals['_CLOUDSTATECHANGED']._serialized_end=2370
-  _globals['_RECORDINGCOPYCHANGED']._serialized_start=2372
-  _globals['_RECORDINGCOPYCHANGED']._serialized_end=2481
+  _globals['_PREVIEWSTATECHANGED']._serialized_end=1486
+  _globals['_ENCODERFALLBACK']._serialized_start=1488
+  _globals['_ENCODERFALLBACK']._serialized_end=1554
+  _globals['_CLIENTJOINED']._serialized_start=1556
+  _globals['_CLIENTJOINED']._serialized_end=1600
+  _globals['_CLIENTLEFT']._serialized_start=1602
+  _globals['_CLIENTLEFT']._serialized_end=1644
+  _globals['_CONTROLACTION']._serialized_start=1647
+  _globals['_CONTROLACTION']._serialized_end=1793
+  _globals['_ROBOTMODECHANGED']._serialized_start=1795
+  _globals['_ROBOTMODECHANGED']._serialized_end=1827
+  _globals['_EVENTGAP']._serialized_start=1830
+  _globals['_EVENTGAP']._serialized_end=1969
+  _globals['_RECORDINGSTATECHANGED']._serialized_start=1972
+  _globals['_RECORDINGSTATECHANGED']._serialized_end=2297
+  _globals['_CLOUDSTATECHANGED']._serialized_start=2299
+  _globals['_CLOUDSTATECHANGED']._serialized_end=2386
+  _globals['_RECORDINGCOPYCHANGED']._serialized_start=2388
+  _globals['_RECORDINGCOPYCHANGED']._serialized_end=2497
 # @@protoc_insertion_point(module_scope)

@@ -301,7 +301,7 @@ Global___FaultCleared: _TypeAlias = FaultCleared  # noqa: Y015
 
 @_typing.final
 class PreviewStateChanged(_message.Message):
-    """The preview settled in another state, or with another profile. Transitional states
+    """The preview settled in another state, with another profile, or another camera is live. Transitional states
     (starting, stopping) and the retries of a faulted preview are no events.
     """
 
@@ -310,22 +310,26 @@ class PreviewStateChanged(_message.Message):
     STATE_FIELD_NUMBER: _builtins.int
     PROFILE_FIELD_NUMBER: _builtins.int
     LAST_ERROR_FIELD_NUMBER: _builtins.int
+    CAMERA_FIELD_NUMBER: _builtins.int
     state: _states_pb2.PreviewState.ValueType
     """PREVIEW_DISABLED, PREVIEW_RUNNING or PREVIEW_FAULTED."""
     profile: _preview_pb2.PreviewProfile.ValueType
     """As in PreviewStatus."""
     last_error: _builtins.str
     """Why it is faulted and what to do. Empty when it is not."""
+    camera: _builtins.str
+    """Name of the live camera. Empty unless it is PREVIEW_RUNNING, and for robots older than this field."""
     def __init__(
         self,
         *,
         state: _states_pb2.PreviewState.ValueType = ...,
         profile: _preview_pb2.PreviewProfile.ValueType = ...,
         last_error: _builtins.str = ...,
+        camera: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["last_error", b"last_error", "profile", b"profile", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["camera", b"camera", "last_error", b"last_error", "profile", b"profile", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -25,33 +25,37 @@ _sym_db = _symbol_database.Default()
 from omniseer.gateway.v1 import states_pb2 as omniseer_dot_gateway_dot_v1_dot_states__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!omniseer/gateway/v1/preview.proto\x12\x13omniseer.gateway.v1\x1a omniseer/gateway/v1/states.proto\"\xea\x03\n\rPreviewStatus\x12\x30\n\x05state\x18\x01 \x01(\x0e\x32!.omniseer.gateway.v1.PreviewState\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile\x12\x12\n\nlast_error\x18\x03 \x01(\t\x12\x35\n\x08\x65ndpoint\x18\x10 \x01(\x0b\x32#.omniseer.gateway.v1.StreamEndpoint\x12\x33\n\x07\x65ncoder\x18\x11 \x01(\x0b\x32\".omniseer.gateway.v1.EncoderStatus\x12/\n\x05video\x18\x12 \x01(\x0b\x32 .omniseer.gateway.v1.VideoFormat\x12\x1b\n\x13target_bitrate_kbps\x18\x13 \x01(\r\x12\x38\n\x08measured\x18\x14 \x01(\x0b\x32&.omniseer.gateway.v1.StreamMeasurement\x12\x36\n\x08\x63ounters\x18\x15 \x01(\x0b\x32$.omniseer.gateway.v1.PreviewCounters\x12\x19\n\x11service_reachable\x18\x16 \x01(\x08\x12\x16\n\x0e\x62itrate_reason\x18\x17 \x01(\t\"\xcc\x02\n\x0eStreamEndpoint\x12\x37\n\ttransport\x18\x01 \x01(\x0e\x32$.omniseer.gateway.v1.StreamTransport\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0c\n\x04port\x18\x03 \x01(\r\x12\x0b\n\x03uri\x18\x04 \x01(\t\x12\x12\n\nlatency_ms\x18\x05 \x01(\r\x12.\n\x05\x63odec\x18\x06 \x01(\x0e\x32\x1f.omniseer.gateway.v1.VideoCodec\x12\x37\n\tcontainer\x18\x07 \x01(\x0e\x32$.omniseer.gateway.v1.StreamContainer\x12\x12\n\npassphrase\x18\x08 \x01(\t\x12\x11\n\tencrypted\x18\t \x01(\x08\x12\x1e\n\x11\x63\x61pture_offset_ns\x18\n \x01(\x03H\x00\x88\x01\x01\x42\x14\n\x12_capture_offset_ns\"\x88\x01\n\rEncoderStatus\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08hardware\x18\x02 \x01(\x08\x12\x0e\n\x06wanted\x18\x03 \x01(\t\x12\x17\n\x0f\x66\x61llback_reason\x18\x04 \x01(\t\x12.\n\x05\x63odec\x18\x05 \x01(\x0e\x32\x1f.omniseer.gateway.v1.VideoCodec\"?\n\x0bVideoFormat\x12\x10\n\x08width_px\x18\x01 \x01(\r\x12\x11\n\theight_px\x18\x02 \x01(\r\x12\x0b\n\x03\x66ps\x18\x03 \x01(\x02\"\xf4\x02\n\x11StreamMeasurement\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x03 \x01(\x04\x12\x0b\n\x03\x66ps\x18\x04 \x01(\x02\x12\x14\n\x0c\x62itrate_kbps\x18\x05 \x01(\x02\x12\x14\n\x0cviewer_count\x18\x06 \x01(\r\x12\x1e\n\x11last_frame_age_ms\x18\x07 \x01(\x04H\x00\x88\x01\x01\x12\x19\n\x0cworst_rtt_ms\x18\x08 \x01(\x02H\x01\x88\x01\x01\x12\x1f\n\x12worst_loss_percent\x18\t \x01(\x02H\x02\x88\x01\x01\x12!\n\x14worst_picture_age_ms\x18\n \x01(\rH\x03\x88\x01\x01\x12\x1e\n\x16reporting_viewer_count\x18\x0b \x01(\rB\x14\n\x12_last_frame_age_msB\x0f\n\r_worst_rtt_msB\x15\n\x13_worst_loss_percentB\x17\n\x15_worst_picture_age_ms\"o\n\x0fPreviewCounters\x12\x0e\n\x06starts\x18\x01 \x01(\x04\x12\x10\n\x08restarts\x18\x02 \x01(\x04\x12\x0e\n\x06\x66\x61ults\x18\x03 \x01(\x04\x12\x11\n\tfallbacks\x18\x04 \x01(\x04\x12\x17\n\x0fviewers_refused\x18\x05 \x01(\x04*\x8d\x01\n\x0ePreviewProfile\x12\x1f\n\x1bPREVIEW_PROFILE_UNSPECIFIED\x10\x00\x12\x1a\n\x16PREVIEW_PROFILE_LOW_BW\x10\x01\x12\x1c\n\x18PREVIEW_PROFILE_BALANCED\x10\x02\x12 \n\x1cPREVIEW_PROFILE_HIGH_QUALITY\x10\x03*U\n\nVideoCodec\x12\x1b\n\x17VIDEO_CODEC_UNSPECIFIED\x10\x00\x12\x14\n\x10VIDEO_CODEC_H264\x10\x01\x12\x14\n\x10VIDEO_CODEC_H265\x10\x02*M\n\x0fStreamTransport\x12 \n\x1cSTREAM_TRANSPORT_UNSPECIFIED\x10\x00\x12\x18\n\x14STREAM_TRANSPORT_SRT\x10\x01*Q\n\x0fStreamContainer\x12 \n\x1cSTREAM_CONTAINER_UNSPECIFIED\x10\x00\x12\x1c\n\x18STREAM_CONTAINER_MPEG_TS\x10\x01*r\n\x0fPictureDelivery\x12 \n\x1cPICTURE_DELIVERY_UNSPECIFIED\x10\x00\x12\x1b\n\x17PICTURE_DELIVERY_DIRECT\x10\x01\x12 \n\x1cPICTURE_DELIVERY_SRT_LATENCY\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!omniseer/gateway/v1/preview.proto\x12\x13omniseer.gateway.v1\x1a omniseer/gateway/v1/states.proto\"h\n\x06\x43\x61mera\x12\x0c\n\x04name\x18\x01 \x01(\t\x12/\n\x05state\x18\x02 \x01(\x0e\x32 .omniseer.gateway.v1.CameraState\x12\r\n\x05\x65rror\x18\x03 \x01(\t\x12\x10\n\x08\x66\x61llback\x18\x04 \x01(\t\"\xaf\x04\n\rPreviewStatus\x12\x30\n\x05state\x18\x01 \x01(\x0e\x32!.omniseer.gateway.v1.PreviewState\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile\x12\x12\n\nlast_error\x18\x03 \x01(\t\x12\x35\n\x08\x65ndpoint\x18\x10 \x01(\x0b\x32#.omniseer.gateway.v1.StreamEndpoint\x12\x33\n\x07\x65ncoder\x18\x11 \x01(\x0b\x32\".omniseer.gateway.v1.EncoderStatus\x12/\n\x05video\x18\x12 \x01(\x0b\x32 .omniseer.gateway.v1.VideoFormat\x12\x1b\n\x13target_bitrate_kbps\x18\x13 \x01(\r\x12\x38\n\x08measured\x18\x14 \x01(\x0b\x32&.omniseer.gateway.v1.StreamMeasurement\x12\x36\n\x08\x63ounters\x18\x15 \x01(\x0b\x32$.omniseer.gateway.v1.PreviewCounters\x12\x19\n\x11service_reachable\x18\x16 \x01(\x08\x12\x16\n\x0e\x62itrate_reason\x18\x17 \x01(\t\x12\x15\n\rwanted_camera\x18\x18 \x01(\t\x12,\n\x07\x63\x61meras\x18\x19 \x03(\x0b\x32\x1b.omniseer.gateway.v1.Camera\"\xcc\x02\n\x0eStreamEndpoint\x12\x37\n\ttransport\x18\x01 \x01(\x0e\x32$.omniseer.gateway.v1.StreamTransport\x12\x0c\n\x04host\x18\x02 \x01(\t\x12\x0c\n\x04port\x18\x03 \x01(\r\x12\x0b\n\x03uri\x18\x04 \x01(\t\x12\x12\n\nlatency_ms\x18\x05 \x01(\r\x12.\n\x05\x63odec\x18\x06 \x01(\x0e\x32\x1f.omniseer.gateway.v1.VideoCodec\x12\x37\n\tcontainer\x18\x07 \x01(\x0e\x32$.omniseer.gateway.v1.StreamContainer\x12\x12\n\npassphrase\x18\x08 \x01(\t\x12\x11\n\tencrypted\x18\t \x01(\x08\x12\x1e\n\x11\x63\x61pture_offset_ns\x18\n \x01(\x03H\x00\x88\x01\x01\x42\x14\n\x12_capture_offset_ns\"\x88\x01\n\rEncoderStatus\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08hardware\x18\x02 \x01(\x08\x12\x0e\n\x06wanted\x18\x03 \x01(\t\x12\x17\n\x0f\x66\x61llback_reason\x18\x04 \x01(\t\x12.\n\x05\x63odec\x18\x05 \x01(\x0e\x32\x1f.omniseer.gateway.v1.VideoCodec\"?\n\x0bVideoFormat\x12\x10\n\x08width_px\x18\x01 \x01(\r\x12\x11\n\theight_px\x18\x02 \x01(\r\x12\x0b\n\x03\x66ps\x18\x03 \x01(\x02\"\xf4\x02\n\x11StreamMeasurement\x12\x11\n\tavailable\x18\x01 \x01(\x08\x12\r\n\x05stale\x18\x02 \x01(\x08\x12\x0e\n\x06\x61ge_ms\x18\x03 \x01(\x04\x12\x0b\n\x03\x66ps\x18\x04 \x01(\x02\x12\x14\n\x0c\x62itrate_kbps\x18\x05 \x01(\x02\x12\x14\n\x0cviewer_count\x18\x06 \x01(\r\x12\x1e\n\x11last_frame_age_ms\x18\x07 \x01(\x04H\x00\x88\x01\x01\x12\x19\n\x0cworst_rtt_ms\x18\x08 \x01(\x02H\x01\x88\x01\x01\x12\x1f\n\x12worst_loss_percent\x18\t \x01(\x02H\x02\x88\x01\x01\x12!\n\x14worst_picture_age_ms\x18\n \x01(\rH\x03\x88\x01\x01\x12\x1e\n\x16reporting_viewer_count\x18\x0b \x01(\rB\x14\n\x12_last_frame_age_msB\x0f\n\r_worst_rtt_msB\x15\n\x13_worst_loss_percentB\x17\n\x15_worst_picture_age_ms\"o\n\x0fPreviewCounters\x12\x0e\n\x06starts\x18\x01 \x01(\x04\x12\x10\n\x08restarts\x18\x02 \x01(\x04\x12\x0e\n\x06\x66\x61ults\x18\x03 \x01(\x04\x12\x11\n\tfallbacks\x18\x04 \x01(\x04\x12\x17\n\x0fviewers_refused\x18\x05 \x01(\x04*\x8d\x01\n\x0ePreviewProfile\x12\x1f\n\x1bPREVIEW_PROFILE_UNSPECIFIED\x10\x00\x12\x1a\n\x16PREVIEW_PROFILE_LOW_BW\x10\x01\x12\x1c\n\x18PREVIEW_PROFILE_BALANCED\x10\x02\x12 \n\x1cPREVIEW_PROFILE_HIGH_QUALITY\x10\x03*U\n\nVideoCodec\x12\x1b\n\x17VIDEO_CODEC_UNSPECIFIED\x10\x00\x12\x14\n\x10VIDEO_CODEC_H264\x10\x01\x12\x14\n\x10VIDEO_CODEC_H265\x10\x02*M\n\x0fStreamTransport\x12 \n\x1cSTREAM_TRANSPORT_UNSPECIFIED\x10\x00\x12\x18\n\x14STREAM_TRANSPORT_SRT\x10\x01*Q\n\x0fStreamContainer\x12 \n\x1cSTREAM_CONTAINER_UNSPECIFIED\x10\x00\x12\x1c\n\x18STREAM_CONTAINER_MPEG_TS\x10\x01*r\n\x0fPictureDelivery\x12 \n\x1cPICTURE_DELIVERY_UNSPECIFIED\x10\x00\x12\x1b\n\x17PICTURE_DELIVERY_DIRECT\x10\x01\x12 \n\x1cPICTURE_DELIVERY_SRT_LATENCY\x10\x02*\x8e\x01\n\x0b\x43\x61meraState\x12\x1c\n\x18\x43\x41MERA_STATE_UNSPECIFIED\x10\x00\x12\x16\n\x12\x43\x41MERA_STATE_READY\x10\x01\x12\x19\n\x15\x43\x41MERA_STATE_STARTING\x10\x02\x12\x15\n\x11\x43\x41MERA_STATE_LIVE\x10\x03\x12\x17\n\x13\x43\x41MERA_STATE_FAILED\x10\x04\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.preview_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_PREVIEWPROFILE']._serialized_start=1613
-  _globals['_PREVIEWPROFILE']._serialized_end=1754
-  _globals['_VIDEOCODEC']._serialized_start=1756
-  _globals['_VIDEOCODEC']._serialized_end=1841
-  _globals['_STREAMTRANSPORT']._serialized_start=1843
-  _globals['_STREAMTRANSPORT']._serialized_end=1920
-  _globals['_STREAMCONTAINER']._serialized_start=1922
-  _globals['_STREAMCONTAINER']._serialized_end=2003
-  _globals['_PICTUREDELIVERY']._serialized_start=2005
-  _globals['_PICTUREDELIVERY']._serialized_end=2119
-  _globals['_PREVIEWSTATUS']._serialized_start=93
-  _globals['_PREVIEWSTATUS']._serialized_end=583
-  _globals['_STREAMENDPOINT']._serialized_start=586
-  _globals['_STREAMENDPOINT']._serialized_end=918
-  _globals['_ENCODERSTATUS']._serialized_start=921
-  _globals['_ENCODERSTATUS']._serialized_end=1057
-  _globals['_VIDEOFORMAT']._serialized_start=1059
-  _globals['_VIDEOFORMAT']._serialized_end=1122
-  _globals['_STREAMMEASUREMENT']._serialized_start=1125
-  _globals['_STREAMMEASUREMENT']._serialized_end=1497
-  _globals['_PREVIEWCOUNTERS']._serialized_start=1499
-  _globals['_PREVIEWCOUNTERS']._serialized_end=1610
+  _globals['_PREVIEWPROFILE']._serialized_start=1788
+  _globals['_PREVIEWPROFILE']._serialized_end=1929
+  _globals['_VIDEOCODEC']._serialized_start=1931
+  _globals['_VIDEOCODEC']._serialized_end=2016
+  _globals['_STREAMTRANSPORT']._serialized_start=2018
+  _globals['_STREAMTRANSPORT']._serialized_end=2095
+  _globals['_STREAMCONTAINER']._serialized_start=2097
+  _globals['_STREAMCONTAINER']._serialized_end=2178
+  _globals['_PICTUREDELIVERY']._serialized_start=2180
+  _globals['_PICTUREDELIVERY']._serialized_end=2294
+  _globals['_CAMERASTATE']._serialized_start=2297
+  _globals['_CAMERASTATE']._serialized_end=2439
+  _globals['_CAMERA']._serialized_start=92
+  _globals['_CAMERA']._serialized_end=196
+  _globals['_PREVIEWSTATUS']._serialized_start=199
+  _globals['_PREVIEWSTATUS']._serialized_end=758
+  _globals['_STREAMENDPOINT']._serialized_start=761
+  _globals['_STREAMENDPOINT']._serialized_end=1093
+  _globals['_ENCODERSTATUS']._serialized_start=1096
+  _globals['_ENCODERSTATUS']._serialized_end=1232
+  _globals['_VIDEOFORMAT']._serialized_start=1234
+  _globals['_VIDEOFORMAT']._serialized_end=1297
+  _globals['_STREAMMEASUREMENT']._serialized_start=1300
+  _globals['_STREAMMEASUREMENT']._serialized_end=1672
+  _globals['_PREVIEWCOUNTERS']._serialized_start=1674
+  _globals['_PREVIEWCOUNTERS']._serialized_end=1785
 # @@protoc_insertion_point(module_scope)

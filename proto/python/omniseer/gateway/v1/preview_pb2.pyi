@@ -3,8 +3,10 @@
 isort:skip_file
 """
 
+from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
+from google.protobuf.internal import containers as _containers
 from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 import builtins as _builtins
@@ -136,6 +138,74 @@ PICTURE_DELIVERY_SRT_LATENCY: PictureDelivery.ValueType  # 2
 """Every packet waits for the SRT latency, lost or not."""
 Global___PictureDelivery: _TypeAlias = PictureDelivery  # noqa: Y015
 
+class _CameraState:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _CameraStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_CameraState.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    CAMERA_STATE_UNSPECIFIED: _CameraState.ValueType  # 0
+    """Not known, or newer than this client."""
+    CAMERA_STATE_READY: _CameraState.ValueType  # 1
+    """It is there, and delivered when it was last used, or has not been used yet."""
+    CAMERA_STATE_STARTING: _CameraState.ValueType  # 2
+    """It is being started, to become the live one."""
+    CAMERA_STATE_LIVE: _CameraState.ValueType  # 3
+    """Its frames are the stream's."""
+    CAMERA_STATE_FAILED: _CameraState.ValueType  # 4
+    """It is missing, or failed when it was last used."""
+
+class CameraState(_CameraState, metaclass=_CameraStateEnumTypeWrapper):
+    """What is known of a camera. No camera is opened to find out: one that has not been used is READY if it is
+    there.
+    """
+
+CAMERA_STATE_UNSPECIFIED: CameraState.ValueType  # 0
+"""Not known, or newer than this client."""
+CAMERA_STATE_READY: CameraState.ValueType  # 1
+"""It is there, and delivered when it was last used, or has not been used yet."""
+CAMERA_STATE_STARTING: CameraState.ValueType  # 2
+"""It is being started, to become the live one."""
+CAMERA_STATE_LIVE: CameraState.ValueType  # 3
+"""Its frames are the stream's."""
+CAMERA_STATE_FAILED: CameraState.ValueType  # 4
+"""It is missing, or failed when it was last used."""
+Global___CameraState: _TypeAlias = CameraState  # noqa: Y015
+
+@_typing.final
+class Camera(_message.Message):
+    """A camera of the robot, or another source of video."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    STATE_FIELD_NUMBER: _builtins.int
+    ERROR_FIELD_NUMBER: _builtins.int
+    FALLBACK_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """Its name in the robot's configuration: lower-case letters, digits, hyphens and underscores."""
+    state: Global___CameraState.ValueType
+    """At this moment."""
+    error: _builtins.str
+    """Why it has failed and what to do, for a person to read. Empty unless it has."""
+    fallback: _builtins.str
+    """Name of the camera that takes its place while it fails. Empty: none does."""
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+        state: Global___CameraState.ValueType = ...,
+        error: _builtins.str = ...,
+        fallback: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["error", b"error", "fallback", b"fallback", "name", b"name", "state", b"state"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Camera: _TypeAlias = Camera  # noqa: Y015
+
 @_typing.final
 class PreviewStatus(_message.Message):
     """The live preview as the gateway knows it. Answered from memory."""
@@ -153,6 +223,8 @@ class PreviewStatus(_message.Message):
     COUNTERS_FIELD_NUMBER: _builtins.int
     SERVICE_REACHABLE_FIELD_NUMBER: _builtins.int
     BITRATE_REASON_FIELD_NUMBER: _builtins.int
+    WANTED_CAMERA_FIELD_NUMBER: _builtins.int
+    CAMERAS_FIELD_NUMBER: _builtins.int
     state: _states_pb2.PreviewState.ValueType
     """State of the preview."""
     profile: Global___PreviewProfile.ValueType
@@ -170,6 +242,10 @@ class PreviewStatus(_message.Message):
     bitrate_reason: _builtins.str
     """Why the target bit rate is what it is, for a person to read, when the robot changed it on its
     own ("RTT 180 ms, 6 % loss: 2500 -> 1200 kbit/s"). Empty when it is the profile's own.
+    """
+    wanted_camera: _builtins.str
+    """Name of the camera that an operator chose last, or the robot's first one: it is live as far as it works.
+    Empty while the preview service does not answer, and for robots older than this field.
     """
     @_builtins.property
     def endpoint(self) -> Global___StreamEndpoint:
@@ -191,6 +267,10 @@ class PreviewStatus(_message.Message):
     def counters(self) -> Global___PreviewCounters:
         """Counts since the gateway started; restarts of the preview service do not reset them."""
 
+    @_builtins.property
+    def cameras(self) -> _containers.RepeatedCompositeFieldContainer[Global___Camera]:
+        """All cameras, in the order of the robot's configuration; at most one is LIVE. Empty as above."""
+
     def __init__(
         self,
         *,
@@ -205,10 +285,12 @@ class PreviewStatus(_message.Message):
         counters: Global___PreviewCounters | None = ...,
         service_reachable: _builtins.bool = ...,
         bitrate_reason: _builtins.str = ...,
+        wanted_camera: _builtins.str = ...,
+        cameras: _abc.Iterable[Global___Camera] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["counters", b"counters", "encoder", b"encoder", "endpoint", b"endpoint", "measured", b"measured", "video", b"video"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["bitrate_reason", b"bitrate_reason", "counters", b"counters", "encoder", b"encoder", "endpoint", b"endpoint", "last_error", b"last_error", "measured", b"measured", "profile", b"profile", "service_reachable", b"service_reachable", "state", b"state", "target_bitrate_kbps", b"target_bitrate_kbps", "video", b"video"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["bitrate_reason", b"bitrate_reason", "cameras", b"cameras", "counters", b"counters", "encoder", b"encoder", "endpoint", b"endpoint", "last_error", b"last_error", "measured", b"measured", "profile", b"profile", "service_reachable", b"service_reachable", "state", b"state", "target_bitrate_kbps", b"target_bitrate_kbps", "video", b"video", "wanted_camera", b"wanted_camera"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

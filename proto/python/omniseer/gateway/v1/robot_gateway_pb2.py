@@ -32,13 +32,15 @@ from omniseer.gateway.v1 import preview_pb2 as omniseer_dot_gateway_dot_v1_dot_p
 from omniseer.gateway.v1 import system_status_pb2 as omniseer_dot_gateway_dot_v1_dot_system__status__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/robot_gateway.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\x1a\x1fomniseer/gateway/v1/event.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a&omniseer/gateway/v1/gateway_info.proto\x1a!omniseer/gateway/v1/overlay.proto\x1a!omniseer/gateway/v1/preview.proto\x1a\'omniseer/gateway/v1/system_status.proto\"\x18\n\x16GetSystemStatusRequest\"\x1b\n\x19GetOverlaySnapshotRequest\"\x17\n\x15GetGatewayInfoRequest\"\xe7\x01\n\x16GetGatewayInfoResponse\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x32\n\x07gateway\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.GatewayFacts\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x32\n\x07methods\x18\x05 \x03(\x0b\x32!.omniseer.gateway.v1.MethodCounts\x12\x1a\n\x12\x63onfiguration_json\x18\x06 \x01(\t\"\xaf\x02\n\x15SetPreviewModeRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile:\xce\x01\xbaH\xca\x01\x1a\xc7\x01\n\rprofile.known\x1a\xb5\x01!this.enabled || this.profile in [0, 1, 2, 3] ? \'\' : \'profile \' + string(this.profile) + \' does not exist; choose 1 low-bw, 2 balanced, 3 high-quality, or 0 to keep the present one\'\"p\n\x16SetPreviewModeResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\"Z\n\x18WatchSystemStatusRequest\x12\"\n\x0fmin_interval_ms\x18\x01 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\x1a\n\x12include_detections\x18\x10 \x01(\x08\"\xa5\x01\n\x19WatchSystemStatusResponse\x12\x31\n\x06status\x18\x01 \x01(\x0b\x32!.omniseer.gateway.v1.SystemStatus\x12\x14\n\x0cmonotonic_ns\x18\x02 \x01(\x04\x12?\n\ndetections\x18\x10 \x01(\x0b\x32+.omniseer.gateway.v1.DetectionOverlayStatus\"\x8f\x01\n\x16SubscribeEventsRequest\x12\x31\n\x05\x61\x66ter\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\x12\x42\n\x0cmin_severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverityB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xb5\x01\n\x17SubscribeEventsResponse\x12+\n\x05\x65vent\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.EventH\x00\x12,\n\x03gap\x18\x02 \x01(\x0b\x32\x1d.omniseer.gateway.v1.EventGapH\x00\x12\x37\n\tcaught_up\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPositionH\x00\x42\x06\n\x04item\"\r\n\x0bPingRequest\"Q\n\x0cPingResponse\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ns\x18\x02 \x01(\x04\x12\x0f\n\x07\x62oot_id\x18\x03 \x01(\t\"@\n\x16RequestKeyFrameRequest\x12\x17\n\nnewest_pts\x18\x01 \x01(\x04H\x00\x88\x01\x01\x42\r\n\x0b_newest_pts\")\n\x17RequestKeyFrameResponse\x12\x0e\n\x06\x66orced\x18\x01 \x01(\x08\"\xe2\x02\n\x14ReportPictureRequest\x12$\n\tviewer_id\x18\x01 \x01(\tB\x11\xbaH\x0er\x0c\x18@2\x08^[ -~]*$\x12!\n\x0epicture_age_ms\x18\x02 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\'\n\x14picture_age_error_ms\x18\x03 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\x1e\n\x06rtt_ms\x18\x04 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03H\x00\x88\x01\x01\x12*\n\x0closs_percent\x18\x05 \x01(\x02\x42\x0f\xbaH\x0c\n\n\x1d\x00\x00\xc8\x42-\x00\x00\x00\x00H\x01\x88\x01\x01\x12\x14\n\x0cpackets_held\x18\x06 \x01(\x04\x12\x18\n\x10packets_given_up\x18\x07 \x01(\x04\x12@\n\x08\x64\x65livery\x18\x08 \x01(\x0e\x32$.omniseer.gateway.v1.PictureDeliveryB\x08\xbaH\x05\x82\x01\x02\x10\x01\x42\t\n\x07_rtt_msB\x0f\n\r_loss_percent\"\x17\n\x15ReportPictureResponse\"*\n\x17SetTeleopEnabledRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\"p\n\x18SetTeleopEnabledResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x31\n\x06teleop\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus\"_\n\x18SendTeleopCommandRequest\x12\x14\n\x0clinear_x_mps\x18\x01 \x01(\x02\x12\x14\n\x0clinear_y_mps\x18\x02 \x01(\x02\x12\x17\n\x0f\x61ngular_z_rad_s\x18\x03 \x01(\x02\"q\n\x19SendTeleopCommandResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x31\n\x06teleop\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus2\xe3\t\n\x0cRobotGateway\x12g\n\x0fGetSystemStatus\x12+.omniseer.gateway.v1.GetSystemStatusRequest\x1a!.omniseer.gateway.v1.SystemStatus\"\x04\x98\xb8\x18\x01\x12o\n\x0eSetPreviewMode\x12*.omniseer.gateway.v1.SetPreviewModeRequest\x1a+.omniseer.gateway.v1.SetPreviewModeResponse\"\x04\x98\xb8\x18\x02\x12p\n\x12GetOverlaySnapshot\x12..omniseer.gateway.v1.GetOverlaySnapshotRequest\x1a$.omniseer.gateway.v1.OverlaySnapshot\"\x04\x98\xb8\x18\x01\x12o\n\x0eGetGatewayInfo\x12*.omniseer.gateway.v1.GetGatewayInfoRequest\x1a+.omniseer.gateway.v1.GetGatewayInfoResponse\"\x04\x98\xb8\x18\x01\x12z\n\x11WatchSystemStatus\x12-.omniseer.gateway.v1.WatchSystemStatusRequest\x1a..omniseer.gateway.v1.WatchSystemStatusResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12t\n\x0fSubscribeEvents\x12+.omniseer.gateway.v1.SubscribeEventsRequest\x1a,.omniseer.gateway.v1.SubscribeEventsResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12Q\n\x04Ping\x12 .omniseer.gateway.v1.PingRequest\x1a!.omniseer.gateway.v1.PingResponse\"\x04\x98\xb8\x18\x01\x12r\n\x0fRequestKeyFrame\x12+.omniseer.gateway.v1.RequestKeyFrameRequest\x1a,.omniseer.gateway.v1.RequestKeyFrameResponse\"\x04\x98\xb8\x18\x01\x12l\n\rReportPicture\x12).omniseer.gateway.v1.ReportPictureRequest\x1a*.omniseer.gateway.v1.ReportPictureResponse\"\x04\x98\xb8\x18\x01\x12u\n\x10SetTeleopEnabled\x12,.omniseer.gateway.v1.SetTeleopEnabledRequest\x1a-.omniseer.gateway.v1.SetTeleopEnabledResponse\"\x04\x98\xb8\x18\x02\x12x\n\x11SendTeleopCommand\x12-.omniseer.gateway.v1.SendTeleopCommandRequest\x1a..omniseer.gateway.v1.SendTeleopCommandResponse\"\x04\x98\xb8\x18\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\'omniseer/gateway/v1/robot_gateway.proto\x12\x13omniseer.gateway.v1\x1a\x1b\x62uf/validate/validate.proto\x1a omniseer/gateway/v1/access.proto\x1a\x1fomniseer/gateway/v1/event.proto\x1a\x1fomniseer/gateway/v1/fault.proto\x1a&omniseer/gateway/v1/gateway_info.proto\x1a!omniseer/gateway/v1/overlay.proto\x1a!omniseer/gateway/v1/preview.proto\x1a\'omniseer/gateway/v1/system_status.proto\"\x18\n\x16GetSystemStatusRequest\"\x1b\n\x19GetOverlaySnapshotRequest\"\x17\n\x15GetGatewayInfoRequest\"\xe7\x01\n\x16GetGatewayInfoResponse\x12\x14\n\x0cgateway_name\x18\x01 \x01(\t\x12\x17\n\x0fgateway_version\x18\x02 \x01(\t\x12\x32\n\x07gateway\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.GatewayFacts\x12\x1a\n\x12wall_clock_unix_ms\x18\x04 \x01(\x04\x12\x32\n\x07methods\x18\x05 \x03(\x0b\x32!.omniseer.gateway.v1.MethodCounts\x12\x1a\n\x12\x63onfiguration_json\x18\x06 \x01(\t\"\xc8\x02\n\x15SetPreviewModeRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\x12\x34\n\x07profile\x18\x02 \x01(\x0e\x32#.omniseer.gateway.v1.PreviewProfile\x12\x17\n\x06\x63\x61mera\x18\x03 \x01(\tB\x07\xbaH\x04r\x02\x18@:\xce\x01\xbaH\xca\x01\x1a\xc7\x01\n\rprofile.known\x1a\xb5\x01!this.enabled || this.profile in [0, 1, 2, 3] ? \'\' : \'profile \' + string(this.profile) + \' does not exist; choose 1 low-bw, 2 balanced, 3 high-quality, or 0 to keep the present one\'\"p\n\x16SetPreviewModeResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x33\n\x07preview\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.PreviewStatus\"Z\n\x18WatchSystemStatusRequest\x12\"\n\x0fmin_interval_ms\x18\x01 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\x1a\n\x12include_detections\x18\x10 \x01(\x08\"\xa5\x01\n\x19WatchSystemStatusResponse\x12\x31\n\x06status\x18\x01 \x01(\x0b\x32!.omniseer.gateway.v1.SystemStatus\x12\x14\n\x0cmonotonic_ns\x18\x02 \x01(\x04\x12?\n\ndetections\x18\x10 \x01(\x0b\x32+.omniseer.gateway.v1.DetectionOverlayStatus\"\x8f\x01\n\x16SubscribeEventsRequest\x12\x31\n\x05\x61\x66ter\x18\x01 \x01(\x0b\x32\".omniseer.gateway.v1.EventPosition\x12\x42\n\x0cmin_severity\x18\x02 \x01(\x0e\x32\".omniseer.gateway.v1.FaultSeverityB\x08\xbaH\x05\x82\x01\x02\x10\x01\"\xb5\x01\n\x17SubscribeEventsResponse\x12+\n\x05\x65vent\x18\x01 \x01(\x0b\x32\x1a.omniseer.gateway.v1.EventH\x00\x12,\n\x03gap\x18\x02 \x01(\x0b\x32\x1d.omniseer.gateway.v1.EventGapH\x00\x12\x37\n\tcaught_up\x18\x03 \x01(\x0b\x32\".omniseer.gateway.v1.EventPositionH\x00\x42\x06\n\x04item\"\r\n\x0bPingRequest\"Q\n\x0cPingResponse\x12\x14\n\x0cmonotonic_ns\x18\x01 \x01(\x04\x12\x1a\n\x12wall_clock_unix_ns\x18\x02 \x01(\x04\x12\x0f\n\x07\x62oot_id\x18\x03 \x01(\t\"@\n\x16RequestKeyFrameRequest\x12\x17\n\nnewest_pts\x18\x01 \x01(\x04H\x00\x88\x01\x01\x42\r\n\x0b_newest_pts\")\n\x17RequestKeyFrameResponse\x12\x0e\n\x06\x66orced\x18\x01 \x01(\x08\"\xe2\x02\n\x14ReportPictureRequest\x12$\n\tviewer_id\x18\x01 \x01(\tB\x11\xbaH\x0er\x0c\x18@2\x08^[ -~]*$\x12!\n\x0epicture_age_ms\x18\x02 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\'\n\x14picture_age_error_ms\x18\x03 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03\x12\x1e\n\x06rtt_ms\x18\x04 \x01(\rB\t\xbaH\x06*\x04\x18\xe0\xd4\x03H\x00\x88\x01\x01\x12*\n\x0closs_percent\x18\x05 \x01(\x02\x42\x0f\xbaH\x0c\n\n\x1d\x00\x00\xc8\x42-\x00\x00\x00\x00H\x01\x88\x01\x01\x12\x14\n\x0cpackets_held\x18\x06 \x01(\x04\x12\x18\n\x10packets_given_up\x18\x07 \x01(\x04\x12@\n\x08\x64\x65livery\x18\x08 \x01(\x0e\x32$.omniseer.gateway.v1.PictureDeliveryB\x08\xbaH\x05\x82\x01\x02\x10\x01\x42\t\n\x07_rtt_msB\x0f\n\r_loss_percent\"\x17\n\x15ReportPictureResponse\"*\n\x17SetTeleopEnabledRequest\x12\x0f\n\x07\x65nabled\x18\x01 \x01(\x08\"p\n\x18SetTeleopEnabledResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x31\n\x06teleop\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus\"_\n\x18SendTeleopCommandRequest\x12\x14\n\x0clinear_x_mps\x18\x01 \x01(\x02\x12\x14\n\x0clinear_y_mps\x18\x02 \x01(\x02\x12\x17\n\x0f\x61ngular_z_rad_s\x18\x03 \x01(\x02\"q\n\x19SendTeleopCommandResponse\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x01 \x01(\x08\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x31\n\x06teleop\x18\x03 \x01(\x0b\x32!.omniseer.gateway.v1.TeleopStatus2\xe3\t\n\x0cRobotGateway\x12g\n\x0fGetSystemStatus\x12+.omniseer.gateway.v1.GetSystemStatusRequest\x1a!.omniseer.gateway.v1.SystemStatus\"\x04\x98\xb8\x18\x01\x12o\n\x0eSetPreviewMode\x12*.omniseer.gateway.v1.SetPreviewModeRequest\x1a+.omniseer.gateway.v1.SetPreviewModeResponse\"\x04\x98\xb8\x18\x02\x12p\n\x12GetOverlaySnapshot\x12..omniseer.gateway.v1.GetOverlaySnapshotRequest\x1a$.omniseer.gateway.v1.OverlaySnapshot\"\x04\x98\xb8\x18\x01\x12o\n\x0eGetGatewayInfo\x12*.omniseer.gateway.v1.GetGatewayInfoRequest\x1a+.omniseer.gateway.v1.GetGatewayInfoResponse\"\x04\x98\xb8\x18\x01\x12z\n\x11WatchSystemStatus\x12-.omniseer.gateway.v1.WatchSystemStatusRequest\x1a..omniseer.gateway.v1.WatchSystemStatusResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12t\n\x0fSubscribeEvents\x12+.omniseer.gateway.v1.SubscribeEventsRequest\x1a,.omniseer.gateway.v1.SubscribeEventsResponse\"\x04\x98\xb8\x18\x01\x30\x01\x12Q\n\x04Ping\x12 .omniseer.gateway.v1.PingRequest\x1a!.omniseer.gateway.v1.PingResponse\"\x04\x98\xb8\x18\x01\x12r\n\x0fRequestKeyFrame\x12+.omniseer.gateway.v1.RequestKeyFrameRequest\x1a,.omniseer.gateway.v1.RequestKeyFrameResponse\"\x04\x98\xb8\x18\x01\x12l\n\rReportPicture\x12).omniseer.gateway.v1.ReportPictureRequest\x1a*.omniseer.gateway.v1.ReportPictureResponse\"\x04\x98\xb8\x18\x01\x12u\n\x10SetTeleopEnabled\x12,.omniseer.gateway.v1.SetTeleopEnabledRequest\x1a-.omniseer.gateway.v1.SetTeleopEnabledResponse\"\x04\x98\xb8\x18\x02\x12x\n\x11SendTeleopCommand\x12-.omniseer.gateway.v1.SendTeleopCommandRequest\x1a..omniseer.gateway.v1.SendTeleopCommandResponse\"\x04\x98\xb8\x18\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'omniseer.gateway.v1.robot_gateway_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
+  _globals['_SETPREVIEWMODEREQUEST'].fields_by_name['camera']._loaded_options = None
+  _globals['_SETPREVIEWMODEREQUEST'].fields_by_name['camera']._serialized_options = b'\272H\004r\002\030@'
   _globals['_SETPREVIEWMODEREQUEST']._loaded_options = None
   _globals['_SETPREVIEWMODEREQUEST']._serialized_options = b'\272H\312\001\032\307\001\n\rprofile.known\032\265\001!this.enabled || this.profile in [0, 1, 2, 3] ? \'\' : \'profile \' + string(this.profile) + \' does not exist; choose 1 low-bw, 2 balanced, 3 high-quality, or 0 to keep the present one\''
   _globals['_WATCHSYSTEMSTATUSREQUEST'].fields_by_name['min_interval_ms']._loaded_options = None
@@ -88,37 +90,37 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_GETGATEWAYINFORESPONSE']._serialized_start=425
   _globals['_GETGATEWAYINFORESPONSE']._serialized_end=656
   _globals['_SETPREVIEWMODEREQUEST']._serialized_start=659
-  _globals['_SETPREVIEWMODEREQUEST']._serialized_end=962
-  _globals['_SETPREVIEWMODERESPONSE']._serialized_start=964
-  _globals['_SETPREVIEWMODERESPONSE']._serialized_end=1076
-  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_start=1078
-  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_end=1168
-  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_start=1171
-  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_end=1336
-  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_start=1339
-  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_end=1482
-  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_start=1485
-  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_end=1666
-  _globals['_PINGREQUEST']._serialized_start=1668
-  _globals['_PINGREQUEST']._serialized_end=1681
-  _globals['_PINGRESPONSE']._serialized_start=1683
-  _globals['_PINGRESPONSE']._serialized_end=1764
-  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_start=1766
-  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_end=1830
-  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_start=1832
-  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_end=1873
-  _globals['_REPORTPICTUREREQUEST']._serialized_start=1876
-  _globals['_REPORTPICTUREREQUEST']._serialized_end=2230
-  _globals['_REPORTPICTURERESPONSE']._serialized_start=2232
-  _globals['_REPORTPICTURERESPONSE']._serialized_end=2255
-  _globals['_SETTELEOPENABLEDREQUEST']._serialized_start=2257
-  _globals['_SETTELEOPENABLEDREQUEST']._serialized_end=2299
-  _globals['_SETTELEOPENABLEDRESPONSE']._serialized_start=2301
-  _globals['_SETTELEOPENABLEDRESPONSE']._serialized_end=2413
-  _globals['_SENDTELEOPCOMMANDREQUEST']._serialized_start=2415
-  _globals['_SENDTELEOPCOMMANDREQUEST']._serialized_end=2510
-  _globals['_SENDTELEOPCOMMANDRESPONSE']._serialized_start=2512
-  _globals['_SENDTELEOPCOMMANDRESPONSE']._serialized_end=2625
-  _globals['_ROBOTGATEWAY']._serialized_start=2628
-  _globals['_ROBOTGATEWAY']._serialized_end=3879
+  _globals['_SETPREVIEWMODEREQUEST']._serialized_end=987
+  _globals['_SETPREVIEWMODERESPONSE']._serialized_start=989
+  _globals['_SETPREVIEWMODERESPONSE']._serialized_end=1101
+  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_start=1103
+  _globals['_WATCHSYSTEMSTATUSREQUEST']._serialized_end=1193
+  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_start=1196
+  _globals['_WATCHSYSTEMSTATUSRESPONSE']._serialized_end=1361
+  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_start=1364
+  _globals['_SUBSCRIBEEVENTSREQUEST']._serialized_end=1507
+  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_start=1510
+  _globals['_SUBSCRIBEEVENTSRESPONSE']._serialized_end=1691
+  _globals['_PINGREQUEST']._serialized_start=1693
+  _globals['_PINGREQUEST']._serialized_end=1706
+  _globals['_PINGRESPONSE']._serialized_start=1708
+  _globals['_PINGRESPONSE']._serialized_end=1789
+  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_start=1791
+  _globals['_REQUESTKEYFRAMEREQUEST']._serialized_end=1855
+  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_start=1857
+  _globals['_REQUESTKEYFRAMERESPONSE']._serialized_end=1898
+  _globals['_REPORTPICTUREREQUEST']._serialized_start=1901
+  _globals['_REPORTPICTUREREQUEST']._serialized_end=2255
+  _globals['_REPORTPICTURERESPONSE']._serialized_start=2257
+  _globals['_REPORTPICTURERESPONSE']._serialized_end=2280
+  _globals['_SETTELEOPENABLEDREQUEST']._serialized_start=2282
+  _globals['_SETTELEOPENABLEDREQUEST']._serialized_end=2324
+  _globals['_SETTELEOPENABLEDRESPONSE']._serialized_start=2326
+  _globals['_SETTELEOPENABLEDRESPONSE']._serialized_end=2438
+  _globals['_SENDTELEOPCOMMANDREQUEST']._serialized_start=2440
+  _globals['_SENDTELEOPCOMMANDREQUEST']._serialized_end=2535
+  _globals['_SENDTELEOPCOMMANDRESPONSE']._serialized_start=2537
+  _globals['_SENDTELEOPCOMMANDRESPONSE']._serialized_end=2650
+  _globals['_ROBOTGATEWAY']._serialized_start=2653
+  _globals['_ROBOTGATEWAY']._serialized_end=3904
 # @@protoc_insertion_point(module_scope)

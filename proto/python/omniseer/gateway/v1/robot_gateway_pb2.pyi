@@ -133,21 +133,29 @@ class SetPreviewModeRequest(_message.Message):
 
     ENABLED_FIELD_NUMBER: _builtins.int
     PROFILE_FIELD_NUMBER: _builtins.int
+    CAMERA_FIELD_NUMBER: _builtins.int
     enabled: _builtins.bool
     """The desired state: true for a preview, false for none."""
     profile: _preview_pb2.PreviewProfile.ValueType
     """What to deliver. Ignored when enabled is false. UNSPECIFIED keeps the current profile, or
     takes BALANCED when none was ever chosen.
     """
+    camera: _builtins.str
+    """Name of the camera to show (PreviewStatus.cameras). Ignored when enabled is false. Empty keeps the
+    current one, at first the robot's first. A change keeps the stream and its connections. While the camera
+    fails, the one before stays live, or its fallback takes its place, and the robot keeps trying.
+    INVALID_ARGUMENT: there is no such camera; the text has the names.
+    """
     def __init__(
         self,
         *,
         enabled: _builtins.bool = ...,
         profile: _preview_pb2.PreviewProfile.ValueType = ...,
+        camera: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["enabled", b"enabled", "profile", b"profile"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["camera", b"camera", "enabled", b"enabled", "profile", b"profile"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -7,6 +7,8 @@ from gateway.links.preview.state import PreviewReport, PreviewSpec
 from gateway.links.reconciler import Desired
 from gateway.links.watch import LinkLostError
 from gateway.status.preview import (
+    Camera,
+    CameraState,
     Codec,
     Counters,
     Encoder,
@@ -58,6 +60,11 @@ def test_a_full_report() -> None:
         # A recording is no affair of the preview's operators: the gateway has no use for these.
         pipeline_state=pb.LIFECYCLE_STATE_RUNNING,
         reasons=[pb.REASON_RECORDING],
+        wanted_camera="front",
+        cameras=[
+            pb.Camera(name="front", state=pb.CAMERA_STATE_FAILED, error="unplugged", fallback="rear"),
+            pb.Camera(name="rear", state=9),  # type: ignore[arg-type]  # of a newer service
+        ],
     )
     assert {field.name for field, _ in message.ListFields()} == set(pb.ActualState.DESCRIPTOR.fields_by_name)
     assert wire.from_wire(message) == PreviewReport(
@@ -71,6 +78,11 @@ def test_a_full_report() -> None:
         encoder=Encoder(name="x264", hardware=True, wanted="mpp-h265", fallback_reason="absent"),
         measurement=Measurement(29.5, 2400.0, 2, 12, worst_rtt_ms=0.0, worst_loss_percent=1.5),
         counters=Counters(starts=1, restarts=2, faults=3, fallbacks=4, viewers_refused=5),
+        wanted_camera="front",
+        cameras=(
+            Camera("front", CameraState.FAILED, "unplugged", "rear"),
+            Camera("rear", None),
+        ),
     )
 
 
@@ -100,9 +112,13 @@ def test_an_unknown_state_breaks_the_link() -> None:
     [
         (PreviewSpec(), pb.DesiredState(revision=7)),
         (
-            PreviewSpec(True, Profile.LOW_BW, "secret-of-the-session"),
+            PreviewSpec(True, Profile.LOW_BW, "secret-of-the-session", "rear"),
             pb.DesiredState(
-                revision=7, enabled=True, profile=pb.PROFILE_LOW_BW, passphrase="secret-of-the-session"
+                revision=7,
+                enabled=True,
+                profile=pb.PROFILE_LOW_BW,
+                passphrase="secret-of-the-session",
+                camera="rear",
             ),
         ),
     ],

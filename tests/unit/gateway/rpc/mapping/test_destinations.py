@@ -20,6 +20,8 @@ from gateway.status.event_log import OperatorEvent
 from gateway.status.fault import Condition, Fault, Severity
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
+    Camera,
+    CameraState,
     Codec,
     Counters,
     Encoder,
@@ -101,6 +103,8 @@ PREVIEW = PreviewView(
     measured=Received(Measurement(14.75, 990.5, 91, 12, 180.5, 6.5), NOW_S - 0.5625),
     counters=Counters(92, 93, 94, 95),
     passphrase="a passphrase",
+    wanted_camera="a wanted camera",
+    cameras=(Camera("a camera", CameraState.FAILED, "an error of the camera", "a fallback"),),
 )
 
 
@@ -245,6 +249,11 @@ PLACES: dict[str, Any] = {
     "preview.endpoint.passphrase": "a passphrase",
     "preview.endpoint.encrypted": True,
     "preview.endpoint.capture_offset_ns": -37,
+    "preview.wanted_camera": "a wanted camera",
+    "preview.cameras[0].name": "a camera",
+    "preview.cameras[0].state": preview_pb2.CAMERA_STATE_FAILED,
+    "preview.cameras[0].error": "an error of the camera",
+    "preview.cameras[0].fallback": "a fallback",
     "preview.encoder.name": "an encoder",
     "preview.encoder.hardware": True,
     "preview.encoder.wanted": "a wanted encoder",

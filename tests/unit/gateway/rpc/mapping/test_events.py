@@ -38,7 +38,7 @@ FAULT = Fault(Condition("odometry.stale", Severity.ERROR, "odometry", "m", "r"),
 DETAILS: list[Detail] = [
     FaultRaised(FAULT),
     FaultCleared(FAULT),
-    PreviewChanged(PreviewState.FAULTED, Profile.LOW_BW, "no camera"),
+    PreviewChanged(PreviewState.FAULTED, Profile.LOW_BW, "no camera", "rear"),
     EncoderFallback("x264", "mpp", "it hangs"),
     ClientJoined("10.0.0.1:1", "alice"),
     ClientLeft("10.0.0.1:1", "alice"),

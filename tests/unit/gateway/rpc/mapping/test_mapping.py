@@ -27,6 +27,8 @@ from gateway.status.limit import Limit
 from gateway.status.meaning import NumberMeaning, TextMeaning
 from gateway.status.pictures import Pictures
 from gateway.status.preview import (
+    Camera,
+    CameraState,
     Codec,
     Counters,
     Encoder,
@@ -208,6 +210,11 @@ def everything() -> Snapshot:
         measured=Received(Measurement(14.5, 990.0, 2, 12, 180.0, 6.0), at_s),
         counters=Counters(4, 3, 2, 1, 6),
         passphrase="a-passphrase",
+        wanted_camera="front",
+        cameras=(
+            Camera("front", CameraState.FAILED, "unplugged", "rear"),
+            Camera("rear", CameraState.LIVE),
+        ),
     )
     board = Board(
         {

@@ -14,7 +14,7 @@ from gateway.status.fault import Condition, Severity
 from gateway.status.faults.rules import FaultRules, conditions
 from gateway.status.faults.sources import STATE_FAULTS
 from gateway.status.limit import Limit
-from gateway.status.preview import Encoder, PreviewState, PreviewView
+from gateway.status.preview import Camera, CameraState, Encoder, PreviewState, PreviewView
 from gateway.status.snapshot import Snapshot, SourceRule
 from gateway.status.source_view import SourceState, detail
 from gateway.status.sources import (
@@ -317,6 +317,17 @@ def test_another_encoder_than_the_wanted_one_is_a_fault_that_names_both() -> Non
     fault = found(snapshot(board(), running))["preview.fallback"]
     for part in ("x264", "mpp-h265", "no device", "own processor"):
         assert part in fault.message
+
+
+def test_a_wanted_camera_that_fails_is_a_fault_that_says_what_is_shown() -> None:
+    cameras = (Camera("front", CameraState.FAILED, "it has ended"), Camera("rear", CameraState.LIVE))
+    running = replace(OFF, state=PreviewState.RUNNING, wanted_camera="front", cameras=cameras)
+    fault = found(snapshot(board(), running))["preview.camera"]
+    assert fault.severity is Severity.WARNING
+    assert fault.message == "camera front does not work, and camera rear is shown instead: it has ended"
+    assert "robotctl preview on --camera front" in fault.remedy
+    assert found(snapshot(board(), replace(running, wanted_camera="rear"))) == {}
+    assert found(snapshot(board(), replace(running, state=PreviewState.DISABLED))) == {}
 
 
 @given(
