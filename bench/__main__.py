@@ -25,6 +25,7 @@ GROUPS = {
 # Too long, or too hard on the machine, to be part of a run without names.
 ON_REQUEST = {
     "drive": "bench.drive",
+    "rec": "bench.rec",
     "export": "bench.export",
     "fleet": "bench.fleet",
     "siege": "bench.siege",
