@@ -23,7 +23,14 @@ GROUPS = {
     "monitor": "bench.monitor",
 }
 # Too long, or too hard on the machine, to be part of a run without names.
-ON_REQUEST = {"drive": "bench.drive", "fleet": "bench.fleet", "siege": "bench.siege", "soak": "bench.soak"}
+ON_REQUEST = {
+    "drive": "bench.drive",
+    "rec": "bench.rec",
+    "export": "bench.export",
+    "fleet": "bench.fleet",
+    "siege": "bench.siege",
+    "soak": "bench.soak",
+}
 _ALL = GROUPS | ON_REQUEST
 _PIPE_WIDTH = 240
 

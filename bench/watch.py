@@ -101,12 +101,12 @@ def _healthy() -> Row:
         target = f"127.0.0.1:{stack.port}"
         with grpc.insecure_channel(target, options=OWN_CONNECTION) as channel:
             call: Any = channel.unary_unary(f"{SERVICE}/GetSystemStatus")
-            _took_ms(call)
+            took_ms(call)
             for number in range(TURNS):
-                alone.append(_p99(_took_ms(call)))
+                alone.append(p99(took_ms(call)))
                 with _load(stack, WATCHERS, 0, *_OTHERS):
                     time.sleep(SPENT_AFTER_S)
-                    among.append(_p99(_took_ms(call)))
+                    among.append(p99(took_ms(call)))
                 log(f"watch: healthy caller, turn {number + 1} of {TURNS}")
     return Row(
         name="watch.p99_healthy",
@@ -119,17 +119,19 @@ def _healthy() -> Row:
     )
 
 
-def _took_ms(call: Any) -> list[float]:
-    took_ms = []
+def took_ms(call: Any) -> list[float]:
+    """Returns how long each of some calls takes, one after the other with a pause between them."""
+    found_ms = []
     for _ in range(CALLS):
         time.sleep(PAUSE_S)
         sent_s = time.perf_counter()
         call(b"")
-        took_ms.append((time.perf_counter() - sent_s) * 1000)
-    return took_ms
+        found_ms.append((time.perf_counter() - sent_s) * 1000)
+    return found_ms
 
 
-def _p99(values: list[float]) -> float:
+def p99(values: list[float]) -> float:
+    """Returns the 99th percentile."""
     return statistics.quantiles(values, n=100)[98]
 
 

@@ -24,14 +24,19 @@ _CALLER: Final = "x-caller"
 """Metadata: who calls, for people."""
 
 
-def unix_channel(socket: Path, max_message_bytes: int = _MAX_MESSAGE_BYTES) -> grpc.aio.Channel:
+def unix_channel(
+    socket: Path, max_message_bytes: int = _MAX_MESSAGE_BYTES, *, ahead_bytes: int | None = None
+) -> grpc.aio.Channel:
     """Returns a channel that closes with its `async with` block.
 
     Args:
         socket: where the service listens, or will.
         max_message_bytes: a longer response fails.
+        ahead_bytes: what each stream may receive before it is read (flow-control window, RFC 9113 5.2); None
+            for gRPC's default, 64 KiB.
     """
-    options = (*_OPTIONS, ("grpc.max_receive_message_length", max_message_bytes))
+    ahead = () if ahead_bytes is None else (("grpc.http2.lookahead_bytes", ahead_bytes),)
+    options = (*_OPTIONS, ("grpc.max_receive_message_length", max_message_bytes), *ahead)
     return grpc.aio.insecure_channel(f"unix:{socket}", options=options)
 
 

@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 import os
 import threading
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -44,8 +44,8 @@ class Chunk:
 
 async def chunks(
     content: Content, offset: int, paces: tuple[Pace, ...], check: Callable[[], None]
-) -> AsyncIterator[Chunk]:
-    """Yields the bytes of a file from an offset on.
+) -> AsyncGenerator[Chunk]:
+    """Yields the bytes of a file from an offset on; the next block is read while one leaves.
 
     The end is withheld until the whole file, the part before the offset included, has the sum that it was
     written with.
@@ -62,10 +62,11 @@ async def chunks(
     limits = [pace.bytes_per_s for pace in paces if pace.bytes_per_s]
     size = max(1, min(CHUNK_BYTES, *(limit // _CHUNKS_PER_S for limit in limits))) if limits else CHUNK_BYTES
     loop = asyncio.get_running_loop()
-    reader = _Reader(content)
+    reader = _Reader(content, offset)
+    ahead = loop.run_in_executor(None, reader.read, size)
     try:
-        await asyncio.to_thread(reader.open_at, offset)
-        while block := await asyncio.to_thread(reader.read, size):
+        while block := await ahead:
+            ahead = loop.run_in_executor(None, reader.read, size)
             for chunk in block:
                 check()
                 delay_s = max(pace.delay_s(loop.time(), len(chunk.data)) for pace in paces) if paces else 0.0
@@ -73,44 +74,58 @@ async def chunks(
                     await asyncio.sleep(delay_s)
                 yield chunk
     finally:
+        # What it fails with is of a block that will not be taken.
+        ahead.add_done_callback(_forget)
         # By a thread, after the read that may still be under way when the caller has left.
         loop.run_in_executor(None, reader.close)
 
 
-class _Reader:
-    """Reads and hashes a file; used by one thread at a time."""
+def _forget(read: "asyncio.Future[list[Chunk]]") -> None:
+    """Takes note of the error that a read may have ended with."""
+    if not read.cancelled():
+        read.exception()
 
-    def __init__(self, content: Content) -> None:
+
+class _Reader:
+    """Reads and hashes a file; used by one thread at a time.
+
+    Args:
+        content: the file.
+        offset: of the first byte that `read` returns.
+    """
+
+    def __init__(self, content: Content, offset: int) -> None:
         self._content = content
+        self._offset = offset
         self._handle = -1
         self._hash: Any = hashlib.sha256()
         self._position = 0
         self._used = threading.Lock()
-
-    def open_at(self, offset: int) -> None:
-        with self._used:
-            self._open(offset)
+        self._closed = False
 
     def read(self, size: int) -> list[Chunk]:
         """Returns the next chunks of the given size; empty at the end."""
         with self._used:
+            if self._handle < 0 and not self._closed:
+                self._open()
             return self._read(size)
 
     def close(self) -> None:
         with self._used:
+            self._closed = True
             if self._handle >= 0:
                 os.close(self._handle)
                 self._handle = -1
 
-    def _open(self, offset: int) -> None:
+    def _open(self) -> None:
         try:
             self._handle = os.open(self._content.path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
             if os.fstat(self._handle).st_size != self._content.size:
                 raise UnreadableError("its size on the disk is not the one that was written")
         except OSError as error:
             raise UnreadableError(f"the disk can't read it: {error.strerror}") from error
-        while self._position < offset:
-            self._next(min(CHUNK_BYTES * _BLOCK_CHUNKS, offset - self._position))
+        while self._position < self._offset:
+            self._next(min(CHUNK_BYTES * _BLOCK_CHUNKS, self._offset - self._position))
 
     def _read(self, size: int) -> list[Chunk]:
         block: list[Chunk] = []

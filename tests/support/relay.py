@@ -15,6 +15,7 @@ class Relay:
         port: where clients connect.
         open: whether connections are accepted.
         frozen: whether bytes are kept back, on connections that stay: as where the other end has vanished.
+        to_clients: bytes that were passed on to clients.
     """
 
     def __init__(self, to_port: int) -> None:
@@ -22,6 +23,7 @@ class Relay:
         self.port = 0
         self.open = True
         self.frozen = False
+        self.to_clients = 0
         self._writers: set[asyncio.StreamWriter] = set()
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -52,17 +54,21 @@ class Relay:
         there, back = await asyncio.open_connection("127.0.0.1", self._to_port)
         self._writers |= {writer, back}
         for source, sink in ((reader, back), (there, writer)):
-            task = asyncio.create_task(self._pass_on(source, sink))
+            task = asyncio.create_task(self._pass_on(source, sink, to_client=sink is writer))
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
-    async def _pass_on(self, source: asyncio.StreamReader, sink: asyncio.StreamWriter) -> None:
+    async def _pass_on(
+        self, source: asyncio.StreamReader, sink: asyncio.StreamWriter, *, to_client: bool
+    ) -> None:
         try:
             while data := await source.read(65536):
                 if self.frozen:
                     continue
                 sink.write(data)
                 await sink.drain()
+                if to_client:
+                    self.to_clients += len(data)
         except ConnectionError:
             pass
         sink.transport.abort()

@@ -40,6 +40,8 @@ Metadata = Sequence[tuple[str, str]]
 _SERVICE: Final = f"/{pb.DESCRIPTOR.services_by_name['RecorderService'].full_name}"
 _MAX_MESSAGE_BYTES: Final = 4 * 1024 * 1024
 """A thumbnail has up to 2 MiB, a recording up to 10000 files."""
+_EXPORT_AHEAD_BYTES: Final = 1024 * 1024
+"""Four chunks of each export, so that the recorder sends the next ones while one is passed on."""
 _REPORT: Final = pb.WatchStateResponse.DESCRIPTOR.fields_by_name
 _STATUS: Final = _REPORT["status"].message_type
 _RECORDING: Final = _REPORT["ended"].message_type
@@ -66,7 +68,7 @@ class RecorderConnector:
         # Exports have a connection of their own: reports never wait behind their bytes.
         async with (
             unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
-            unix_channel(self.socket, _MAX_MESSAGE_BYTES) as exports,
+            unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
         ):
             yield RecorderClient(channel, exports)
 

@@ -1,0 +1,26 @@
+"""The harness of the benchmarks of recorded video, with short windows: figures are not judged here."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from bench.rec import video
+from bench.rec.ground import ros_domain
+
+pytestmark = [pytest.mark.ros, pytest.mark.gst]
+
+
+@pytest.fixture(scope="module")
+def ground(tmp_path_factory: pytest.TempPathFactory) -> Iterator[video.Ground]:
+    with ros_domain(), video.video_ground(tmp_path_factory.mktemp("video")) as running:
+        yield running
+
+
+def test_a_round_of_stamps(ground: video.Ground) -> None:
+    assert max(video.stamp_errors_ms(ground, 1.5)) < 5000
+
+
+def test_a_round_of_the_tap(ground: video.Ground) -> None:
+    with ground.robot.preview():
+        assert video.ms_per_frame(ground, 1.0, recording=False) > 0
+        assert video.ms_per_frame(ground, 1.0, recording=True) > 0
