@@ -37,7 +37,9 @@ def rows_table(rows: Iterable[Row]) -> Table:
     for row in rows:
         body = "dim" if row.style is SeverityStyle.WARNING and row.mark == "STALE" else ""
         text = Text(row.text, style=body)
-        table.add_row(row.label, Text(row.mark, style=STYLES[row.style]), text, Text(row.age, style="dim"))
+        mark = Text(row.mark, style=STYLES[row.style])
+        # A label may be the robot's own words: as plain text they can't be taken for markup.
+        table.add_row(Text(row.label), mark, text, Text(row.age, style="dim"))
     return table
 
 

@@ -57,6 +57,11 @@ from console.presentation.value_style import (
 _MARKS: Final = {Freshness.FRESH: "fresh", Freshness.STALE: "STALE", Freshness.MISSING: "no data"}
 _CAMERA_IN_USE: Final = (CameraState.LIVE, CameraState.STARTING)
 _REMARKABLE_AGE_MS: Final = 2000
+_LONGEST_TITLE: Final = 40
+_MOST_DECIMALS: Final = 9
+"""As the gateway's configuration allows; another gateway may send anything."""
+_LARGE: Final = 1e15
+"""A binary64 has no digits behind the point from about here on."""
 _UNREADABLE: Final = (
     SourceState.QOS_MISMATCH,
     SourceState.WRONG_TYPE,
@@ -249,7 +254,8 @@ def _texts(view: View) -> Iterator[Row]:
 
 def _title(title: str, view: View) -> str:
     """Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example."""
-    return sentence(title) if view.compact else title
+    short = title[:_LONGEST_TITLE]
+    return sentence(short) if view.compact else short
 
 
 def _access(view: View) -> Iterator[Row]:
@@ -442,7 +448,10 @@ def number_text(number: results.NumberValue) -> str:
     """Returns the number as its configuration wants it shown, with its unit."""
     if number.value is None:
         return UNKNOWN
-    digits = f"{number.value:.10g}" if number.decimals is None else f"{number.value:.{number.decimals}f}"
+    if number.decimals is None or abs(number.value) >= _LARGE:
+        digits = f"{number.value:.10g}"
+    else:
+        digits = f"{number.value:.{min(number.decimals, _MOST_DECIMALS)}f}"
     return f"{digits} {number.unit}".strip()
 
 

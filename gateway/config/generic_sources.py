@@ -1,7 +1,7 @@
 """Keys of the generic kinds of `sources`: which keys each kind has, and how they fit together."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator
@@ -124,10 +124,8 @@ def text_meaning(levels: Mapping[str, Level], other: Level, remedy: str) -> Text
     return TextMeaning(listed, _SEVERITIES[other], remedy)
 
 
-def check_words(levels: Mapping[str, Level], max_length: int) -> None:
-    """Raises ValueError if a text with a level can't come, because texts are cut before it ends."""
-    for text in levels:
-        if len(text) > max_length:
-            raise ValueError(
-                f"levels has '{text}', but texts are cut to max_length ({max_length}) characters"
-            )
+def check_words(words: Iterable[str], max_length: int) -> None:
+    """Raises ValueError if one of the words of `names` or `levels` is longer than texts may be."""
+    for word in words:
+        if len(word) > max_length:
+            raise ValueError(f"'{word}' is longer than texts may be: max_length is {max_length}")

@@ -144,7 +144,7 @@ class SourceSettings(Section):
         changed = {name: value for name, value in self if value != defaults[name]}
         check_keys(self.kind, changed)
         check_order((self.error_below, self.warning_below), (self.error_above, self.warning_above))
-        check_words(self.levels, self.max_length)
+        check_words((*self.levels, *self.names.values()), self.max_length)
         if not self.scale:
             raise ValueError("scale must not be 0: every value would be the same")
         return self

@@ -24,6 +24,7 @@ from console.window import saver
 from console.window.cockpit_keys import cockpit_keys
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
+from omniseer.gateway.v1 import value_pb2
 from tests.support.cockpit import (
     PICTURE,
     CockpitRobot,
@@ -248,6 +249,22 @@ def test_the_bar_says_it_at_a_glance(cockpit: Cockpit) -> None:
     with_trouble(cockpit.robot.gateway)
     until(lambda: bar.battery.detail.text().startswith("LOW"), "a low battery")
     assert bar.health.detail.text().startswith("1 error, 1 warning")
+
+
+def test_values_that_only_the_configuration_names_stand_in_the_status(cockpit: Cockpit) -> None:
+    def shown() -> dict[str, tuple[str, str]]:
+        lines = cockpit.window.side.components.shown
+        return {line.label.text(): (line.mark.text(), line.text.text()) for line in lines}
+
+    status = cockpit.robot.gateway.status
+    number = status.numbers.add(title="Left motor", available=True, value=96, unit="°C", decimals=1)
+    number.level = value_pb2.NUMBER_LEVEL_ERROR_HIGH
+    status.texts.add(
+        title="<b>gripper</b>", available=True, text="jammed", level=value_pb2.TEXT_LEVEL_WARNING
+    )
+    until(lambda: "Left motor" in shown(), "the number")
+    assert shown()["Left motor"] == ("TOO HIGH", "96.0\u00a0°C")
+    assert shown()["<b>gripper</b>"] == ("WARNING", "jammed")
 
 
 def test_another_reading_of_the_pictures_age_may_be_given(cockpit: Cockpit) -> None:

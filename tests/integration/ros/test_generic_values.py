@@ -3,6 +3,8 @@
 import json
 import math
 import re
+import subprocess
+import sys
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
@@ -260,3 +262,47 @@ def test_from_the_configuration_to_the_operator(talker: Talker, tmp_path: Path) 
         assert broken.state == source_pb2.SOURCE_STATE_FIELD_MISSING
         assert "number.broken.field_missing" in {each.id for each in gateway.status().faults}
         assert "has no field 'temp'" in (tmp_path / "gateway.log").read_text(encoding="utf-8")
+
+
+PAGE = Path(__file__).parents[3] / "docs/configuration.md"
+
+
+def examples() -> list[str]:
+    """The examples of sources on the page, as files."""
+    blocks = re.findall(
+        r"^```yaml\n(sources:\n.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+    )
+    assert len(blocks) >= 3
+    return blocks
+
+
+def check(config: Path, *options: str) -> "subprocess.CompletedProcess[str]":
+    program = Path(sys.executable).parent / "robot-gateway"
+    command = [str(program), "check", "--config", str(config), *options]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize("example", examples())
+def test_the_examples_of_the_page_are_accepted_and_printed_as_they_are(example: str, tmp_path: Path) -> None:
+    config, printed = tmp_path / "gateway.yaml", tmp_path / "printed.yaml"
+    config.write_text(example, encoding="utf-8")
+    checked = check(config)
+    assert (checked.returncode, checked.stderr) == (0, "")
+    printed.write_text(check(config, "--print").stdout, encoding="utf-8")
+    assert check(printed, "--print").stdout == printed.read_text(encoding="utf-8")
+
+
+def test_check_refuses_a_field_that_the_type_lacks_and_names_what_it_can_not_know(tmp_path: Path) -> None:
+    config = tmp_path / "gateway.yaml"
+    absent = number("absent", "no_such_msgs/msg/Thing", "field")
+    config.write_text(json.dumps({"sources": [absent]}), encoding="utf-8")
+    unknown = check(config)
+    assert unknown.returncode == 0
+    assert (
+        "not checked: field field of 'number.absent': message type no_such_msgs/msg/Thing" in unknown.stderr
+    )
+    config.write_text(json.dumps({"sources": [absent, SOURCES[-1]]}), encoding="utf-8")
+    refused = check(config)
+    assert refused.returncode == 2
+    assert "has no field 'temp'; it has header, temperature, variance" in refused.stderr
+    assert "ros2 interface show sensor_msgs/msg/Temperature" in refused.stderr

@@ -89,7 +89,10 @@ def test_the_environment_overrides_the_file(tmp_path: Path, monkeypatch: pytest.
         (f'sources: [{NUMBER}, field: a, unit: "\\e[1m"}}]', "expected: printable text"),
         (f"sources: [{TEXT}, scale: 2}}]", "has no key 'scale'"),
         (f"sources: [{TEXT}, levels: {{jammed: bad}}}}]", "levels.jammed"),
-        (f"sources: [{TEXT}, max_length: 3, levels: {{jammed: error}}}}]", "texts are cut to max_length (3)"),
+        (
+            f"sources: [{TEXT}, max_length: 3, levels: {{jammed: error}}}}]",
+            "'jammed' is longer than texts may be: max_length is 3",
+        ),
         (f"sources: [{TEXT}, names: {{x: jammed}}}}]", "a whole number"),
         (f"sources: [{NUMBER}, field: a, levels: {{jammed: error}}}}]", "has no key 'levels'"),
         (f"sources: [{NUMBER}, field: a, scale: 0}}]", "scale must not be 0"),

@@ -176,3 +176,18 @@ def test_health_counts_active_errors_and_warnings() -> None:
         message.faults.add(severity=f"FAULT_SEVERITY_{severity}", active=active, message="broken")
     health = table_rows(View(decoded(message)))[0]
     assert (health.label, health.text) == ("health", "robot healthy (2 errors, 1 warning)")
+
+
+def test_a_title_is_plain_text_of_bounded_length() -> None:
+    message = healthy_status()
+    message.numbers.add(title="[/red] load", available=True, value=1e300, decimals=4_000_000_000)
+    message.numbers.add(title="x" * 10_000, available=True, value=0.125, decimals=4_000_000_000)
+    message.texts.add(title="[bold]arm", available=True, text="[/] jammed")
+    console = Console(file=io.StringIO(), width=160)
+    console.print(status_view(decoded(message), "robot:50051"))
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert any("[/red] load" in line and "1e+300" in line for line in lines)
+    assert any("[bold]arm" in line and "[/] jammed" in line for line in lines)
+    assert any("0.125000000" in line and "x" * 40 in line for line in lines)
+    assert not any("x" * 41 in line for line in lines)
