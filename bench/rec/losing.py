@@ -23,11 +23,20 @@ _RATES_MB_S: Final = {"rec.lost_10": 10, "rec.lost_40": 40}
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Messages of one round. `told_lost` is the recorder's own count; None where it knows none."""
+    """Messages of one round.
+
+    Attributes:
+        published: by the talker.
+        lost: of these, not in the recording.
+        untaken: of the lost ones, those that came after the newest of their topic: the recorder was so late
+            that they were still on their way when it was stopped.
+        counted: lost by the recorder's own count, which begins before the round; None where it knows none.
+    """
 
     published: int
     lost: int
-    told_lost: int | None
+    untaken: int
+    counted: int | None
 
 
 def rows(workdir: Path, wanted: set[str]) -> list[Row]:
@@ -64,6 +73,7 @@ def one_round(recorder: RecorderProgram, publisher: Talker, seconds: float) -> F
         last = publisher.numbers()
         time.sleep(_AFTERWARDS_S)
         made = running.stop()
-        lost = missing(numbers(running.folder), first, last)
-        told = made.messages_lost if made.HasField("messages_lost") else None
-        return Found(between(first, last), lost, told)
+        found = numbers(running.folder)
+        counted = made.messages_lost if made.HasField("messages_lost") else None
+        untaken = missing({topic: set(range(max(each) + 1)) for topic, each in found.items()}, first, last)
+        return Found(between(first, last), missing(found, first, last), untaken, counted)
