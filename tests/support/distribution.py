@@ -18,6 +18,8 @@ _SHARING: Final = tuple(
 LONGEST: Final = (
     *_SHARING,
     *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "bridge", "on_the_robot", "bad_ground")),
+    "tests/e2e/systemd/test_install.py",
+    "tests/e2e/systemd/test_robot.py",
     "tests/integration/drive/test_doubt.py",
     "tests/integration/preview/test_fallback.py",
     "tests/e2e/test_release.py",
