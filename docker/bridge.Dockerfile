@@ -55,7 +55,8 @@ ENV PATH=/opt/robot-gateway/.venv/bin:$PATH \
 # The group is shared with the gateway, which connects to the socket.
 USER 10005:10000
 STOPSIGNAL SIGTERM
-HEALTHCHECK --interval=30s --timeout=5s --start-period=30s --retries=3 \
+# The check shares half a processor with the program (BRIDGE_CPUS).
+HEALTHCHECK --interval=30s --timeout=10s --start-period=30s --retries=3 \
   CMD ["python", "-m", "bridge.health"]
 ENTRYPOINT ["tini", "--"]
 # Docker restarts what has ended, not what is unhealthy: the guard ends a program that hangs.
