@@ -20,6 +20,7 @@ LONGEST: Final = (
     *(f"{_CONTAINERS}test_{name}.py" for name in ("guarded", "on_the_robot", "bad_ground")),
     "tests/integration/drive/test_doubt.py",
     "tests/integration/preview/test_fallback.py",
+    "tests/e2e/containers/test_upgrade_robot.py",
     "tests/e2e/test_release.py",
     "tests/e2e/test_demo.py",
     "tests/integration/fuzz/test_fuzz.py",
