@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import UserError
-from release_program import git, sbom
+from release_program import git, image_sbom, images, sbom
 from release_program.changelog import section
 from release_program.distributions import DISTRIBUTIONS
 from release_program.environments import install
@@ -33,11 +33,17 @@ def main() -> int:
         choices=_PYTHONS,
         help="that of the computers which install it without a registry; may be repeated; by default all",
     )
+    parser.add_argument(
+        "--without-images",
+        action="store_true",
+        help="only what operators install; a robot can't be upgraded to it",
+    )
     wishes = parser.parse_args()
     output = (wishes.output or _ROOT / f"build/robot-gateway-{wishes.version}").absolute()
     try:
         commit = _permitted(wishes.version)
-        _make(wishes.version, commit, output, tuple(wishes.python or _PYTHONS))
+        pythons = tuple(wishes.python or _PYTHONS)
+        _make(wishes.version, commit, output, pythons, with_images=not wishes.without_images)
     except UserError as error:
         print(f"release: {error}", file=sys.stderr)
         return int(error.exit_code)
@@ -72,7 +78,9 @@ def _project_version() -> str:
     return str(project["version"])
 
 
-def _make(version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...]) -> None:
+def _make(
+    version: str, commit: git.Commit, output: Path, pythons: tuple[str, ...], *, with_images: bool
+) -> None:
     """Makes all parts beside `output`, which appears when all of them are complete."""
     if output.exists():
         raise UserError(f"{output} exists", f"Type: rm -r {output}, or name another one with --output")
@@ -99,9 +107,21 @@ def _make(version: str, commit: git.Commit, output: Path, pythons: tuple[str, ..
                 made / "sbom" / f"{distribution.stem}-{version}.cdx.json",
                 commit.epoch_s,
             )
+        if with_images:
+            _add_images(made, version, commit)
         _write_texts(made, tree, version, commit)
         write_sums(made)
         made.rename(output)
+
+
+def _add_images(made: Path, version: str, commit: git.Commit) -> None:
+    _say("building the images")
+    images.build(_ROOT, version)
+    _say("saving them, and listing what is in them")
+    (made / "images").mkdir()
+    for image in images.save(_ROOT, version, made / "images"):
+        name = image.partition(":")[0]
+        image_sbom.write_of_image(image, version, made / f"sbom/{name}-{version}.cdx.json", commit.epoch_s)
 
 
 def _write_texts(made: Path, tree: Path, version: str, commit: git.Commit) -> None:

@@ -33,7 +33,7 @@ def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def made(repository: Path) -> Path:
     """A release, at the path where it is by default."""
-    ended = release(repository, "--python", PYTHON)
+    ended = release(repository, "--without-images", "--python", PYTHON)
     assert ended.returncode == 0, ended.stderr
     directory = repository / f"build/robot-gateway-{VERSION}"
     assert ended.stderr.splitlines()[-1] == f"release: {directory}"
@@ -63,7 +63,13 @@ def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, tmp_path: Path)
     before = os.umask(0o077)
     try:
         ended = release(
-            other, "--python", PYTHON, "--output", output, environment={"TZ": "Asia/Tokyo", "LC_ALL": "C"}
+            other,
+            "--without-images",
+            "--python",
+            PYTHON,
+            "--output",
+            output,
+            environment={"TZ": "Asia/Tokyo", "LC_ALL": "C"},
         )
     finally:
         os.umask(before)
@@ -116,6 +122,40 @@ def test_the_sbom_lists_what_is_installed_with_licences_and_dependencies(made: P
     wheels = {wheel.name.split("-")[0].lower().replace("_", "-") for wheel in (made / "wheels").iterdir()}
     assert listed["console"].keys() - wheels == set()
     assert "Apache-2.0" in json.dumps(listed["client"]["grpcio"]["licenses"])
+
+
+IMAGE_SBOM = """
+import sys
+from release_program.image_sbom import debian_components, document, python_components
+system = 'NAME="Debian GNU/Linux"\\nID=debian\\nVERSION_ID="12"\\n'
+def made():
+    debian = debian_components("libc6\\t2.36-9+deb12u1\\tamd64\\tglibc\\n", system)
+    python = python_components('[["typing_extensions", "4.16.0"]]')
+    return document("robot-gateway", "1.2.3", [*debian, *python], 1767323045)
+assert made() == made()
+print(made())
+list(debian_components("dpkg-query: no packages found\\n", system))
+"""
+
+
+def test_an_images_sbom_is_the_same_each_time_and_lists_nothing_but_packages() -> None:
+    """Of listings as an image gives them; tests/e2e/containers has real ones."""
+    ended = subprocess.run(
+        [ROOT / ".cache/release/bin/python", "-c", IMAGE_SBOM],
+        env={**os.environ, "PYTHONPATH": f"{ROOT / 'scripts'}:{ROOT}"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert ended.returncode == 1
+    assert "which is no package" in ended.stderr
+    bom = json.loads(ended.stdout)
+    assert bom["metadata"]["timestamp"] == "2026-01-02T03:04:05+00:00"
+    assert [component["purl"] for component in bom["components"]] == [
+        "pkg:deb/debian/libc6@2.36-9%2Bdeb12u1?arch=amd64&distro=debian-12&upstream=glibc",
+        "pkg:pypi/typing-extensions@4.16.0",
+    ]
 
 
 def test_the_client_installs_and_imports_without_network_gstreamer_and_qt(made: Path, tmp_path: Path) -> None:
@@ -221,7 +261,7 @@ def test_a_failed_build_names_its_reason_and_leaves_nothing(repository: Path, tm
     lock = broken / "requirements/console.txt"
     lock.write_text("typer==0.29.2\n")
     commit(broken)
-    ended = release(broken, "--python", PYTHON, "--output", tmp_path / "out/release")
+    ended = release(broken, "--without-images", "--python", PYTHON, "--output", tmp_path / "out/release")
     assert ended.returncode == 1
     assert ended.stderr.endswith("release: the lock file has no hash of typer. Type: scripts/lock\n")
     assert not list((tmp_path / "out").iterdir())

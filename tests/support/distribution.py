@@ -22,6 +22,7 @@ LONGEST: Final = (
     "tests/e2e/systemd/test_robot.py",
     "tests/integration/drive/test_doubt.py",
     "tests/integration/preview/test_fallback.py",
+    "tests/e2e/containers/test_upgrade_robot.py",
     "tests/e2e/test_release.py",
     "tests/e2e/test_demo.py",
     "tests/integration/fuzz/test_fuzz.py",

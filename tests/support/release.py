@@ -11,7 +11,7 @@ from typing import Final
 ROOT: Final = Path(__file__).parents[2]
 VERSION: Final = "9.8.7"
 """No version that the project has or soon gets."""
-_RELEASE_WITHIN_S: Final = 400
+_RELEASE_WITHIN_S: Final = 400.0
 _COMMITTED_AT: Final = "2026-01-02T03:04:05+00:00"
 
 
@@ -89,6 +89,7 @@ def release(
     repository: Path,
     *options: str | Path,
     version: str = VERSION,
+    within_s: float = _RELEASE_WITHIN_S,
     environment: Mapping[str, str] | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Runs the repository's scripts/release."""
@@ -98,7 +99,7 @@ def release(
         env={**os.environ, **(environment or {})},
         capture_output=True,
         text=True,
-        timeout=_RELEASE_WITHIN_S,
+        timeout=within_s,
         check=False,
     )
 

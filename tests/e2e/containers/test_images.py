@@ -74,6 +74,11 @@ def test_images_that_were_saved_and_loaded_are_the_same(tmp_path: Path) -> None:
         saved = scripts_images("save", str(file), tag=CARRIED)
         assert saved.returncode == 0, saved.stderr
         assert file.stat().st_size > 10_000_000
+        listed = dict(line.split() for line in scripts_images("ids", tag=CARRIED).stdout.splitlines())
+        assert listed == {
+            f"{image}:{CARRIED}": docker("image", "inspect", "--format={{.Id}}", f"{image}:{CARRIED}").strip()
+            for image in IMAGES
+        }
         docker("image", "rm", *(f"{image}:{CARRIED}" for image in IMAGES))
         loaded = scripts_images("load", str(file), tag=CARRIED)
         assert loaded.returncode == 0, loaded.stderr
@@ -82,6 +87,10 @@ def test_images_that_were_saved_and_loaded_are_the_same(tmp_path: Path) -> None:
             assert docker("run", "--rm", "--network=none", f"{image}:{CARRIED}") == f"{image}\n"
     finally:
         docker("image", "rm", "--force", *(f"{image}:{CARRIED}" for image in IMAGES))
+
+
+def test_the_names_are_those_of_the_robots_images() -> None:
+    assert tuple(scripts_images("names").stdout.split()) == IMAGES
 
 
 @pytest.mark.usefixtures("images")

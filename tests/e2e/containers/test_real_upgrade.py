@@ -1,0 +1,147 @@
+"""A whole robot in containers, brought to a release made by scripts/release, and back."""
+
+import json
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from console.client.blocking import GatewayClient
+from console.client.errors import GatewayError
+from tests.support.engine import ROOT, TAG
+from tests.support.free import free_domain, free_tcp_port, free_udp_port
+from tests.support.release import VERSION, release, released_repository
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.docker, pytest.mark.timeout(1500)]
+
+IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, images: str) -> Iterator[Path]:  # noqa: ARG001  # for its effect
+    directory = tmp_path_factory.mktemp("release")
+    repository = released_repository(directory / "repository")
+    # The tree's own settings, as of the robot whose images these are.
+    (repository / ".env").write_text("COMPOSE_FILE=compose.yaml\n")
+    ended = release(repository, "--python", "3.11", "--output", directory / "made", within_s=1200)
+    assert ended.returncode == 0, ended.stderr
+    yield directory / "made"
+    names = [f"{image}:{VERSION}" for image in IMAGES]
+    subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=False)
+
+
+@pytest.fixture
+def robot(tmp_path: Path, images: str) -> Iterator[tuple[Path, int]]:  # noqa: ARG001  # for its effect
+    """The directory of a running robot that records, of this tree's images, and its gateway's port."""
+    directory = tmp_path / "robot"
+    directory.mkdir()
+    for name in ("compose.yaml", "compose.demo.yaml", "docker", "scripts"):
+        path = ROOT / name
+        (shutil.copytree if path.is_dir() else shutil.copy)(path, directory / name)
+    config = directory / "docker/config/gateway.yaml"
+    config.write_text(config.read_text().replace("name: robot-gateway", "name: lab7"))
+    port = free_tcp_port()
+    with free_domain() as domain:
+        settings = {
+            "COMPOSE_PROJECT_NAME": f"robot-upgrade-e2e-{port}",
+            "COMPOSE_FILE": "compose.yaml:compose.demo.yaml",
+            "COMPOSE_PROFILES": "record",
+            "ROBOT_RECORDS": "true",
+            "ROS_DOMAIN_ID": str(domain),
+            "GATEWAY_PORT": str(port),
+            "PREVIEW_PORT": str(free_udp_port()),
+            "PREVIEW_BIND": "127.0.0.1",
+            "TAG": TAG,
+        }
+        (directory / ".env").write_text("".join(f"{name}={value}\n" for name, value in settings.items()))
+        try:
+            compose(directory, "up", "--detach")
+            yield directory, port
+        finally:
+            compose(directory, "down", "--volumes", "--timeout", "5")
+
+
+def compose(directory: Path, *words: str) -> None:
+    subprocess.run(
+        ["docker", "compose", "--progress", "quiet", *words],
+        cwd=directory, capture_output=True, timeout=180, check=True,
+    )  # fmt: skip
+
+
+def upgrade(directory: Path, *words: str | Path) -> None:
+    ended = subprocess.run(
+        [directory / "scripts/upgrade-robot", *words],
+        cwd="/", capture_output=True, text=True, timeout=400, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+
+
+def seen(port: int) -> tuple[str, str, list[str]]:
+    """The robot's name, the version that runs, and its recordings; waits until all of it answers."""
+
+    def asked() -> tuple[str, str, list[str]] | None:
+        try:
+            with GatewayClient(f"127.0.0.1:{port}") as client:
+                status = client.status()
+                if not (status.health.ready and status.preview.service_reachable):
+                    return None
+                names = [each.id for each in client.recordings() if each.label == "kept"]
+                return status.gateway_name, status.gateway_version, names
+        except GatewayError:
+            return None
+
+    return wait_until(asked, "the robot answers and is complete", 60)
+
+
+def test_a_robot_is_upgraded_and_taken_back_with_its_recordings_and_its_name(
+    made: Path, robot: tuple[Path, int]
+) -> None:
+    directory, port = robot
+    name, old, recordings = seen(port)
+    assert (name, recordings) == ("lab7", [])
+    assert old != VERSION
+    with GatewayClient(f"127.0.0.1:{port}") as client:
+        kept = client.start_recording("kept", with_video=False).recording.id
+        client.stop_recording(kept)
+
+    upgrade(directory, made)
+    assert seen(port) == ("lab7", VERSION, [kept])
+    upgrade(directory, "--rollback")
+    assert seen(port) == ("lab7", old, [kept])
+
+
+def test_the_images_are_named_with_their_digests(made: Path) -> None:
+    listed = dict(line.split() for line in (made / "images/IMAGES").read_text().splitlines())
+    assert set(listed) == {f"{image}:{VERSION}" for image in IMAGES}
+    for image, digest in listed.items():
+        shown = subprocess.run(
+            ["docker", "image", "inspect", "--format", "{{.Id}}", image],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        assert shown.strip() == digest
+
+
+@pytest.mark.parametrize(
+    ("image", "package", "distribution"),
+    [("robot-gateway", "python3", "grpcio"), ("robot-preview", "gstreamer1.0-plugins-bad", "pydantic")],
+)
+def test_the_sbom_of_an_image_has_what_is_in_it(
+    made: Path, image: str, package: str, distribution: str
+) -> None:
+    bom = json.loads((made / f"sbom/{image}-{VERSION}.cdx.json").read_text())
+    assert (bom["bomFormat"], bom["metadata"]["component"]["name"]) == ("CycloneDX", image)
+    found = {component["purl"].partition("@")[0]: component for component in bom["components"]}
+    inside = subprocess.run(
+        ["docker", "run", "--rm", "--network=none", "--entrypoint=dpkg-query", f"{image}:{VERSION}",
+         "--show", "--showformat=${Version}", package],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    assert found[f"pkg:deb/debian/{package}"]["version"] == inside
+    assert "distro=debian-12" in found[f"pkg:deb/debian/{package}"]["purl"]
+    assert f"pkg:pypi/{distribution}" in found
+    assert found["pkg:pypi/robot-gateway"]["version"] == VERSION

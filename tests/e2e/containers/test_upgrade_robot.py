@@ -1,0 +1,338 @@
+"""scripts/upgrade-robot with small images: what it refuses, what it keeps, and how it goes back.
+
+The project is a stand-in for the robot's: a service with a health check, its configuration check, a volume.
+"""
+
+import gzip
+import os
+import signal
+import subprocess
+import tarfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from release_program.sums import write_sums
+
+from tests.support.engine import ROOT
+from tests.support.waiting import wait_until
+
+pytestmark = [pytest.mark.docker, pytest.mark.timeout(300)]
+
+COMPOSE = """
+name: ${COMPOSE_PROJECT_NAME}
+services:
+  gateway-config:
+    image: robot-gateway:${TAG:-latest}
+    pull_policy: never
+    network_mode: none
+    command: [grep, -q, "^good", /config]
+    volumes: ["./docker/config/gateway.yaml:/config:ro"]
+  gateway:
+    image: robot-gateway:${TAG:-latest}
+    pull_policy: never
+    network_mode: none
+    init: true
+    depends_on:
+      gateway-config: {condition: service_completed_successfully}
+    command: [sh, -c, "cat /name >> /state/log; exec sleep 600"]
+    volumes: ["state:/state"]
+    healthcheck: {test: [CMD, test, -f, /healthy], interval: 1s, retries: 1}
+  extra:
+    image: robot-gateway:${TAG:-latest}
+    pull_policy: never
+    network_mode: none
+    init: true
+    profiles: [extra]
+    command: [sleep, "600"]
+volumes:
+  state:
+# VERSION
+"""
+
+
+class Robot:
+    """A robot's directory with a running project, and releases for it."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory / "robot"
+        self.releases = directory / "releases"
+        self.project = f"upgrade-{os.getpid()}-{directory.name[-12:].strip('_-').lower()}"
+        self.tags: set[str] = set()
+
+    def begin(self, tag: str = "1.0.0") -> None:
+        """Makes the directory, with a changed configuration, and starts version 1.0.0."""
+        self.image(tag, "1.0.0")
+        self.write_tree(self.directory, "1.0.0")
+        (self.directory / ".env").write_text(f"COMPOSE_PROJECT_NAME={self.project}\nTAG={tag}\nOWN=1\n")
+        (self.directory / "docker/config/gateway.yaml").write_text("good, this robot's own\n")
+        (self.directory / "docker/vendor/board.deb").write_text("a package of the board's maker")
+        (self.directory / "notes.txt").write_text("mine")
+        self.compose("up", "--detach")
+
+    def image(self, tag: str, version: str, *, healthy: bool = True, revision: str = "") -> None:
+        state = " && touch /healthy" if healthy else ""
+        dockerfile = (
+            f"FROM debian:bookworm-slim\nRUN echo {version} > /name{state}\n"
+            f"LABEL org.opencontainers.image.revision={revision or version}\n"
+        )
+        subprocess.run(
+            ["docker", "build", "--quiet", "--network=none", "--tag", f"robot-gateway:{tag}", "-"],
+            input=dockerfile, capture_output=True, text=True, timeout=120, check=True,
+        )  # fmt: skip
+        self.tags.add(tag)
+
+    def write_tree(self, target: Path, version: str) -> None:
+        for folder in ("docker/config", "docker/vendor", "scripts"):
+            (target / folder).mkdir(parents=True)
+        (target / "compose.yaml").write_text(COMPOSE.replace("# VERSION", f"# {version}"))
+        (target / "docker/config/gateway.yaml").write_text("the release's default, no good here\n")
+        (target / "docker/vendor/README.md").write_text(version)
+        (target / f"scripts/of-{version}").write_text("")
+        (target / ".dockerignore").write_text(version)
+
+    def release(self, version: str, *, healthy: bool = True, revision: str = "") -> Path:
+        """A release as scripts/release makes it, with these images."""
+        made = self.releases / version
+        (made / "images").mkdir(parents=True)
+        self.image(version, version, healthy=healthy, revision=revision)
+        saved = subprocess.run(
+            ["docker", "save", f"robot-gateway:{version}"], capture_output=True, timeout=120, check=True
+        ).stdout
+        with gzip.open(made / f"images/robot-images-{version}.tar.gz", "wb", compresslevel=1) as file:
+            file.write(saved)
+        (made / "images/IMAGES").write_text(f"robot-gateway:{version} sha256:0\n")
+        self.write_tree(made / "tree", version)
+        with tarfile.open(made / f"robot-gateway-{version}.tar.gz", "w:gz") as file:
+            file.add(made / "tree", f"robot-gateway-{version}")
+        subprocess.run(["rm", "-r", made / "tree"], check=True)
+        (made / "RELEASE").write_text(f"VERSION={version}\nREVISION={version}\n")
+        write_sums(made)
+        # As on a robot that has never seen it.
+        subprocess.run(["docker", "image", "rm", f"robot-gateway:{version}"], capture_output=True, check=True)
+        return made
+
+    def compose(self, *words: str) -> str:
+        done = subprocess.run(
+            ["docker", "compose", "--progress", "quiet", *words],
+            cwd=self.directory, capture_output=True, text=True, timeout=120, check=True,
+        )  # fmt: skip
+        return done.stdout
+
+    def upgrade(self, *words: str | Path, within_s: int = 60) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [ROOT / "scripts/upgrade-robot", "--robot", self.directory, *words],
+            cwd="/",
+            env={**os.environ, "UPGRADE_HEALTHY_WITHIN_S": str(within_s)},
+            capture_output=True, text=True, timeout=200, check=False,
+        )  # fmt: skip
+
+    def started(self) -> list[str]:
+        """The versions that ever started, from the volume that outlives them."""
+        return self.compose("exec", "-T", "gateway", "cat", "/state/log").split()
+
+    def running(self, service: str = "gateway") -> str:
+        """The version that a service runs."""
+        return self.compose("--profile", "*", "exec", "-T", service, "cat", "/name").strip()
+
+    def snapshot(self) -> dict[str, str]:
+        """All files but the script's own."""
+        return {
+            str(path.relative_to(self.directory)): path.read_text()
+            for path in self.directory.rglob("*")
+            if path.is_file() and ".upgrade" not in path.parts
+        }
+
+    def end(self) -> None:
+        subprocess.run(
+            ["docker", "compose", "--profile", "*", "down", "--volumes", "--timeout", "1"],
+            cwd=self.directory, capture_output=True, timeout=120, check=False,
+        )  # fmt: skip
+        listed = subprocess.run(
+            ["docker", "image", "ls", "--format", "{{.Tag}}", "robot-gateway"],
+            capture_output=True, text=True, check=True,
+        ).stdout.split()  # fmt: skip
+        mine = [tag for tag in listed if tag in self.tags or tag.startswith("before-9.")]
+        if mine:
+            names = [f"robot-gateway:{tag}" for tag in mine]
+            subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=True)
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Iterator[Robot]:
+    found = Robot(tmp_path)
+    try:
+        yield found
+    finally:
+        found.end()
+
+
+def test_up_and_back_and_forth_with_state_and_settings_kept(robot: Robot) -> None:
+    robot.begin()
+    before = robot.snapshot()
+    upgraded = robot.upgrade(robot.release("9.1.0"))
+    assert upgraded.returncode == 0, upgraded.stderr
+    assert upgraded.stderr.splitlines()[-1] == (
+        "upgrade-robot: 9.1.0 is in use. Back to 1.0.0: scripts/upgrade-robot --rollback"
+    )
+    assert robot.running() == "9.1.0"
+    assert robot.started() == ["1.0.0", "9.1.0"]
+    after = robot.snapshot()
+    assert after[".env"] == f"COMPOSE_PROJECT_NAME={robot.project}\nOWN=1\nTAG=9.1.0\n"
+    for kept in ("docker/config/gateway.yaml", "docker/vendor/board.deb", "notes.txt"):
+        assert after[kept] == before[kept]
+    assert "# 9.1.0" in after["compose.yaml"]
+    assert (after[".dockerignore"], after["docker/vendor/README.md"]) == ("9.1.0", "9.1.0")
+    assert {"scripts/of-9.1.0"} == {name for name in after if name.startswith("scripts/")}
+
+    again = robot.upgrade(robot.releases / "9.1.0")
+    assert (again.returncode, again.stderr) == (0, "upgrade-robot: 9.1.0 is in use here already\n")
+
+    back = robot.upgrade("--rollback")
+    assert back.returncode == 0, back.stderr
+    assert robot.running() == "1.0.0"
+    rest = robot.snapshot()
+    assert {**rest, ".env": ""} == {**before, ".env": ""}
+    assert sorted(rest[".env"].split()) == sorted(before[".env"].split())
+
+    forth = robot.upgrade("--rollback")
+    assert forth.returncode == 0, forth.stderr
+    assert robot.started() == ["1.0.0", "9.1.0", "1.0.0", "9.1.0"]
+    assert robot.snapshot() == after
+
+
+def test_a_tag_that_moves_is_fixed_for_the_way_back(robot: Robot) -> None:
+    robot.begin(tag="latest")
+    (robot.directory / ".env").write_text(f"COMPOSE_PROJECT_NAME={robot.project}\n")
+    assert robot.upgrade(robot.release("9.1.0")).returncode == 0
+    robot.image("latest", "built-since")
+    back = robot.upgrade("--rollback")
+    assert back.returncode == 0, back.stderr
+    assert robot.running() == "1.0.0"
+
+
+def test_a_service_that_was_started_by_hand_comes_along(robot: Robot) -> None:
+    robot.begin()
+    robot.compose("--profile", "extra", "up", "--detach")
+    upgraded = robot.upgrade(robot.release("9.1.0"))
+    assert upgraded.returncode == 0, upgraded.stderr
+    assert robot.running("extra") == "9.1.0"
+
+
+def test_a_release_that_does_not_become_healthy_is_left_by_itself(robot: Robot) -> None:
+    robot.begin()
+    before = robot.snapshot()
+    failed = robot.upgrade(robot.release("9.1.0", healthy=False), within_s=8)
+    assert failed.returncode == 1
+    assert "9.1.0 does not become healthy: going back to 1.0.0" in failed.stderr
+    assert "1.0.0 is in use again, as before" in failed.stderr
+    assert robot.running() == "1.0.0"
+    assert {**robot.snapshot(), ".env": ""} == {**before, ".env": ""}
+    nothing = robot.upgrade("--rollback")
+    assert "there is nothing to go back to" in nothing.stderr
+
+
+def test_a_configuration_that_the_release_refuses_changes_nothing(robot: Robot) -> None:
+    robot.begin()
+    (robot.directory / "docker/config/gateway.yaml").write_text("bad\n")
+    before = robot.snapshot()
+    refused = robot.upgrade(robot.release("9.1.0"))
+    assert refused.returncode == 1
+    assert (
+        "9.1.0 does not accept this robot's configuration of gateway, nothing was changed" in refused.stderr
+    )
+    assert robot.snapshot() == before
+    assert robot.started() == ["1.0.0"]
+
+
+@pytest.mark.parametrize(
+    "damaged", ["images/robot-images-9.1.0.tar.gz", "robot-gateway-9.1.0.tar.gz", "RELEASE"]
+)
+def test_a_damaged_release_changes_nothing(robot: Robot, damaged: str) -> None:
+    robot.begin()
+    before = robot.snapshot()
+    made = robot.release("9.1.0")
+    with (made / damaged).open("ab") as file:
+        file.write(b"\n")
+    refused = robot.upgrade(made)
+    assert refused.returncode == 1
+    assert f"{damaged}: FAILED" in refused.stderr
+    assert "is damaged or incomplete, nothing was changed" in refused.stderr
+    assert robot.snapshot() == before
+    assert robot.running() == "1.0.0"
+
+
+def test_images_of_another_commit_are_refused(robot: Robot) -> None:
+    robot.begin()
+    refused = robot.upgrade(robot.release("9.1.0", revision="other"))
+    assert refused.returncode == 1
+    assert "is of commit other, the release of 9.1.0; nothing was changed" in refused.stderr
+    assert robot.running() == "1.0.0"
+
+
+def test_an_upgrade_that_was_killed_is_finished_by_the_next_command(robot: Robot) -> None:
+    """While the new containers start: directory and .env are half way or beyond."""
+    robot.begin()
+    made = robot.release("9.1.0", healthy=False)
+    program = subprocess.Popen(
+        [ROOT / "scripts/upgrade-robot", "--robot", robot.directory, made],
+        stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
+    marker = robot.directory / ".upgrade/switching"
+    try:
+        wait_until(marker.exists, "the upgrade has begun to switch", 60)
+    finally:
+        os.killpg(program.pid, signal.SIGKILL)
+        program.wait(10)
+    assert marker.read_text() == "9.1.0 1.0.0\n"
+    finished = robot.upgrade("--rollback", within_s=8)
+    assert "a change from 1.0.0 to 9.1.0 was interrupted: finishing it" in finished.stderr
+    assert "1.0.0 is in use again" in finished.stderr
+    assert robot.running() == "1.0.0"
+    assert not marker.exists()
+
+
+def test_two_at_a_time_are_refused(robot: Robot) -> None:
+    robot.begin()
+    (robot.directory / ".upgrade").mkdir()
+    with subprocess.Popen(
+        ["flock", robot.directory / ".upgrade/lock", "cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as holder:
+        assert holder.stdin
+        assert holder.stdout
+        holder.stdin.write(b"held\n")
+        holder.stdin.flush()
+        assert holder.stdout.readline() == b"held\n"
+        refused = robot.upgrade("--rollback")
+        holder.stdin.close()
+    assert refused.returncode == 1
+    assert "another upgrade-robot is at work" in refused.stderr
+
+
+def test_a_rollback_whose_images_are_gone_changes_nothing(robot: Robot) -> None:
+    robot.begin()
+    assert robot.upgrade(robot.release("9.1.0")).returncode == 0
+    subprocess.run(
+        ["docker", "image", "rm", "--force", "robot-gateway:1.0.0"], capture_output=True, check=True
+    )
+    refused = robot.upgrade("--rollback")
+    assert refused.returncode == 1
+    assert "the image robot-gateway:1.0.0 is gone, nothing was changed" in refused.stderr
+    assert robot.running() == "9.1.0"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "one argument"),
+        (("--forward",), "unknown: --forward"),
+        (("/nowhere",), "there is no directory /nowhere"),
+        (("/usr",), "/usr is no release"),
+        (("--rollback",), "there is nothing to go back to"),
+    ],
+)
+def test_what_is_no_command_is_refused(robot: Robot, words: tuple[str, ...], said: str) -> None:
+    robot.write_tree(robot.directory, "1.0.0")
+    refused = robot.upgrade(*words)
+    assert refused.returncode in (1, 2)
+    assert said in refused.stderr
