@@ -321,6 +321,9 @@ def test_a_wanted_camera_that_fails_is_a_fault_that_says_what_is_shown() -> None
     assert fault.severity is Severity.WARNING
     assert fault.message == "camera front does not work, and camera rear is shown instead: it has ended"
     assert "robotctl preview on --camera front" in fault.remedy
+    again = replace(running, cameras=(Camera("front", CameraState.STARTING), cameras[1]))
+    assert set(found(snapshot(board(), again), frozenset({"preview.camera"}))) == {"preview.camera"}
+    assert found(snapshot(board(), again)) == {}, "the operator has just chosen it"
     assert found(snapshot(board(), replace(running, wanted_camera="rear"))) == {}
     assert found(snapshot(board(), replace(running, state=PreviewState.DISABLED))) == {}
 
