@@ -9,7 +9,8 @@ from gateway.status.preview import CameraState, PreviewState, PreviewView, camer
 UNREACHABLE: Final = "preview.unreachable"
 FAULTED: Final = "preview.faulted"
 FALLBACK: Final = "preview.fallback"
-CAMERA: Final = "preview.camera"
+CAMERA: Final = "preview.camera."
+"""And the name of the camera."""
 _COMPONENT: Final = "preview"
 
 
@@ -43,13 +44,14 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
             "The robot retries by itself; to retry at once type: robotctl preview on",
         )
     wanted, live = camera_called(preview.wanted_camera, preview.cameras), live_camera(preview.cameras)
-    tried_again = CAMERA in active and wanted is not None and wanted.state is CameraState.STARTING
-    failed = wanted is not None and wanted.state is CameraState.FAILED
-    if preview.state is PreviewState.RUNNING and wanted and (failed or tried_again):
+    fails = {CameraState.FAILED}
+    if CAMERA + preview.wanted_camera in active:
+        fails.add(CameraState.STARTING)  # It is tried again.
+    if preview.state is PreviewState.RUNNING and wanted and wanted.state in fails:
         instead = f", and camera {live.name} is shown instead" if live else ""
         reason = f": {wanted.error}" if wanted.error else ""
         yield Condition(
-            CAMERA,
+            CAMERA + wanted.name,
             Severity.WARNING,
             _COMPONENT,
             f"camera {wanted.name} does not work{instead}{reason}",
