@@ -231,6 +231,8 @@ def _info(stream: RecordedStream) -> dict[str, Any]:
         "profile": stream.profile.value,
         "error": stream.error,
     }
+    if stream.camera:
+        info["camera"] = stream.camera
     if stream.encoder:
         info |= {"encoder": stream.encoder.name, "fallback_reason": stream.encoder.fallback_reason}
     if stream.stream:

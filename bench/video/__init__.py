@@ -22,6 +22,7 @@ _MODULES = {
     "bench.video.enabling": ("video.enable_to_frame_ms", "video.cold_enable_ms"),
     "bench.video.cpu": ("video.cpu", "video.cpu_in_turns"),
     "bench.video.switching": ("video.switch_gap_ms",),
+    "bench.video.camera_switching": ("video.camera_switch_gap_ms", "video.camera_against_profile"),
     "bench.video.adaptive": tuple(
         f"video.adaptive_{link}{figure}"
         for link in ("limited", "lossy")

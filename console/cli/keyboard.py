@@ -23,6 +23,7 @@ class Key(Enum):
     LOW_BW = "1"
     BALANCED = "2"
     HIGH_QUALITY = "3"
+    CAMERA = "v"
     QUIT = "q"
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from console.client import GatewayError, PreviewProfile, PreviewState, PreviewStatus
+from console.client import Camera, CameraState, GatewayError, PreviewProfile, PreviewState, PreviewStatus
 from console.monitor.link import LinkState
 from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.presentation.formatting import joined
@@ -22,6 +22,8 @@ class Controls(PreviewSwitch):
         summary: size, rate and encoder.
         answers: the outcome of the operator's request.
         conditions: the robot's own messages.
+        cameras: of the robot, in its order; the wanted one is `wanted_camera`.
+        wanted_camera: the one chosen last, or selected for the next start.
     """
 
     enabled: bool
@@ -30,6 +32,8 @@ class Controls(PreviewSwitch):
     summary: str
     answers: tuple[Note, ...]
     conditions: tuple[Note, ...]
+    cameras: tuple[Camera, ...] = ()
+    wanted_camera: str = ""
 
     @property
     def notes(self) -> tuple[Note, ...]:
@@ -37,13 +41,16 @@ class Controls(PreviewSwitch):
         return (*self.answers, *self.conditions)
 
 
-def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float) -> Controls:
+def controls(
+    state: MonitorState, selected: PreviewProfile | None, now_s: float, selected_camera: str = ""
+) -> Controls:
     """Returns the controls for a state.
 
     Args:
         state: the latest.
         selected: the profile that the operator selected while the preview was off.
         now_s: on the monotonic clock.
+        selected_camera: the camera that the operator selected while the preview was off; empty for none.
     """
     preview = state.snapshot.status.preview if state.snapshot else None
     current = PreviewState.UNKNOWN if preview is None or state.outdated(now_s) else preview.state
@@ -58,6 +65,9 @@ def controls(state: MonitorState, selected: PreviewProfile | None, now_s: float)
         summary=_summary(preview) if preview and current is not PreviewState.UNKNOWN else "",
         answers=tuple(_request_notes(state.request, now_s)),
         conditions=tuple(_robot_notes(preview)) if preview else (),
+        camera="" if on else selected_camera,
+        cameras=preview.cameras if preview else (),
+        wanted_camera=_wanted_camera(preview, "" if on else selected_camera),
     )
 
 
@@ -69,9 +79,14 @@ def _profile(preview: PreviewStatus | None, selected: PreviewProfile | None) -> 
     return preview.profile
 
 
+def _wanted_camera(preview: PreviewStatus | None, selected: str) -> str:
+    return selected or (preview.wanted_camera if preview else "")
+
+
 def _summary(preview: PreviewStatus) -> str:
     encoder, video = preview.encoder, preview.video
     return joined(
+        preview.live_camera.name if preview.live_camera and len(preview.cameras) > 1 else "",
         f"{video.width_px}x{video.height_px} at {video.fps:g} fps" if video else "",
         encoder.name if encoder else "",
         "in hardware" if encoder and encoder.hardware else "",
@@ -101,6 +116,11 @@ def _robot_notes(preview: PreviewStatus) -> Iterator[Note]:
         )
     elif not preview.service_reachable:
         yield Note("The preview service on the robot does not answer the gateway", SeverityStyle.WARNING)
+    wanted = preview.camera(preview.wanted_camera)
+    if wanted and wanted.state is CameraState.FAILED and preview.state is PreviewState.RUNNING:
+        live = preview.live_camera
+        instead = f"; {live.name} is shown" if live else ""
+        yield Note(f"Camera {wanted.name} does not work{instead}: {wanted.error}", SeverityStyle.WARNING)
     if preview.encoder and preview.encoder.fallback_reason:
         yield Note(
             f"Preferred {preview.encoder.wanted}: {preview.encoder.fallback_reason}", SeverityStyle.WARNING

@@ -35,6 +35,7 @@ def cockpit_keys(window: "MonitorWindow") -> Sequence[Key]:
         *practice,
         Key(("P",), "preview on or off", window.switch),
         *profiles,
+        Key(("V",), "preview: next camera", window.next_camera),
         Key(("O",), "boxes around objects", window.toggle_boxes),
         Key(("S",), "save the picture and its status", window.save_picture),
         Key(("C",), "record, and stop recording", window.recording.record),

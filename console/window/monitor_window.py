@@ -151,6 +151,16 @@ class MonitorWindow(QWidget):
         self._actions.choose(profile)
         self.refresh()
 
+    def choose_camera(self, name: str) -> None:
+        """Requests or selects a camera."""
+        self._actions.choose_camera(name)
+        self.refresh()
+
+    def next_camera(self) -> None:
+        """Requests or selects the next camera that works."""
+        self._actions.next_camera()
+        self.refresh()
+
     def retry(self) -> None:
         """Ends the pause before the next attempt to connect."""
         self._worker.retry_now()
@@ -276,6 +286,7 @@ class MonitorWindow(QWidget):
         self.strip.arranged.connect(self.arrange)
         self.preview.switched.connect(self.switch)
         self.preview.chosen.connect(self.choose)
+        self.preview.camera_chosen.connect(self.choose_camera)
         self.banner.retry.connect(self.retry)
         self.side.acknowledged.connect(self._acknowledge_one)
         self.side.acknowledge.clicked.connect(self._acknowledge_all)

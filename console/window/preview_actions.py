@@ -6,10 +6,11 @@ from console.client import PreviewProfile
 from console.monitor.monitor_state import MonitorState
 from console.monitor.preview_controls import Controls, controls
 from console.monitor.worker import Worker
+from console.presentation.preview_switch import next_camera
 
 
 class PreviewActions:
-    """Sends the operator's requests, and remembers the profile that was selected while the preview is off.
+    """Sends the operator's requests, and remembers what was selected while the preview is off.
 
     Args:
         worker: talks to the gateway.
@@ -18,12 +19,13 @@ class PreviewActions:
     def __init__(self, worker: Worker) -> None:
         self._worker = worker
         self._selected: PreviewProfile | None = None
+        self._selected_camera = ""
 
     def controls(self, state: MonitorState, now_s: float) -> Controls:
         """Returns the controls for a state."""
-        now = controls(state, self._selected, now_s)
+        now = controls(state, self._selected, now_s, self._selected_camera)
         if now.on:
-            self._selected = None
+            self._selected, self._selected_camera = None, ""
         return now
 
     def switch(self) -> None:
@@ -41,6 +43,21 @@ class PreviewActions:
             self._worker.switch(desired)
         else:
             self._selected = profile
+
+    def choose_camera(self, name: str) -> None:
+        """Requests a camera; while the preview is off, selects it for the next start."""
+        now = self._now()
+        if not now.enabled or not name:
+            return
+        if desired := now.with_camera(name):
+            self._worker.switch(desired)
+        else:
+            self._selected_camera = name
+
+    def next_camera(self) -> None:
+        """Requests or selects the next camera that works."""
+        now = self._now()
+        self.choose_camera(next_camera(now.cameras, now.wanted_camera))
 
     def _now(self) -> Controls:
         return self.controls(self._worker.latest(), time.monotonic())

@@ -1,4 +1,4 @@
-"""The preview's controls, in one row below the picture: state, switch, profiles."""
+"""The preview's controls, in one row below the picture: state, cameras, switch, profiles."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QWidget
@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QPushButton, QWidget
 from console.client import PreviewProfile
 from console.monitor.preview_controls import Controls
 from console.presentation.preview_switch import PROFILES
+from console.window.camera_menu import CameraMenu
 from console.window.labels import PlainLabel, set_text
 from console.window.layout import fill
 from console.window.marked_word import MarkedWord
@@ -25,8 +26,13 @@ class PreviewPanel(QWidget):
     chosen = Signal(object)
     """A profile's button was pressed; with the PreviewProfile."""
 
+    camera_chosen = Signal(str)
+    """A camera was chosen in the menu; with its name."""
+
     def __init__(self) -> None:
         super().__init__()
+        self.camera = CameraMenu()
+        self.camera.chosen.connect(self.camera_chosen)
         self.state = MarkedWord()
         self.switch = QPushButton("&Start preview")
         self.switch.setToolTip("Key P")
@@ -41,6 +47,7 @@ class PreviewPanel(QWidget):
         set_text(self.switch, "&Stop preview" if now.on else "&Start preview")
         for profile, button in self.profiles.items():
             _check(button, profile, profile is now.profile)
+        self.camera.show_cameras(now.cameras, now.wanted_camera)
         self._set_enabled(now.enabled)
 
     def _set_enabled(self, enabled: bool) -> None:
@@ -48,7 +55,7 @@ class PreviewPanel(QWidget):
         if self.switch.isEnabled() == enabled:
             return
         focus = QApplication.focusWidget()
-        buttons = (self.switch, *self.profiles.values())
+        buttons = (self.switch, self.camera, *self.profiles.values())
         if not enabled and focus in buttons:
             self._focused = focus
         for button in buttons:
@@ -69,7 +76,7 @@ class PreviewPanel(QWidget):
 
     def _lay_out(self) -> None:
         title, profiles = PlainLabel("Preview"), self.profiles.values()
-        fill(QHBoxLayout(self), title, (self.state, 1), self.switch, 8, *profiles, spacing=6)
+        fill(QHBoxLayout(self), title, (self.state, 1), self.camera, self.switch, 8, *profiles, spacing=6)
         self.switch.setMinimumWidth(self.switch.sizeHint().width())
 
 

@@ -6,18 +6,18 @@ from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from console.monitor.preview_controls import controls
 from console.viewer.formatting import delivery_text, figures_line, live_note, recording_line
 from console.viewer.robot_video import RobotVideo
 from console.window.keys import Key, bind_keys, full_screen_key, leave_full_screen
 from console.window.labels import ElidedLabel, set_text
 from console.window.layout import fill
+from console.window.preview_actions import PreviewActions
 from console.window.theme import DimLabel
 from console.window.video_view import VideoView
 from console.window.window_settings import DECORATION
 
 _TICK_MS = 500
-_KEYS = "P preview   O boxes   A age   F full screen   Q quit"
+_KEYS = "P preview   V camera   O boxes   A age   F full screen   Q quit"
 
 
 class ViewWindow(QWidget):
@@ -31,6 +31,7 @@ class ViewWindow(QWidget):
     def __init__(self, robot: RobotVideo, video: VideoView) -> None:
         super().__init__()
         self.robot = robot
+        self._actions = PreviewActions(robot.worker)
         self._counted = (time.monotonic(), 0)
         self.video = video
         self.figures, self.notes = ElidedLabel(), ElidedLabel()
@@ -41,7 +42,8 @@ class ViewWindow(QWidget):
         self._timer.timeout.connect(self._refresh)
         self._timer.start()
         keys = (
-            Key(("P",), "preview on or off", self._switch),
+            Key(("P",), "preview on or off", self._actions.switch),
+            Key(("V",), "next camera", self._actions.next_camera),
             Key(("O",), "boxes", lambda: self.video.show_overlay(not self.video.overlay_shown)),
             Key(("A",), "age of the picture", lambda: self.video.show_age(not self.video.age_shown)),
             Key(("Q",), "quit", self.close),
@@ -71,18 +73,13 @@ class ViewWindow(QWidget):
         self._counted = (now_s, frames)
         fps = (frames - before) / (now_s - before_s)
         set_text(self.figures, figures_line(session.latest_frame(), fps, session.redials))
-        notes = [note.text for note in controls(state, None, now_s).notes]
+        notes = [note.text for note in self._actions.controls(state, now_s).notes]
         texts = (recording_line(self.robot.recording), *notes, live_note(session.playback()))
         # Last: it is what may be elided in a small window.
         texts += (delivery_text(session.delivery()),)
         set_text(self.notes, "   ".join(filter(None, texts)))
         name = state.snapshot.status.gateway_name if state.snapshot else ""
         self.setWindowTitle(f"{name} {self.robot.worker.target}".strip())
-
-    def _switch(self) -> None:
-        now = controls(self.robot.worker.latest(), None, time.monotonic())
-        if now.enabled:
-            self.robot.worker.switch(now.toggled())
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Leaves the whole screen to the video."""

@@ -30,12 +30,14 @@ class FileLoop:
         self._loop = asyncio.get_running_loop()
         self._on_failure = on_failure
         self._task: asyncio.Task[None] | None = None
+        self._detached = False
         self._probe_id = self._pad.add_probe(
             Gst.PadProbeType.EVENT_DOWNSTREAM | Gst.PadProbeType.EVENT_FLUSH, self._probe
         )
 
     def detach(self) -> None:
         """Removes the probe: with it the pipeline and this object would keep each other alive."""
+        self._detached = True
         self._pad.remove_probe(self._probe_id)
         if self._task:
             self._task.cancel()
@@ -50,6 +52,8 @@ class FileLoop:
         return Gst.PadProbeReturn.OK
 
     def _restart(self) -> None:
+        if self._detached:
+            return
         self._task = asyncio.create_task(self._seek(), name="loop the file")
 
     async def _seek(self) -> None:

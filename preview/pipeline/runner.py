@@ -130,9 +130,11 @@ class Runner:
         target = plan.target
         self._bitrate = Decision(target.bitrate_kbps)
         self._controller.retarget(target.bitrate_kbps, self._floor_kbps)
-        parts, framing = self._parts, self._framing
+        framing = self._framing
 
         def apply() -> None:
+            # Of this moment: the camera may have changed while the driver was busy.
+            parts = self._parts
             builder.apply_source_target(parts.source, plan)
             parts.apply_target(plan)
             framing.set_rate(target.fps)

@@ -9,7 +9,8 @@ from gateway.status.preview import CameraState, PreviewState, PreviewView, camer
 UNREACHABLE: Final = "preview.unreachable"
 FAULTED: Final = "preview.faulted"
 FALLBACK: Final = "preview.fallback"
-CAMERA: Final = "preview.camera"
+CAMERA: Final = "preview.camera."
+"""And the name of the camera."""
 _COMPONENT: Final = "preview"
 
 
@@ -18,7 +19,7 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
 
     Args:
         preview: the state to examine.
-        active: ids of the active faults: a preview that is starting again has not recovered yet.
+        active: ids of the active faults: a preview or a camera that is starting again has not recovered yet.
         settled: whether the startup grace has elapsed.
     """
     if not preview.service_reachable:
@@ -43,13 +44,17 @@ def preview_faults(preview: PreviewView, active: frozenset[str], *, settled: boo
             "The robot retries by itself; to retry at once type: robotctl preview on",
         )
     wanted, live = camera_called(preview.wanted_camera, preview.cameras), live_camera(preview.cameras)
-    if preview.state is PreviewState.RUNNING and wanted and wanted.state is CameraState.FAILED:
+    fails = {CameraState.FAILED}
+    if CAMERA + preview.wanted_camera in active:
+        fails.add(CameraState.STARTING)  # It is tried again.
+    if preview.state is PreviewState.RUNNING and wanted and wanted.state in fails:
         instead = f", and camera {live.name} is shown instead" if live else ""
+        reason = f": {wanted.error}" if wanted.error else ""
         yield Condition(
-            CAMERA,
+            CAMERA + wanted.name,
             Severity.WARNING,
             _COMPONENT,
-            f"camera {wanted.name} does not work{instead}: {wanted.error}",
+            f"camera {wanted.name} does not work{instead}{reason}",
             f"The robot retries by itself; to retry at once type: robotctl preview on --camera {wanted.name}",
         )
     encoder = preview.encoder

@@ -1,10 +1,11 @@
 """The harness of the video benchmarks, with short windows: it must measure; figures are not judged here."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from bench.video import latency, product, switching
+from bench.video import camera_switching, latency, product, switching
 from bench.video.camera import Camera, camera
 
 pytestmark = pytest.mark.gst
@@ -33,3 +34,12 @@ def test_a_cell_of_the_latency(source: Camera, robot: product.Robot, ours: bool)
 def test_a_round_of_switches(robot: product.Robot) -> None:
     # LOW_BW has 15 frames per second, so the longest gap is no shorter than 67 ms, less some jitter.
     assert switching.round_ms(robot, settle_s=0.3, apart_s=0.6) > 50
+
+
+def test_a_round_of_cameras(source: Camera, tmp_path: Path) -> None:
+    cameras = camera_switching.cameras_of(source)
+    with product.robot(tmp_path, None, latency.LATENCY_MS, settings={"cameras": cameras}) as robot:
+        longest_ms = camera_switching.camera_round_ms(robot, settle_s=0.3, apart_s=0.6)
+        assert robot.client.status().preview.wanted_camera == "front"
+    # At 30 frames per second no gap is shorter than 33 ms.
+    assert longest_ms > 30

@@ -83,7 +83,9 @@ def test_what_a_program_learns_of_a_camera_that_fails(ground: VideoGround) -> No
         robot.enable_preview(camera="short")
         # It ends after a second, and begins again beside its fallback, at growing distances.
         wait_until(
-            lambda: any(fault.id == "preview.camera" and fault.active for fault in robot.status().faults),
+            lambda: any(
+                fault.id == "preview.camera.short" and fault.active for fault in robot.status().faults
+            ),
             "the fault",
         )
         preview = robot.status().preview
@@ -93,7 +95,7 @@ def test_what_a_program_learns_of_a_camera_that_fails(ground: VideoGround) -> No
             lambda: getattr(robot.status().preview.live_camera, "name", "") == "rear", "the fallback is live"
         )
         robot.enable_preview(camera="front")
-        fault = next(each for each in robot.status().faults if each.id == "preview.camera")
+        fault = next(each for each in robot.status().faults if each.id == "preview.camera.short")
         assert "camera short does not work" in fault.message
         assert "short" in fault.message
         live = []

@@ -24,7 +24,7 @@ from console.window import saver
 from console.window.cockpit_keys import cockpit_keys
 from console.window.monitor_window import MonitorWindow
 from console.window.programs import monitor
-from omniseer.gateway.v1 import value_pb2
+from omniseer.gateway.v1 import preview_pb2, states_pb2, value_pb2
 from tests.support.cockpit import (
     PICTURE,
     CockpitRobot,
@@ -409,6 +409,47 @@ def test_every_key_of_the_list_is_bound_and_no_key_twice(cockpit: Cockpit) -> No
     bound = [each.key().toString() for each in cockpit.window.findChildren(QShortcut)]
     assert sorted(listed) == sorted(bound)
     assert len(set(listed)) == len(listed)
+
+
+def test_cameras_are_chosen_by_key_and_menu(cockpit: Cockpit) -> None:
+    gateway, menu = cockpit.robot.gateway, cockpit.window.preview.camera
+    assert not menu.isVisible(), "a robot with one camera has no choice"
+    preview = gateway.status.preview
+    preview.state, preview.wanted_camera = states_pb2.PREVIEW_RUNNING, "front & centre"
+    live, ready, failed = (
+        preview_pb2.CAMERA_STATE_LIVE,
+        preview_pb2.CAMERA_STATE_READY,
+        preview_pb2.CAMERA_STATE_FAILED,
+    )
+    for name, state in (("front & centre", live), ("arm", failed), ("rear", ready)):
+        preview.cameras.add(name=name, state=state, error="unplugged" if state == failed else "")
+    until(menu.isVisible, "the menu")
+    assert menu.text() == "front && centre"
+    assert "front & centre" in menu.accessibleName()
+    let_pass(0.3)
+    keep_screenshot(cockpit.window, "cameras")
+    cockpit.press(Qt.Key.Key_V)
+    until(lambda: gateway.preview_requests, "the request")
+    assert (gateway.preview_requests[-1].enabled, gateway.preview_requests[-1].camera) == (True, "rear")
+    until(menu.isEnabled, "the answer")
+    menu.fill()
+    actions = menu.cameras.actions()
+    assert [action.text() for action in actions] == ["front && centre", "arm  (does not work)", "rear"]
+    assert [action.isChecked() for action in actions] == [True, False, False]
+    assert actions[1].toolTip() == "unplugged"
+    # What does not work may be asked for: the robot then tries it at once.
+    actions[1].trigger()
+    until(lambda: len(gateway.preview_requests) == 2, "the second request")
+    assert gateway.preview_requests[-1].camera == "arm"
+    until(menu.isEnabled, "the answer")
+    preview.state = states_pb2.PREVIEW_DISABLED
+    until(lambda: cockpit.window.preview.switch.text() == "&Start preview", "it is off")
+    cockpit.press(Qt.Key.Key_V)
+    until(lambda: menu.text() == "rear", "it is selected for the next start")
+    assert len(gateway.preview_requests) == 2
+    cockpit.press(Qt.Key.Key_P)
+    until(lambda: len(gateway.preview_requests) == 3, "the start")
+    assert gateway.preview_requests[-1].camera == "rear"
 
 
 def test_letters_typed_into_the_search_are_no_keys(cockpit: Cockpit) -> None:

@@ -5,6 +5,7 @@ import socket
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +17,7 @@ from preview.pipeline.events import AccessUnit, PipelineEvents
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
 from tests.support.eventually import eventually
-from tests.support.pipeline_contract import LIVE, Events, PipelineContract, plan_of
+from tests.support.pipeline_contract import LIVE, Events, PipelineContract, another, plan_of
 from tests.support.recording import record
 
 pytestmark = pytest.mark.gst
@@ -94,4 +95,21 @@ async def test_a_pipeline_that_may_do_without_its_listener_goes_on(tmp_path: Pat
     assert events.counts["listener_failed"] == 1
     await runner.write_graph(tmp_path / "graph.dot")
     assert "GstSRTSink" in (tmp_path / "graph.dot").read_text(encoding="utf-8")
+    assert await (await runner.stop())
+
+
+async def test_the_end_of_a_camera_that_is_replaced_is_not_taken_for_that_of_the_next() -> None:
+    """Both are on their way to the event loop at once."""
+    events = Events()
+    runner = Runner(plan_of(LIVE), events)
+    await runner.start()
+    await events.wait_for("first_frame")
+    end = runner._source_end
+    runner.show(another("rear"))
+    await events.wait_for("camera_shown")
+    # As if the old camera's thread had come as far as this just before it was replaced.
+    assert end._probe(end._pad, SimpleNamespace(get_event=Gst.Event.new_eos)) == Gst.PadProbeReturn.DROP
+    await events.wait_for("measured", events.counts["measured"] + 1)
+    assert not events.faults
+    assert events.counts["camera_failed"] == 0
     assert await (await runner.stop())

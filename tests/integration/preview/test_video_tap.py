@@ -222,6 +222,25 @@ def test_another_profile_is_noted_and_no_gap(preview: Tapped, tmp_path: Path) ->
     assert decoded_frames(film_of(recording.samples, tmp_path)) == len(recording.samples)
 
 
+def test_another_camera_is_noted_and_no_gap(tmp_path: Path) -> None:
+    cameras = {"front": {"kind": "test", "pattern": "red"}, "rear": {"kind": "test", "pattern": "blue"}}
+    with Tapped(tmp_path, {"cameras": cameras}) as preview, TapRecording(preview.tap) as recording:
+        recording.wait_for_frames(10)
+        assert recording.notes(STREAM_NOTE)[-1].values["camera"] == "front"
+        preview.revision += 1
+        preview.apply(
+            pb.DesiredState(
+                revision=preview.revision, enabled=True, profile=pb.PROFILE_BALANCED, camera="rear"
+            )
+        )
+        recording.wait_for(
+            lambda: recording.notes(STREAM_NOTE)[-1].values.get("camera") == "rear", "the note"
+        )
+        recording.wait_for_frames(10)
+    assert recording.losses == []
+    decodes(recording.samples, tmp_path)
+
+
 def test_another_encoder_takes_over_in_the_recording(tmp_path: Path) -> None:
     order = {"encoders": {"order": ["va-h265", "x264"]}}
     with (

@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 
 from console.client import (
+    Camera,
+    CameraState,
     DeadlineExceeded,
     DesiredPreview,
     OverlaySnapshot,
@@ -15,7 +17,7 @@ from console.client import (
 from console.monitor.link import Link, LinkState
 from console.monitor.monitor_state import MonitorState, PreviewRequest
 from console.monitor.preview_controls import Controls, controls
-from console.presentation.preview_switch import Note
+from console.presentation.preview_switch import Note, next_camera
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2, preview_pb2
 from omniseer.gateway.v1 import states_pb2 as states
@@ -126,3 +128,60 @@ def test_a_fault_is_reported_once_in_the_robots_words() -> None:
 def test_an_unreachable_service_is_reported_while_the_preview_is_off() -> None:
     (note,) = of(with_preview(states.PREVIEW_DISABLED, reachable=False)).notes
     assert "does not answer" in note.text
+
+
+def with_cameras(on: bool, wanted: str, **cameras: CameraState) -> OverlaySnapshot:
+    taken = RUNNING if on else DISABLED
+    listed = tuple(
+        Camera(name=name, state=state, error="unplugged" if state is CameraState.FAILED else "", fallback="")
+        for name, state in cameras.items()
+    )
+    preview = replace(taken.status.preview, wanted_camera=wanted, cameras=listed)
+    return replace(taken, status=replace(taken.status, preview=preview))
+
+
+LIVE, READY, FAILED = CameraState.LIVE, CameraState.READY, CameraState.FAILED
+
+
+def test_a_camera_is_requested_at_once_or_selected_for_the_next_time() -> None:
+    now = of(with_cameras(True, "front", front=LIVE, rear=READY))
+    assert (now.wanted_camera, [each.name for each in now.cameras]) == ("front", ["front", "rear"])
+    assert now.with_camera("rear") == DesiredPreview(True, camera="rear")
+    assert now.summary.startswith("front")
+    off = with_cameras(False, "front", front=READY, rear=READY)
+    assert of(off).with_camera("rear") is None
+    assert of(off).toggled() == DesiredPreview(True, HIGH)
+    selected = controls(heard(off), None, NOW_S, "rear")
+    assert selected.wanted_camera == "rear"
+    assert selected.toggled() == DesiredPreview(True, HIGH, "rear")
+
+
+def test_a_single_camera_is_not_mentioned() -> None:
+    assert "camera" not in of(with_cameras(True, "camera", camera=LIVE)).summary
+
+
+def test_a_wanted_camera_that_fails_is_a_note() -> None:
+    now = of(with_cameras(True, "front", front=FAILED, rear=LIVE))
+    assert [note.text for note in now.conditions] == [
+        "Camera front does not work; rear is shown: unplugged",
+    ]
+    assert of(with_cameras(True, "rear", front=FAILED, rear=LIVE)).conditions == ()
+
+
+@pytest.mark.parametrize(
+    ("states_", "present", "following"),
+    [
+        ({"front": LIVE, "rear": READY, "arm": READY}, "front", "rear"),
+        ({"front": READY, "rear": READY, "arm": LIVE}, "arm", "front"),
+        ({"front": LIVE, "rear": FAILED, "arm": READY}, "front", "arm"),
+        ({"front": LIVE, "rear": FAILED}, "front", ""),
+        ({"front": LIVE}, "front", ""),
+        ({}, "", ""),
+        # The wanted one is of another configuration, or of a robot that does not say.
+        ({"front": LIVE, "rear": READY}, "gone", "front"),
+    ],
+)
+def test_the_next_camera_is_the_next_that_works(
+    states_: dict[str, CameraState], present: str, following: str
+) -> None:
+    assert next_camera(with_cameras(True, present, **states_).status.preview.cameras, present) == following

@@ -12,6 +12,8 @@ from console.cli.keyboard import Key, keys_in
 from console.cli.live_screen import Fitted, live_view
 from console.cli.preview_keys import PreviewKeys
 from console.client import (
+    Camera,
+    CameraState,
     DesiredPreview,
     GatewayError,
     PreviewChange,
@@ -80,6 +82,29 @@ def test_p_requests_the_opposite(asking: PreviewKeys, state: PreviewState, reque
     assert asking.press(Key.TOGGLE, preview(state)) == request_
     offered = {key: does for key, does, _ in PreviewKeys().help(preview(state))}
     assert offered[Key.TOGGLE] == ("preview on" if request_.enabled else "preview off")
+
+
+def test_v_takes_the_next_camera_that_works(asking: PreviewKeys) -> None:
+    def robot(state: PreviewState, *cameras: str) -> PreviewStatus:
+        listed = (Camera(name=name, state=CameraState.READY, error="", fallback="") for name in cameras)
+        return replace(preview(state), cameras=tuple(listed), wanted_camera="front")
+
+    off = robot(PreviewState.DISABLED, "front", "rear", "arm")
+    assert asking.press(Key.CAMERA, off) is None
+    assert asking.press(Key.CAMERA, off) is None
+    assert shown(asking) == "camera arm: p turns the preview on with it"
+    assert "camera (arm)" in [does for _, does, _ in asking.help(off)]
+    assert asking.press(Key.TOGGLE, off) == DesiredPreview(True, camera="arm")
+    running = robot(PreviewState.RUNNING, "front", "rear")
+    asking.done(PreviewChange(accepted=True, message="preview is running, camera arm", preview=running))
+    assert asking.press(Key.CAMERA, running) == DesiredPreview(True, camera="rear")
+    assert shown(asking) == "camera rear: request sent ..."
+
+
+def test_with_a_single_camera_v_has_nothing_to_do(asking: PreviewKeys) -> None:
+    assert asking.press(Key.CAMERA, preview(PreviewState.RUNNING)) is None
+    assert shown(asking) == "this robot has no other camera that works"
+    assert Key.CAMERA not in [key for key, _, _ in asking.help(preview(PreviewState.RUNNING))]
 
 
 def test_a_profile_is_switched_while_it_runs_and_marked_while_it_does_not(asking: PreviewKeys) -> None:

@@ -322,10 +322,16 @@ def test_another_encoder_than_the_wanted_one_is_a_fault_that_names_both() -> Non
 def test_a_wanted_camera_that_fails_is_a_fault_that_says_what_is_shown() -> None:
     cameras = (Camera("front", CameraState.FAILED, "it has ended"), Camera("rear", CameraState.LIVE))
     running = replace(OFF, state=PreviewState.RUNNING, wanted_camera="front", cameras=cameras)
-    fault = found(snapshot(board(), running))["preview.camera"]
+    fault = found(snapshot(board(), running))["preview.camera.front"]
     assert fault.severity is Severity.WARNING
     assert fault.message == "camera front does not work, and camera rear is shown instead: it has ended"
     assert "robotctl preview on --camera front" in fault.remedy
+    again = replace(running, cameras=(Camera("front", CameraState.STARTING), cameras[1]))
+    assert set(found(snapshot(board(), again), frozenset({"preview.camera.front"}))) == {
+        "preview.camera.front"
+    }
+    assert found(snapshot(board(), again)) == {}, "the operator has just chosen it"
+    assert found(snapshot(board(), again), frozenset({"preview.camera.rear"})) == {}, "another one had failed"
     assert found(snapshot(board(), replace(running, wanted_camera="rear"))) == {}
     assert found(snapshot(board(), replace(running, state=PreviewState.DISABLED))) == {}
 
