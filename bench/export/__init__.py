@@ -1,6 +1,6 @@
 """Copying a recording off the robot: recorder, gateway and client are the real programs, over TCP.
 
-Takes about 6 min.
+Takes about 3 min.
 """
 
 import importlib
