@@ -9,6 +9,7 @@ pytest_plugins = [
     "tests.support.distribution",
     "tests.support.engine",
     "tests.support.leftovers",
+    "tests.support.on_request",
     "tests.support.ros",
 ]
 

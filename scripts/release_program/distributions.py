@@ -52,7 +52,7 @@ CONSOLE: Final = Distribution(
     summary="robotctl: shows a robot's status and live video, controls its preview, drives it.",
     readme="docs/robotctl.md",
     entries=("console", "practice"),
-    requires=("typer", "rich", "cryptography", "nats-py", "nkeys"),
+    requires=("typer", "rich", "nats-py", "nkeys"),
     # Qt for the windows; GStreamer comes from the system.
     extras={"video": "console", "gamepad": "gamepad"},
     scripts=("robotctl",),

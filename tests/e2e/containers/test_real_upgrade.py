@@ -15,7 +15,7 @@ from tests.support.free import free_domain, free_tcp_port, free_udp_port
 from tests.support.release import VERSION, release, released_repository
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.docker, pytest.mark.timeout(1500)]
+pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(1500)]
 
 IMAGES = ("robot-gateway", "robot-preview", "robot-drive", "robot-recorder")
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.systemd_robot import SystemdRobot, build_image, running_robot
 
-pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(900)]
 
 SCRIPT = "/robot-gateway/scripts/install-robot"
 PROGRAMS = ("gateway", "preview")

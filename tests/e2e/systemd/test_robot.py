@@ -9,7 +9,7 @@ import pytest
 from tests.support.systemd_robot import SystemdRobot, build_image, running_robot
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.docker, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.on_request, pytest.mark.docker, pytest.mark.timeout(900)]
 
 PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge")
 SOCKETS = {
