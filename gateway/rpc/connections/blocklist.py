@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from heapq import nlargest
 from typing import Final
 
 from common.token_bucket import TokenBucket
@@ -57,36 +58,37 @@ class Blocklist:
         self._clock = clock
         self._addresses: dict[str, _Address] = {}
         """The one that was heard of last at the end."""
-        self._blocked: dict[str, _Address] = {}
 
     def note_admitted(self, prefix: str) -> None:
         """Ends the block of an address from which a call was admitted, and trusts it for TRUSTED_S."""
-        self._remember(prefix).trusted_until_s = self._clock() + TRUSTED_S
-        self._blocked.pop(prefix, None)
+        address, now_s = self._remember(prefix), self._clock()
+        address.trusted_until_s = now_s + TRUSTED_S
+        address.ends_s = min(address.ends_s, now_s)
 
     def note_unused(self, prefix: str) -> None:
         """Takes down that a connection ended, or was closed, without an admitted call."""
         now_s = self._clock()
         address = self._remember(prefix)
-        if prefix in self._blocked and address.ends_s > now_s:
+        if address.ends_s > now_s:
             return  # it was accepted before the block
         if address.unused.take(now_s, capacity=UNUSED_BURST, refill_per_s=UNUSED_PER_S):
             return
         if now_s - address.ends_s >= FORGOTTEN_AFTER_S:
             address.block_s = 0.0
         address.block_s = min(LONGEST_BLOCK_S, address.block_s * BLOCK_FACTOR) or FIRST_BLOCK_S
-        self._block(prefix, address, now_s + address.block_s)
+        self._block(prefix, address.block_s)
 
     def note_flood(self, prefix: str) -> None:
         """Takes down that a connection without an admitted call made more calls than it could expect to."""
-        self._block(prefix, self._remember(prefix), self._clock() + FLOOD_BLOCK_S)
+        self._block(prefix, FLOOD_BLOCK_S)
 
     def blocked(self) -> frozenset[str]:
         """Returns the addresses that may not connect now."""
         now_s = self._clock()
-        for prefix in [prefix for prefix, each in self._blocked.items() if each.ends_s <= now_s]:
-            del self._blocked[prefix]
-        return frozenset(self._blocked)
+        blocked = [prefix for prefix, each in self._addresses.items() if each.ends_s > now_s]
+        if len(blocked) > MAX_BLOCKED:
+            blocked = nlargest(MAX_BLOCKED, blocked, key=lambda prefix: self._addresses[prefix].ends_s)
+        return frozenset(blocked)
 
     def _remember(self, prefix: str) -> _Address:
         address = self._addresses.pop(prefix, None)
@@ -107,12 +109,8 @@ class Blocklist:
         )
         oldest = next(kept, next(iter(self._addresses)))
         del self._addresses[oldest]
-        self._blocked.pop(oldest, None)
 
-    def _block(self, prefix: str, address: _Address, ends_s: float) -> None:
-        if prefix in _NEVER or address.trusted_until_s > self._clock():
-            return
-        address.ends_s = max(address.ends_s, ends_s)
-        self._blocked[prefix] = address
-        if len(self._blocked) > MAX_BLOCKED:
-            del self._blocked[min(self._blocked, key=lambda each: self._blocked[each].ends_s)]
+    def _block(self, prefix: str, block_s: float) -> None:
+        address, now_s = self._remember(prefix), self._clock()
+        if prefix not in _NEVER and address.trusted_until_s <= now_s:
+            address.ends_s = max(address.ends_s, now_s + block_s)
