@@ -166,11 +166,6 @@ class Admission:
         self._places[prefix] += 1
         self._blocklist.note_admitted(prefix)
 
-    def has_place(self, peer: Peer) -> bool:
-        """Returns whether the connection has a place, or needs none."""
-        connection = self._connections.get(peer.address)
-        return connection is None or connection.admitted
-
     def is_pending(self, peer: Peer) -> bool:
         """Returns whether the connection has no place and needs one; also if it is not known yet."""
         connection = self._connections.get(peer.address)

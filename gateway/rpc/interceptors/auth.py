@@ -157,7 +157,7 @@ class Auth(Interceptor[CallContext]):
     def _dismiss(self, call: CallContext) -> None:
         """Takes the connection's place away, unless a stream of a valid caller is open on it."""
         # A stranger's has none, and is not searched for: there may be thousands of such calls a second.
-        if not self._admission.has_place(call.peer):
+        if self._admission.is_pending(call.peer):
             return
         address = call.peer.address
         if not any(each.peer.address == address for each in self._streams):
