@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import grpc
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 
 from bench.video.foreign import end
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -63,6 +65,16 @@ class RecorderProgram(RestartableProgram):
         """A recording with its files."""
         request = pb.GetRecordingRequest(recording_id=recording_id)
         found: pb.Recording = self.call("GetRecording", request).recording
+        return found
+
+    def decoded(self, made: pb.Recording, topic: str) -> list[Any]:
+        """The messages of a recording's topic, by an independent reader of its final files."""
+        found = []
+        for file in made.files:
+            if file.name.endswith(".mcap"):
+                with (self.root / "recordings" / made.id / file.name).open("rb") as content:
+                    reader = make_reader(content, decoder_factories=[DecoderFactory()], validate_crcs=True)
+                    found += [each.decoded_message for each in reader.iter_decoded_messages(topics=[topic])]
         return found
 
     def _serves(self) -> bool:

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 
 from omniseer.gateway.v1 import recording_pb2 as pb
 from recorder.values import VIDEO_TOPIC
@@ -27,17 +25,6 @@ def printed(gateway: GatewayProgram, *words: str) -> Any:
     ran = robotctl("--target", f"127.0.0.1:{gateway.port}", "record", *words, "--json")
     assert ran.returncode == 0, ran.stderr
     return json.loads(ran.stdout)
-
-
-def read(program: RecorderProgram, made: pb.Recording, topic: str) -> list[Any]:
-    """A recording's messages of one topic, by an independent reader."""
-    found = []
-    for file in made.files:
-        if file.name.endswith(".mcap"):
-            with (program.root / "recordings" / made.id / file.name).open("rb") as content:
-                reader = make_reader(content, decoder_factories=[DecoderFactory()], validate_crcs=True)
-                found += [each.decoded_message for each in reader.iter_decoded_messages(topics=[topic])]
-    return found
 
 
 def written(program: RecorderProgram) -> int:
@@ -74,7 +61,7 @@ def test_a_killed_gateway_costs_a_recording_nothing_and_its_successor_ends_it(tm
             stopped = printed(gateway, "stop")["recording"]
         assert (stopped["id"], stopped["state"]) == (recording_id, "complete")
         assert (stopped["messages_lost"], stopped["gaps"]) == (0, [])
-        found = read(recorder, recorder.recording(recording_id), TOPIC)
+        found = recorder.decoded(recorder.recording(recording_id), TOPIC)
         assert [each.data for each in found] == list(range(1, 301))
 
 
@@ -111,8 +98,8 @@ def test_a_killed_preview_costs_a_recording_its_frames_alone_and_the_file_says_s
         assert made.state == pb.RECORDING_STATE_COMPLETE
         assert made.messages_lost == 0
         assert pb.RECORDING_GAP_CAUSE_VIDEO in {gap.cause for gap in made.gaps}
-        assert [each.data for each in read(recorder, made, TOPIC)] == list(range(1, 201))
-        video = read(recorder, made, VIDEO_TOPIC)
+        assert [each.data for each in recorder.decoded(made, TOPIC)] == list(range(1, 201))
+        video = recorder.decoded(made, VIDEO_TOPIC)
         assert len(video) == made.video_frames
         stamps = [(each.timestamp.sec, each.timestamp.nanosec) for each in video]
         assert stamps == sorted(set(stamps))

@@ -4,8 +4,6 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 from rosbags.rosbag2 import Reader
 
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -17,17 +15,9 @@ pytestmark = pytest.mark.ros
 TOPIC = "/odom"
 
 
-def read(program: RecorderProgram, made: pb.Recording) -> list[int]:
-    """The numbers in the messages of a recording, by an independent reader of its final files."""
-    folder = program.root / "recordings" / made.id
-    numbers = []
-    for file in made.files:
-        if file.name.endswith(".mcap"):
-            with (folder / file.name).open("rb") as content:
-                reader = make_reader(content, decoder_factories=[DecoderFactory()])
-                decoded = reader.iter_decoded_messages(topics=[TOPIC])
-                numbers += [each.decoded_message.data for each in decoded]
-    return numbers
+def numbers(program: RecorderProgram, made: pb.Recording) -> list[int]:
+    """The numbers in the messages of a recording."""
+    return [each.data for each in program.decoded(made, TOPIC)]
 
 
 @pytest.mark.usefixtures("ros_domain")
@@ -43,7 +33,7 @@ def test_a_recording_over_the_graph_opens_in_other_programs(tmp_path: Path) -> N
         stopped = program.call("StopRecording", pb.StopRecordingRequest(request_id="2"))
         made = program.recording(started.recording.id)
         assert stopped.recording.state == made.state == pb.RECORDING_STATE_COMPLETE
-        assert read(program, made) == list(range(1, 201))
+        assert numbers(program, made) == list(range(1, 201))
         assert made.messages_lost == 0
         folder = program.root / "recordings" / made.id / "data"
         assert program.stop() == 0
@@ -79,7 +69,7 @@ def test_killed_while_it_records_it_goes_on_with_the_same_recording(tmp_path: Pa
         assert made.state == pb.RECORDING_STATE_COMPLETE
         causes = {gap.cause for gap in made.gaps}
         assert pb.RECORDING_GAP_CAUSE_INTERRUPTED in causes
-        found = read(program, made)
+        found = numbers(program, made)
         assert found == sorted(set(found))
         assert len([file for file in made.files if file.name.endswith(".mcap")]) >= 2
 
