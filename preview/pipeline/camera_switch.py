@@ -101,7 +101,7 @@ class Candidate:
             raise CameraFailedError(f"has sent no frame for {deadline_s:.1f} s") from None
 
     async def take_over(self, old: Any, plan: Plan) -> None:
-        """Links the candidate in the place of the old camera, which goes on for nobody.
+        """Links the candidate in the place of the old camera, which goes on without effect.
 
         Args:
             old: bin of the old camera.

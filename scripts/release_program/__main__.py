@@ -38,12 +38,12 @@ def main() -> int:
         action="store_true",
         help="only what operators install; a robot can't be upgraded to it",
     )
-    wishes = parser.parse_args()
-    output = (wishes.output or _ROOT / f"build/robot-gateway-{wishes.version}").absolute()
+    options = parser.parse_args()
+    output = (options.output or _ROOT / f"build/robot-gateway-{options.version}").absolute()
     try:
-        commit = _permitted(wishes.version)
-        pythons = tuple(wishes.python or _PYTHONS)
-        _make(wishes.version, commit, output, pythons, with_images=not wishes.without_images)
+        commit = _permitted(options.version)
+        pythons = tuple(options.python or _PYTHONS)
+        _make(options.version, commit, output, pythons, with_images=not options.without_images)
     except UserError as error:
         print(f"release: {error}", file=sys.stderr)
         return int(error.exit_code)

@@ -102,7 +102,7 @@ class AcceptedSockets:
     def block(self, prefixes: Collection[str]) -> bool:
         """Has the kernel drop every attempt to connect from these addresses, and from no others.
 
-        Whoever is connected stays connected. A caller notices nothing but that nobody answers.
+        Open connections stay open. An attempt to connect gets no answer at all.
 
         Args:
             prefixes: of addresses (`gateway.access.address_prefix`).

@@ -64,7 +64,7 @@ class ConnectionGuard:
         self.muted = 0
         self.blocked = 0
         self._applied: frozenset[str] = frozenset()
-        """What the kernel was last told to block."""
+        """Prefixes in the packet filter."""
         self._watched: dict[str, _Watched] = {}
         """By address."""
         self._logged_s = -math.inf
