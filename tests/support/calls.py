@@ -1,5 +1,6 @@
 """Calls of operators without a server: gRPC's context is a double, everything else is real."""
 
+import asyncio
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,8 @@ from common.interceptors import Chain, Interceptor
 from gateway.rpc.calls.call import CallContext
 from gateway.rpc.calls.methods import CONTRACT, Method
 
+SENDING_TURNS = 20
+"""Of the event loop, until a status has been sent."""
 PEER = "ipv4:10.0.0.5:41234"
 
 
@@ -33,8 +36,12 @@ class RpcDouble:
     def code(self) -> grpc.StatusCode | None:
         return self.aborted_with
 
-    async def abort(self, code: grpc.StatusCode, details: str = "", _trailing_metadata: Any = ()) -> None:
+    async def abort(self, code: grpc.StatusCode, details: str = "", trailing_metadata: Any = ()) -> None:  # noqa: ARG002
+        if self.aborted_with is not None:
+            raise grpc.aio.UsageError("Abort already called!")
         self.aborted_with = code
+        for _ in range(SENDING_TURNS):
+            await asyncio.sleep(0)
         raise grpc.aio.AbortError(details)
 
 

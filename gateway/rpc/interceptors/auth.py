@@ -4,6 +4,7 @@ import asyncio
 import hashlib
 import logging
 import ssl
+from collections.abc import Awaitable, Coroutine
 from functools import lru_cache
 from typing import Any, Final, NoReturn
 
@@ -28,6 +29,8 @@ CHECK_EVERY_S: Final = 0.25
 """How often credentials are checked for expiry; changes of their list are applied at once."""
 _ABORT_WITHIN_S: Final = 0.25
 """How long a caller has to take the status of a stream that ends; one that doesn't read gets none."""
+_ABORTS_PER_TURN: Final = 4
+"""Each takes about 0.3 ms of the event loop."""
 TOKEN_HEADER: Final = "authorization"  # noqa: S105  # a name
 """Bearer tokens travel as in HTTP (RFC 6750 2.1)."""
 _SCHEME: Final = "bearer"
@@ -145,14 +148,26 @@ class Auth(Interceptor[CallContext]):
             del self._admitted[credential_ids]
         if lost:
             self._stream_key.renew_passphrase()
+        ended = []
         for call in [each for each in self._streams if each.principal and not valid(each.principal)]:
             # First the stream, then the place: others of the same connection may be valid.
-            task = self._streams.pop(call)
+            ended.append((call, self._streams.pop(call)))
             call.refusal = self._authenticator.access_lost()
             self._dismiss(call)
-            abort = asyncio.create_task(self._end(call, task), name="revocation of a stream")
-            self._aborts.add(abort)
-            abort.add_done_callback(self._aborts.discard)
+        if ended:
+            self._abort_later(self._abort_all(ended), name="revocation of streams")
+
+    def _abort_later(self, aborting: Coroutine[Any, Any, None], name: str) -> None:
+        abort = asyncio.create_task(aborting, name=name)
+        self._aborts.add(abort)
+        abort.add_done_callback(self._aborts.discard)
+
+    async def _abort_all(self, ended: "list[tuple[CallContext, asyncio.Task[object]]]") -> None:
+        """Begins to abort these calls, a few in each turn of the event loop: other callers wait meanwhile."""
+        for number, (call, task) in enumerate(ended, start=1):
+            self._abort_later(self._abort(call, task), name="revocation of a stream")
+            if number % _ABORTS_PER_TURN == 0:
+                await asyncio.sleep(0)
 
     def _dismiss(self, call: CallContext) -> None:
         """Takes the connection's place away, unless a stream of a valid caller is open on it."""
@@ -163,7 +178,7 @@ class Auth(Interceptor[CallContext]):
         if not any(each.peer.address == address for each in self._streams):
             self._admission.dismiss(call.peer)
 
-    async def _end(self, call: CallContext, task: "asyncio.Task[object]") -> None:
+    async def _abort(self, call: CallContext, task: "asyncio.Task[object]") -> None:
         """Aborts the call with the reason, and cancels it on our side whether or not the caller reads."""
         error = self._authenticator.access_lost()
         who = call.principal.name if call.principal else ""
@@ -172,12 +187,22 @@ class Auth(Interceptor[CallContext]):
         aborting = call.rpc.abort(code, str(error), trailing_metadata=metadata_of(error, code))
         try:
             async with asyncio.timeout(_ABORT_WITHIN_S):
-                await aborting
-        except (grpc.aio.BaseError, TimeoutError):
-            # Aborted (grpc.aio raises whenever it has); gone already; or the caller does not read.
-            pass
+                await self._aborted(aborting, task)
+        except TimeoutError:
+            pass  # The caller does not read.
         finally:
             task.cancel()
+
+    @staticmethod
+    async def _aborted(aborting: Awaitable[NoReturn], task: "asyncio.Task[object]") -> None:
+        """Returns when the status has been sent."""
+        try:
+            await aborting
+        except grpc.aio.AbortError:
+            pass  # grpc.aio raises it whenever it has aborted.
+        except grpc.aio.BaseError:
+            # The caller has gone; or `on_response` refuses the stream just now, which must not be cut short.
+            await asyncio.wait([task])
 
     async def _authenticate(self, call: CallContext) -> Principal:
         token = token_of(call.rpc)

@@ -36,6 +36,9 @@ from tests.support.guarded_gateway import NOTHING, Login, Robot, guarded_gateway
 from tests.support.promise import keeps_async
 
 FLOOD, AT_ONCE = 50, 10
+MANY = 100
+"""Streams of one credential."""
+REVOKED_WITHIN_S = 2.0
 
 
 def stub(robot: Robot, login: Login = NOTHING) -> Any:
@@ -126,6 +129,29 @@ async def test_open_streams_end_with_the_credential_and_no_others_do(
         async with asyncio.timeout(10):
             assert await staying.read() is not grpc.aio.EOF
         staying.cancel()
+
+
+async def test_every_one_of_many_streams_learns_why_it_ended(tmp_path: Path) -> None:
+    """Statuses go on being sent while they are ended one after the other."""
+    robot = new_robot(tmp_path)
+    credential, login = robot.add(Role.VIEWER)
+    async with guarded_gateway(robot):
+        request = WatchSystemStatusRequest(min_interval_ms=50)
+        streams = [
+            calls.WatchSystemStatus(request, metadata=login.metadata())
+            for calls in (stub(robot) for _ in range(MANY // 5))
+            for _ in range(5)
+        ]
+        for each in streams:
+            await each.read()
+        robot.admin.revoke(credential.credential_id)
+        async with asyncio.timeout(REVOKED_WITHIN_S):
+            ends = await asyncio.gather(*map(to_its_end, streams), return_exceptions=True)
+        reasons = {
+            refusal_in(end.trailing_metadata()).reason if isinstance(end, grpc.aio.AioRpcError) else repr(end)
+            for end in ends
+        }
+        assert reasons == {Reason.CREDENTIAL_REVOKED}
 
 
 async def test_a_stream_that_nobody_reads_ends_on_the_robots_side(tmp_path: Path) -> None:

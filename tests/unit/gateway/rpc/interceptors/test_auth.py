@@ -7,9 +7,11 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
+import grpc
 import pytest
 
 from common.errors import NotAuthenticatedError, TooMuchError
+from common.grpc_errors import ErrorInterceptor
 from common.reasons import Reason
 from gateway.access.authenticator import Authenticator
 from gateway.access.credential import Credential, Kind
@@ -152,6 +154,24 @@ async def test_a_stream_gets_nothing_after_its_caller_lost_access(ground: Ground
 
     with pytest.raises(NotAuthenticatedError):
         await serve([ground.auth], "WatchSystemStatus", answers, token=ground.tokens["anna"].text())
+
+
+async def test_a_refusal_on_its_way_is_not_cut_short(ground: Ground) -> None:
+    """A stream that has a status to send is refused by it before it is aborted for the lost access."""
+
+    async def answers(_request: Any, _call: CallContext) -> Any:
+        yield b"a status"
+        ground.revoke("anna")
+        ground.auth.end_revoked()
+        yield b"another"
+
+    with pytest.raises(grpc.aio.AbortError, match="no longer valid"):
+        await serve(
+            [ErrorInterceptor(), ground.auth],
+            "WatchSystemStatus",
+            answers,
+            token=ground.tokens["anna"].text(),
+        )
 
 
 async def test_a_credential_added_since_the_last_look_is_accepted_at_once(ground: Ground) -> None:
