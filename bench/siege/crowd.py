@@ -42,10 +42,12 @@ class Counts:
     """What an attack came to.
 
     Attributes:
+        tried: attempts to open a connection.
         opened: connections; with TLS, where the attacker goes that far.
         refused: calls that the gateway has answered.
     """
 
+    tried: int = 0
     opened: int = 0
     refused: int = 0
 
@@ -65,16 +67,23 @@ class Crowd:
 
     async def idle(self, source: str) -> NoReturn:
         """Holds a connection that is complete in every respect, but makes no call."""
-        await _persist(lambda: self._idle_once(source), REOPEN_S)
+        await self._persist(lambda: self._idle_once(source), REOPEN_S)
 
     async def drip(self, source: str) -> NoReturn:
         """Sends one byte of a TLS handshake each second."""
-        await _persist(lambda: self._drip_once(source), REOPEN_S)
+        await self._persist(lambda: self._drip_once(source), REOPEN_S)
 
     async def flood(self, source: str, token: str) -> NoReturn:
         """Keeps as many calls with this token open as a connection permits."""
         headers = GET_SYSTEM_STATUS + literal(b"authorization", f"Bearer {token}".encode())
-        await _persist(lambda: self._flood_once(source, headers), FLOODER_REOPEN_S)
+        await self._persist(lambda: self._flood_once(source, headers), FLOODER_REOPEN_S)
+
+    async def _persist(self, attack: Callable[[], Awaitable[None]], pause_s: float) -> NoReturn:
+        while True:
+            self.counts.tried += 1
+            with suppress(OSError):  # refused, reset or timed out: the gateway has defended itself
+                await attack()
+            await asyncio.sleep(pause_s)
 
     async def _idle_once(self, source: str) -> None:
         async with TlsConnection.open(source, self._target, self._context) as connection:
@@ -126,13 +135,6 @@ class _Frame(NamedTuple):
     @property
     def ends_stream(self) -> bool:
         return self.kind == RST_STREAM or (self.kind == HEADERS and bool(self.flags & END_STREAM))
-
-
-async def _persist(attack: Callable[[], Awaitable[None]], pause_s: float) -> NoReturn:
-    while True:
-        with suppress(OSError):  # refused, reset or timed out: the gateway has defended itself
-            await attack()
-        await asyncio.sleep(pause_s)
 
 
 async def _received(connection: TlsConnection) -> AsyncIterator[list[_Frame]]:

@@ -39,12 +39,14 @@ def p99_ms(took_ms: list[float]) -> float:
 
 def rows(outcome: Outcome, size: Size) -> list[Row]:
     """Returns what the outcome says, turn by turn; without what the ground does not show."""
-    opened, refused = (sum(getattr(each, name) for each in outcome.attacks) for name in ("opened", "refused"))
+    tried, opened, refused = (
+        sum(getattr(each, name) for each in outcome.attacks) for name in ("tried", "opened", "refused")
+    )
     found = [
         Row(
             name="siege.answered",
             what=f"share of an operator's calls and statuses that were answered, among {size}; these opened "
-            f"{opened} connections and had {refused} calls refused",
+            f"{opened} connections in {tried} attempts, and had {refused} calls refused",
             unit="of 1",
             values=_answered(outcome),
             bar=1.0,

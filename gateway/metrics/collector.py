@@ -151,6 +151,8 @@ class GatewayCollector(InstantCollector):
         yield _counter("connections_muted", muted, guard.muted)
         blocked = "Addresses from which no connection is accepted at present."
         yield _gauge("addresses_blocked", blocked, guard.blocked)
+        accepted = "Share of the attempts of other strangers to connect that is accepted at present."
+        yield _gauge("strangers_accepted_ratio", accepted, 1 / guard.one_in)
 
 
 def _gauge(name: str, what: str, value: float) -> Metric:

@@ -7,12 +7,12 @@ import os
 import socket
 import stat
 import struct
-from collections.abc import Collection
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final
 
 from gateway.rpc.connections import packet_filter
+from gateway.rpc.connections.packet_filter import ConnectPolicy
 
 _DESCRIPTORS: Final = Path("/proc/self/fd")
 _FAMILIES: Final = frozenset({socket.AF_INET, socket.AF_INET6})
@@ -99,18 +99,15 @@ class AcceptedSockets:
             return True
         return False
 
-    def block(self, prefixes: Collection[str]) -> bool:
-        """Has the kernel drop every attempt to connect from these addresses, and from no others.
+    def apply(self, policy: ConnectPolicy) -> bool:
+        """Has the kernel drop the attempts to connect that the policy does not let through, and no others.
 
-        Open connections stay open. An attempt to connect gets no answer at all.
-
-        Args:
-            prefixes: of addresses (`gateway.access.address_prefix`).
+        Open connections stay open. An attempt that is dropped gets no answer at all.
 
         Returns:
             Whether it does. Some kernels permit it to root alone.
         """
-        program = packet_filter.drop_from(prefixes)
+        program = packet_filter.program_of(policy)
         try:
             for descriptor in self._listening:
                 with _duplicate(descriptor) as listening:

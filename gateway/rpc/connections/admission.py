@@ -18,6 +18,8 @@ from gateway.access.address_prefix import address_prefix
 from gateway.config import LimitSettings
 from gateway.rpc.calls.call import Peer
 from gateway.rpc.connections.blocklist import Blocklist
+from gateway.rpc.connections.packet_filter import ConnectPolicy
+from gateway.rpc.connections.shedding import Shedding
 
 QUIET_AFTER_S: Final = 1.0
 """A connection without streams and without calls for this long gives way when room is needed."""
@@ -48,6 +50,7 @@ class _Connection:
     pending_since_s: float
     admitted: bool = False
     floods: bool = False
+    unused: bool = False
     streams: int = 0
     refused_s: float = -math.inf
     method_buckets: dict[str, TokenBucket] = field(default_factory=dict)
@@ -73,6 +76,7 @@ class Admission:
         self._max_pending = min(MAX_PENDING, max_connections // 4)
         self._clock = clock
         self._blocklist = Blocklist(clock)
+        self._shedding = Shedding(clock)
         self._connections: dict[str, _Connection] = {}
         """By `Peer.address`, the one that called last at the end."""
         self._places: Counter[str] = Counter()
@@ -190,11 +194,18 @@ class Admission:
         for address in self._connections.keys() - present:
             gone = self._connections.pop(address)
             if not gone.admitted:
-                self._blocklist.note_unused(gone.address_prefix)
+                self._note_unused(gone)
             self._free_place(gone)
         for address in present - self._connections.keys():
-            prefix = address_prefix(address.rpartition(":")[0].strip("[]"))
-            self._connections[address] = self._new(prefix, now_s)
+            self._connections[address] = self._new(_prefix_of(address), now_s)
+        self._shedding.adapt()
+        surplus = self._beyond_limits(now_s)
+        for address in surplus:
+            self._note_unused(self._connections[address])
+        return surplus
+
+    def _beyond_limits(self, now_s: float) -> list[str]:
+        """Returns the pending connections that are too old or too many."""
         pending = [(each, address) for address, each in self._connections.items() if not each.admitted]
         pending.sort(key=lambda item: item[0].pending_since_s, reverse=True)
         newer: Counter[str] = Counter()
@@ -211,14 +222,29 @@ class Admission:
             or (rank >= self._max_pending // 2 and age_s > SPARED_S)
         ]
 
+    def _note_unused(self, connection: _Connection) -> None:
+        """Takes down once that a connection is of no use."""
+        if not connection.unused:
+            connection.unused = True
+            self._blocklist.note_unused(connection.address_prefix, strict=self._shedding.active)
+
     def pending(self) -> list[str]:
         """Returns the addresses of the connections that have no place."""
         return [address for address, each in self._connections.items() if not each.admitted]
 
-    def note_flood(self, peer: Peer) -> None:
-        """Takes down that a pending connection makes more calls than it can expect to be answered."""
-        self._blocklist.note_flood(peer.address_prefix)
-        connection = self._connections.get(peer.address)
+    def pending_of_blocked(self) -> list[str]:
+        """Returns the addresses of the pending connections whose address prefix is blocked."""
+        blocked = self._blocklist.blocked()
+        return [
+            address
+            for address, each in self._connections.items()
+            if not each.admitted and each.address_prefix in blocked
+        ]
+
+    def note_flood(self, address: str) -> None:
+        """Takes down that the pending connection of this `Peer.address` calls or sends too much."""
+        self._blocklist.note_flood(_prefix_of(address))
+        connection = self._connections.get(address)
         if connection is not None:
             connection.floods = True
 
@@ -227,11 +253,19 @@ class Admission:
         connection = self._connections.get(address)
         return connection is not None and connection.floods
 
-    def blocked(self) -> frozenset[str]:
-        """Returns the address prefixes from which no further connection is to be accepted now."""
-        return self._blocklist.blocked()
+    @property
+    def overrun(self) -> bool:
+        """Whether strangers connect faster than the gateway can take, or did so a moment ago."""
+        return self._shedding.active
+
+    def connect_policy(self) -> ConnectPolicy:
+        """Returns from whom further connections are to be accepted now. Called after `surplus`."""
+        blocked, one_in = self._blocklist.blocked(), self._shedding.one_in
+        return ConnectPolicy(blocked, one_in, self._blocklist.trusted() if one_in > 1 else frozenset())
 
     def _new(self, prefix: str, now_s: float) -> _Connection:
+        if not self._blocklist.is_trusted(prefix):
+            self._shedding.note_stranger()
         return _Connection(prefix, TokenBucket(self._limits.burst, now_s), now_s)
 
     def _capacity(self, connection: _Connection, now_s: float) -> float:
@@ -257,3 +291,8 @@ class Admission:
             self._places[connection.address_prefix] -= 1
             if not self._places[connection.address_prefix]:
                 del self._places[connection.address_prefix]
+
+
+def _prefix_of(address: str) -> str:
+    """Returns the prefix of a `Peer.address`."""
+    return address_prefix(address.rpartition(":")[0].strip("[]"))

@@ -1,4 +1,4 @@
-"""Closes connections without an admitted call, throttles and mutes those that flood, blocks who persists."""
+"""Closes connections without an admitted call, throttles those that flood, keeps away those who persist."""
 
 import asyncio
 import logging
@@ -9,6 +9,7 @@ from typing import Final, NoReturn
 
 from gateway.rpc.connections.accepted_sockets import UNLIMITED, AcceptedSockets
 from gateway.rpc.connections.admission import Admission
+from gateway.rpc.connections.packet_filter import ConnectPolicy
 
 _log = logging.getLogger(__name__)
 
@@ -16,6 +17,8 @@ SCAN_EVERY_S: Final = 0.1
 """What is accepted in between is bounded by the server's limit of connections."""
 PENDING_BYTES: Final = 1_048_576
 """What a pending connection may send: a few of the largest requests, or thousands of small ones."""
+OVERRUN_BYTES: Final = 16_384
+"""Instead of PENDING_BYTES while strangers connect faster than the gateway can take: a hundred calls."""
 UNTHROTTLED_BYTES: Final = 65_536
 """What it may send until it is answered slowly: hundreds of calls."""
 THROTTLED_BYTES_PER_S: Final = 1024
@@ -54,6 +57,7 @@ class ConnectionGuard:
         throttled: connections that were throttled here since the start.
         muted: connections that were muted here since the start.
         blocked: addresses from which no connection is accepted at present.
+        one_in: of how many attempts of other strangers to connect one is let through at present.
     """
 
     def __init__(self, admission: Admission) -> None:
@@ -63,8 +67,8 @@ class ConnectionGuard:
         self.throttled = 0
         self.muted = 0
         self.blocked = 0
-        self._applied: frozenset[str] = frozenset()
-        """Prefixes in the packet filter."""
+        self.one_in = 1
+        self._applied = ConnectPolicy()
         self._watched: dict[str, _Watched] = {}
         """By address."""
         self._logged_s = -math.inf
@@ -74,29 +78,45 @@ class ConnectionGuard:
         sockets = AcceptedSockets(port)
         while True:
             await asyncio.sleep(SCAN_EVERY_S)
+            done = self.closed + self.throttled + self.muted
             try:
-                present = sockets.scan()
+                self.look(sockets)
             except OSError as error:
                 # No descriptors are left; the server's limit keeps connections from being the cause.
                 self._log(logging.ERROR, f"connections can't be examined: {error}")
                 continue
-            done = self.closed + self.throttled + self.muted
-            closed = sum(sockets.close(address) for address in self._admission.surplus(present))
-            self.open = len(present) - closed
-            self.closed += closed
-            self.restrain(sockets, present)
-            self.block(sockets)
             if self.closed + self.throttled + self.muted > done:
                 self._log(
                     logging.WARNING,
                     f"of connections without an admitted call, {self.closed} were closed since the start, "
                     f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
-                    f"{self.open} are open, and {self.blocked} addresses are blocked",
+                    f"{self.open} are open, {self.blocked} addresses blocked, and 1 in {self.one_in} of the "
+                    "attempts of other strangers to connect is accepted",
                 )
 
-    def restrain(self, sockets: AcceptedSockets, present: list[str]) -> None:
-        """Throttles pending connections that have sent much, and cuts off those that have sent too much."""
-        pending = set(self._admission.pending())
+    def look(self, sockets: AcceptedSockets) -> None:
+        """Looks at all connections once.
+
+        Raises:
+            OSError: they can't be listed.
+        """
+        present = sockets.scan()
+        surplus = set(self._admission.surplus(present))
+        flooding = self._restrain(sockets, present)
+        surplus.update(self._admission.pending_of_blocked())
+        # First, so that none that is closed comes back at once.
+        self._filter(sockets)
+        closed = sum(sockets.close(address) for address in surplus)
+        self.open = len(present) - closed
+        self.closed += closed
+        for address in flooding:
+            if address not in surplus:
+                self._cut_off(sockets, address)
+
+    def _restrain(self, sockets: AcceptedSockets, present: list[str]) -> list[str]:
+        """Throttles pending connections that have sent much, and returns those that have sent too much."""
+        pending, flooding = set(self._admission.pending()), []
+        most = OVERRUN_BYTES if self._admission.overrun else PENDING_BYTES
         watched: dict[str, _Watched] = {}
         for address in present:
             state = self._watched.get(address, _FRESH)
@@ -109,8 +129,9 @@ class ConnectionGuard:
             if state.placed:
                 state = _Watched(before=received)
             sent = received - state.before
-            if (sent > PENDING_BYTES or self._admission.floods(address)) and not state.cut_off:
-                self._cut_off(sockets, address)
+            if (sent > most or self._admission.floods(address)) and not state.cut_off:
+                self._admission.note_flood(address)
+                flooding.append(address)
                 state = replace(state, cut_off=True)
             elif sent > UNTHROTTLED_BYTES and not state.throttled:
                 sockets.throttle(address, THROTTLED_BYTES_PER_S)
@@ -118,18 +139,20 @@ class ConnectionGuard:
                 state = replace(state, throttled=True)
             watched[address] = state
         self._watched = watched
+        return flooding
 
-    def block(self, sockets: AcceptedSockets) -> None:
-        """Blocks the addresses that are on the list, and no others."""
-        wanted = self._admission.blocked()
+    def _filter(self, sockets: AcceptedSockets) -> None:
+        """Has the kernel keep away those who may not connect now."""
+        wanted = self._admission.connect_policy()
         if wanted == self._applied:
             return
         # Where the kernel does not permit it, connections are closed as they come.
-        self.blocked = len(wanted) if sockets.block(wanted) else 0
+        applied = wanted if sockets.apply(wanted) else ConnectPolicy()
+        self.blocked, self.one_in = len(applied.blocked), applied.one_in
         self._applied = wanted
 
     def _cut_off(self, sockets: AcceptedSockets, address: str) -> None:
-        """Mutes the connection, or closes it where the kernel does not permit that."""
+        """Mutes a connection of a trusted address, or closes it where the kernel does not permit that."""
         if sockets.mute(address):
             self.muted += 1
         elif sockets.close(address):

@@ -5,6 +5,7 @@ import socket
 import struct
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final
 
@@ -23,6 +24,8 @@ _STORE: Final = 0x02
 _SHIFT_RIGHT: Final = 0x74
 _JUMP: Final = 0x05
 _JUMP_IF_EQUAL: Final = 0x15
+_JUMP_IF_SET: Final = 0x45
+_AND: Final = 0x54
 _RETURN: Final = 0x06
 """The number of bytes that are kept; 0 drops the packet."""
 _ALL_BYTES: Final = 0xFFFF_FFFF
@@ -32,6 +35,11 @@ _IPV4_SOURCE: Final = _NETWORK_HEADER + 12
 """RFC 791 3.1."""
 _IPV6_SOURCE: Final = _NETWORK_HEADER + 8
 """RFC 8200 3."""
+_RANDOM: Final = 0x1_0000_0000 - 0x1000 + 56
+"""SKF_AD_OFF and SKF_AD_RANDOM: 32 random bits, since 3.15."""
+_TCP_FLAGS: Final = 13
+"""RFC 9293 3.1; what is not addressed otherwise begins with the TCP header."""
+_SYN: Final = 0x02
 _HIGH, _LOW = 0, 1
 """Words of the scratch memory."""
 
@@ -47,26 +55,37 @@ DROP_ALL: Final = _DROP
 """Drops every packet."""
 
 
-def drop_from(prefixes: Iterable[str]) -> bytes:
-    """Returns the program that drops packets from these addresses.
+@dataclass(frozen=True, slots=True)
+class ConnectPolicy:
+    """Whose attempts to connect reach the listening socket.
 
-    Args:
-        prefixes: IPv4 addresses, and /64 prefixes of IPv6 (`gateway.access.address_prefix`).
+    All addresses are prefixes (`gateway.access.address_prefix`).
+
+    Attributes:
+        blocked: addresses that may not connect.
+        one_in: of how many attempts of all others one is let through, by chance; a power of two.
+        spared: addresses to which `one_in` does not apply.
     """
-    ipv4, ipv6 = [], []
-    for address in map(ip_address, prefixes):
-        if isinstance(address, IPv4Address):
-            ipv4.append(_if_ipv4(address))
-        else:
-            ipv6.append(_if_ipv6(address))
+
+    blocked: frozenset[str] = frozenset()
+    one_in: int = 1
+    spared: frozenset[str] = frozenset()
+
+
+def program_of(policy: ConnectPolicy) -> bytes:
+    """Returns the program that drops the attempts to connect that the policy does not let through."""
+    spared_ipv4, spared_ipv6 = _comparisons(policy.spared, _PASS)
+    blocked_ipv4, blocked_ipv6 = _comparisons(policy.blocked, _DROP)
+    rest = _one_in(policy.one_in)
     of_ipv6 = b"".join(
         [
             _instruction(_LOAD_WORD, _IPV6_SOURCE),
             _instruction(_STORE, _HIGH),
             _instruction(_LOAD_WORD, _IPV6_SOURCE + 4),
             _instruction(_STORE, _LOW),
-            *ipv6,
-            _PASS,
+            *spared_ipv6,
+            *blocked_ipv6,
+            *rest,
         ]
     )
     return b"".join(
@@ -78,8 +97,9 @@ def drop_from(prefixes: Iterable[str]) -> bytes:
             _instruction(_JUMP, len(of_ipv6) // _INSTRUCTION.size),
             of_ipv6,
             _instruction(_LOAD_WORD, _IPV4_SOURCE),
-            *ipv4,
-            _PASS,
+            *spared_ipv4,
+            *blocked_ipv4,
+            *rest,
         ]
     )
 
@@ -99,11 +119,41 @@ def attach(filtered: socket.socket, program: bytes) -> None:
     filtered.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, described)
 
 
-def _if_ipv4(address: IPv4Address) -> bytes:
-    return _instruction(_JUMP_IF_EQUAL, int(address), if_true=0, if_false=1) + _DROP
+def _comparisons(prefixes: Iterable[str], verdict: bytes) -> tuple[list[bytes], list[bytes]]:
+    """Returns instructions that end with this verdict for packets from one of these addresses, by family."""
+    ipv4, ipv6 = [], []
+    for address in map(ip_address, sorted(prefixes)):
+        if isinstance(address, IPv4Address):
+            ipv4.append(_if_ipv4(address, verdict))
+        else:
+            ipv6.append(_if_ipv6(address, verdict))
+    return ipv4, ipv6
 
 
-def _if_ipv6(prefix: IPv6Address) -> bytes:
+def _one_in(count: int) -> list[bytes]:
+    """Returns instructions that let one of so many attempts to connect through, and every other packet.
+
+    Once an attempt was let through, the packets that complete the connection are, too.
+    """
+    if count == 1:
+        return [_PASS]
+    return [
+        _instruction(_LOAD_BYTE, _TCP_FLAGS),
+        _instruction(_JUMP_IF_SET, _SYN, if_true=1, if_false=0),
+        _PASS,
+        _instruction(_LOAD_WORD, _RANDOM),
+        _instruction(_AND, count - 1),
+        _instruction(_JUMP_IF_EQUAL, 0, if_true=0, if_false=1),
+        _PASS,
+        _DROP,
+    ]
+
+
+def _if_ipv4(address: IPv4Address, verdict: bytes) -> bytes:
+    return _instruction(_JUMP_IF_EQUAL, int(address), if_true=0, if_false=1) + verdict
+
+
+def _if_ipv6(prefix: IPv6Address, verdict: bytes) -> bytes:
     high, low = divmod(int(prefix) >> 64, 1 << 32)
     return b"".join(
         [
@@ -111,6 +161,6 @@ def _if_ipv6(prefix: IPv6Address) -> bytes:
             _instruction(_JUMP_IF_EQUAL, high, if_true=0, if_false=3),
             _instruction(_LOAD_STORED, _LOW),
             _instruction(_JUMP_IF_EQUAL, low, if_true=0, if_false=1),
-            _DROP,
+            verdict,
         ]
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from common.interceptors import Interceptor
-from gateway.rpc.calls.call import CallContext, Peer
+from gateway.rpc.calls.call import CallContext
 from gateway.rpc.connections.admission import Admission
 
 EXAMINED: Final = 8
@@ -28,14 +28,14 @@ class _Queue:
     """The calls of one pending connection.
 
     Attributes:
-        peer: whose calls they are.
+        address: the connection's `Peer.address`.
         examined: how many have a turn.
         waiting: those that have none yet, in the order in which they came.
         long_since_s: since when FLOOD_WAITING or more wait; None if they are fewer.
         floods: whether it was reported.
     """
 
-    peer: Peer
+    address: str
     examined: int = 0
     waiting: "dict[asyncio.Future[None], None]" = field(default_factory=dict)
     long_since_s: float | None = None
@@ -67,7 +67,7 @@ class Turns(Interceptor[CallContext]):
         address = call.peer.address
         queue = self._queues.get(address)
         if queue is None:
-            queue = self._queues[address] = _Queue(call.peer)
+            queue = self._queues[address] = _Queue(address)
         if queue.examined >= EXAMINED:
             return self._wait(call, queue)
         queue.examined += 1
@@ -134,7 +134,7 @@ class Turns(Interceptor[CallContext]):
         if not queue.floods:
             queue.floods = True
             self._waiting -= len(queue.waiting)
-            self._admission.note_flood(queue.peer)
+            self._admission.note_flood(queue.address)
 
 
 class TurnEnd(Interceptor[CallContext]):

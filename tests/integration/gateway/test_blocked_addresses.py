@@ -12,14 +12,20 @@ import pytest
 from gateway.access.address_prefix import address_prefix
 from gateway.access.role import Role
 from gateway.rpc.connections.accepted_sockets import AcceptedSockets
-from gateway.rpc.connections.blocklist import MAX_BLOCKED, UNUSED_BURST
+from gateway.rpc.connections.blocklist import MAX_BLOCKED, MAX_TRUSTED, UNUSED_BURST
 from gateway.rpc.connections.guard import SCAN_EVERY_S
+from gateway.rpc.connections.packet_filter import ConnectPolicy
+from gateway.rpc.connections.shedding import MAX_ONE_IN
 from gateway.rpc.interceptors.turns import EXAMINED
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.guarded_gateway import guarded_gateway, new_robot
 
 SOON_S = 0.3
+
+
+def blocking(prefixes: list[str]) -> ConnectPolicy:
+    return ConnectPolicy(frozenset(prefixes))
 
 
 def can_connect(server: socket.socket, source: str) -> bool:
@@ -34,14 +40,14 @@ def test_a_blocked_address_can_not_connect_and_others_can() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         sockets = AcceptedSockets(server.getsockname()[1])
         sockets.scan()
-        assert sockets.block(["127.0.5.1", "127.0.5.2"])
+        assert sockets.apply(blocking(["127.0.5.1", "127.0.5.2"]))
         assert not can_connect(server, "127.0.5.1")
         assert not can_connect(server, "127.0.5.2")
         assert can_connect(server, "127.0.5.3")
-        assert sockets.block(["127.0.5.3"])
+        assert sockets.apply(blocking(["127.0.5.3"]))
         assert can_connect(server, "127.0.5.1")
         assert not can_connect(server, "127.0.5.3")
-        assert sockets.block([])
+        assert sockets.apply(blocking([]))
         assert can_connect(server, "127.0.5.3")
 
 
@@ -52,7 +58,7 @@ def test_who_is_connected_stays_connected() -> None:
             accepted, _ = server.accept()
             with accepted:
                 sockets.scan()
-                assert sockets.block(["127.0.5.1"])
+                assert sockets.apply(blocking(["127.0.5.1"]))
                 caller.sendall(b"still here")
                 assert accepted.recv(16) == b"still here"
 
@@ -64,11 +70,11 @@ def test_as_many_as_may_be_blocked_of_both_families() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         sockets = AcceptedSockets(server.getsockname()[1])
         sockets.scan()
-        assert sockets.block([*crowd, "127.0.5.1"])
+        assert sockets.apply(blocking([*crowd, "127.0.5.1"]))
         assert not can_connect(server, "127.0.5.1")
         assert can_connect(server, "127.0.5.2")
         many = [f"2001:db8:0:{number:x}::" for number in range(MAX_BLOCKED)]
-        assert sockets.block(many)
+        assert sockets.apply(blocking(many))
         assert can_connect(server, "127.0.5.1")
 
 
@@ -86,12 +92,54 @@ def test_a_listener_for_both_families_blocks_both() -> None:
             except TimeoutError:
                 return False
 
-        assert sockets.block([address_prefix("::1")])
+        assert sockets.apply(blocking([address_prefix("::1")]))
         assert (connects("::1"), connects("127.0.0.1")) == (False, True)
-        assert sockets.block(["127.0.0.1"])
+        assert sockets.apply(blocking(["127.0.0.1"]))
         assert (connects("::1"), connects("127.0.0.1")) == (True, False)
-        assert sockets.block(["2001:db8::", "0.0.0.1"])
+        assert sockets.apply(blocking(["2001:db8::", "0.0.0.1"]))
         assert (connects("::1"), connects("127.0.0.1")) == (True, True)
+
+
+def test_of_a_crowd_a_share_connects_and_those_that_are_spared_do() -> None:
+    """Chances are 1 in 10^11 that all of 40 attempts get through one in two, or none does."""
+    with socket.create_server(("127.0.0.1", 0), backlog=100) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        sockets.scan()
+        assert sockets.apply(ConnectPolicy(one_in=2, spared=frozenset({"127.0.5.1"})))
+        assert all(can_connect(server, "127.0.5.1") for _ in range(40))
+        connected = [can_connect(server, "127.0.5.2") for _ in range(40)]
+        assert 0 < sum(connected) < 40
+        assert sockets.apply(ConnectPolicy(frozenset({"127.0.5.3"}), 2, frozenset({"127.0.5.1"})))
+        assert not any(can_connect(server, "127.0.5.3") for _ in range(5))
+
+
+def test_who_was_let_through_connects_and_stays() -> None:
+    """The packets after the first, of the handshake too, are not left to chance."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        sockets.scan()
+        with socket.create_connection(server.getsockname(), source_address=("127.0.5.1", 0)) as caller:
+            assert sockets.apply(ConnectPolicy(one_in=MAX_ONE_IN))
+            accepted, _ = server.accept()
+            with accepted:
+                for _ in range(100):
+                    caller.sendall(b"?")
+                    assert accepted.recv(1) == b"?"
+                    accepted.sendall(b"!")
+                    assert caller.recv(1) == b"!"
+
+
+def test_the_largest_policy_is_permitted() -> None:
+    """Of IPv6, whose comparisons take most instructions."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sockets = AcceptedSockets(server.getsockname()[1])
+        sockets.scan()
+        policy = ConnectPolicy(
+            frozenset(f"2001:db8:0:{number:x}::" for number in range(MAX_BLOCKED)),
+            MAX_ONE_IN,
+            frozenset(f"2001:db8:1:{number:x}::" for number in range(MAX_TRUSTED + 3)),
+        )
+        assert sockets.apply(policy)
 
 
 async def test_an_address_that_connects_again_and_again_is_blocked_and_an_operator_is_not(

@@ -88,6 +88,7 @@ class World:
     throttled = 35
     muted = 36
     blocked = 42
+    one_in = 8
     expired = 37
     sent_bytes = 38
     waiting = 39
@@ -175,6 +176,7 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_connections_throttled_total", ""] == 35
     assert shown["robot_gateway_connections_muted_total", ""] == 36
     assert shown["robot_gateway_addresses_blocked", ""] == 42
+    assert shown["robot_gateway_strangers_accepted_ratio", ""] == 1 / 8
 
 
 def test_the_robot_and_its_sources() -> None:

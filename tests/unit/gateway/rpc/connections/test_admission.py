@@ -15,7 +15,9 @@ from gateway.rpc.connections.admission import (
     SPARED_S,
     Admission,
 )
-from gateway.rpc.connections.blocklist import UNUSED_BURST
+from gateway.rpc.connections.blocklist import UNUSED_BURST, UNUSED_IF_STRICT
+from gateway.rpc.connections.packet_filter import ConnectPolicy
+from gateway.rpc.connections.shedding import BURST, LOWER_AFTER_S, RAISE_FACTOR
 from tests.support.clock import Clock
 
 PLACES, PER_ADDRESS = 40, 20
@@ -212,11 +214,11 @@ def test_a_connection_is_pending_until_it_is_admitted(admission: Admission) -> N
 def test_connections_that_end_unused_get_their_address_blocked(admission: Admission) -> None:
     """Whether the peer closes them or the gateway does."""
     for port in range(UNUSED_BURST + 1):
-        assert not admission.blocked()
+        assert not admission.connect_policy().blocked
         admission.surplus([f"10.0.0.5:{port}"])
-    assert not admission.blocked(), "the last one may still call"
+    assert not admission.connect_policy().blocked, "the last one may still call"
     admission.surplus([])
-    assert admission.blocked() == {"10.0.0.5"}
+    assert admission.connect_policy().blocked == {"10.0.0.5"}
 
 
 def test_those_with_an_admitted_call_do_not(admission: Admission) -> None:
@@ -224,7 +226,63 @@ def test_those_with_an_admitted_call_do_not(admission: Admission) -> None:
         admit(admission, f"10.0.0.5:{port}")
         admission.surplus([f"10.0.0.5:{port}"])
     admission.surplus([])
-    assert not admission.blocked()
+    assert not admission.connect_policy().blocked
+
+
+def overrun(admission: Admission) -> None:
+    """More strangers connect at once than are accepted."""
+    admission.surplus([f"10.1.{number}.1:1" for number in range(BURST + 1)])
+    assert admission.overrun
+
+
+def test_a_rush_of_strangers_has_a_share_of_their_attempts_dropped(
+    admission: Admission, clock: Clock
+) -> None:
+    admit(admission, "10.0.0.5:1")
+    assert admission.connect_policy() == ConnectPolicy()
+    overrun(admission)
+    policy = admission.connect_policy()
+    assert policy.one_in == RAISE_FACTOR
+    assert "10.0.0.5" in policy.spared
+    clock.now_s += LOWER_AFTER_S * RAISE_FACTOR
+    while admission.overrun:
+        clock.now_s += LOWER_AFTER_S
+        admission.surplus([])
+    assert admission.connect_policy().one_in == 1
+
+
+def test_connections_of_those_who_had_a_call_admitted_are_no_rush(admission: Admission) -> None:
+    admit(admission, "10.0.0.5:1")
+    admission.surplus([f"10.0.0.5:{port}" for port in range(1, 2 * BURST)])
+    assert not admission.overrun
+
+
+def test_amid_a_rush_few_unused_connections_get_an_address_blocked(admission: Admission) -> None:
+    overrun(admission)
+    for port in range(UNUSED_IF_STRICT + 1):
+        assert "10.0.0.7" not in admission.connect_policy().blocked
+        admission.surplus([f"10.0.0.7:{port}"])
+    admission.surplus([])
+    assert "10.0.0.7" in admission.connect_policy().blocked
+
+
+def test_a_connection_that_is_closed_as_surplus_is_unused_once(admission: Admission, clock: Clock) -> None:
+    for port in range(UNUSED_BURST):
+        address = f"10.0.0.5:{port}"
+        admission.surplus([address])
+        clock.now_s += PENDING_S + 0.1
+        assert admission.surplus([address]) == [address]
+        assert admission.surplus([address]) == [address], "it is still there"
+        admission.surplus([])
+    assert not admission.connect_policy().blocked
+
+
+def test_pending_connections_of_a_blocked_address_are_known(admission: Admission) -> None:
+    admission.surplus(["10.0.0.5:1", "10.0.0.5:2", "10.0.0.6:1"])
+    assert admission.pending_of_blocked() == []
+    admission.note_flood("10.0.0.5:1")
+    assert sorted(admission.pending_of_blocked()) == ["10.0.0.5:1", "10.0.0.5:2"]
+    assert (admission.floods("10.0.0.5:1"), admission.floods("10.0.0.5:2")) == (True, False)
 
 
 def test_a_unix_socket_is_not_limited(clock: Clock) -> None:

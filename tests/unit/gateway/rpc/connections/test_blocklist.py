@@ -12,8 +12,10 @@ from gateway.rpc.connections.blocklist import (
     LONGEST_BLOCK_S,
     MAX_BLOCKED,
     MAX_REMEMBERED,
+    MAX_TRUSTED,
     TRUSTED_S,
     UNUSED_BURST,
+    UNUSED_IF_STRICT,
     UNUSED_PER_S,
     Blocklist,
 )
@@ -100,6 +102,36 @@ def test_a_shorter_block_does_not_end_a_longer_one(blocklist: Blocklist, clock: 
     blocklist.note_flood(STRANGER)
     blocklist.note_unused(STRANGER)
     assert block_s(blocklist, clock) == FLOOD_BLOCK_S
+
+
+def test_if_strict_few_unused_connections_block_for_as_long_as_a_flood(
+    blocklist: Blocklist, clock: Clock
+) -> None:
+    for _ in range(UNUSED_IF_STRICT):
+        blocklist.note_unused(STRANGER, strict=True)
+    assert not blocklist.blocked()
+    blocklist.note_unused(STRANGER, strict=True)
+    assert block_s(blocklist, clock) == FLOOD_BLOCK_S
+
+
+def test_trust_is_told_and_ends(blocklist: Blocklist, clock: Clock) -> None:
+    assert not blocklist.is_trusted(STRANGER)
+    blocklist.note_admitted(STRANGER)
+    assert blocklist.is_trusted(STRANGER)
+    assert blocklist.trusted() == {STRANGER, "127.0.0.1", "::", "fe80::"}
+    clock.now_s += TRUSTED_S
+    assert not blocklist.is_trusted(STRANGER)
+    assert blocklist.trusted() == {"127.0.0.1", "::", "fe80::"}
+
+
+def test_of_too_many_trusted_addresses_the_newest_are_told(blocklist: Blocklist) -> None:
+    for number in range(MAX_TRUSTED):
+        blocklist.note_admitted(f"10.1.0.{number}")
+    blocklist.note_admitted("10.1.0.0")
+    blocklist.note_admitted(STRANGER)
+    trusted = blocklist.trusted()
+    assert {STRANGER, "10.1.0.0"} <= trusted
+    assert "10.1.0.1" not in trusted
 
 
 def test_an_address_with_an_admitted_call_is_not_blocked(blocklist: Blocklist, clock: Clock) -> None:

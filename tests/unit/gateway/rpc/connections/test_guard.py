@@ -9,13 +9,18 @@ from gateway.rpc.calls.call import Peer, peer_of
 from gateway.rpc.connections.accepted_sockets import UNLIMITED
 from gateway.rpc.connections.admission import Admission
 from gateway.rpc.connections.guard import (
+    OVERRUN_BYTES,
     PENDING_BYTES,
     THROTTLED_BYTES_PER_S,
     UNTHROTTLED_BYTES,
     ConnectionGuard,
 )
+from gateway.rpc.connections.packet_filter import ConnectPolicy
+from gateway.rpc.connections.shedding import BURST, RAISE_FACTOR
 
 STRANGER, OPERATOR = "10.0.0.1:1000", "10.0.0.2:1000"
+NEIGHBOUR = "10.0.0.2:2000"
+"""A stranger at the operator's address."""
 THROTTLED, RELEASED = (STRANGER, THROTTLED_BYTES_PER_S), (STRANGER, UNLIMITED)
 
 
@@ -27,7 +32,7 @@ class Sockets:
         self.throttled: list[tuple[str, int]] = []
         self.muted: list[str] = []
         self.closed: list[str] = []
-        self.blocked: list[frozenset[str]] = []
+        self.applied: list[ConnectPolicy] = []
         self._mutes = mutes
 
     def received_bytes(self, address: str) -> int:
@@ -41,12 +46,16 @@ class Sockets:
             self.muted.append(address)
         return self._mutes
 
-    def block(self, prefixes: frozenset[str]) -> bool:
-        self.blocked.append(prefixes)
+    def scan(self) -> list[str]:
+        return list(self.received)
+
+    def apply(self, policy: ConnectPolicy) -> bool:
+        self.applied.append(policy)
         return self._mutes
 
     def close(self, address: str) -> bool:
         self.closed.append(address)
+        del self.received[address]
         return True
 
 
@@ -65,11 +74,8 @@ class Ground:
 
     def look(self, **received: int) -> None:
         self.sockets.received.update({globals()[name]: count for name, count in received.items()})
-        present = list(self.sockets.received)
         sockets: Any = self.sockets
-        self.admission.surplus(present)
-        self.guard.restrain(sockets, present)
-        self.guard.block(sockets)
+        self.guard.look(sockets)
 
 
 @pytest.fixture
@@ -98,21 +104,42 @@ def test_it_is_answered_at_full_speed_once_it_is_admitted(ground: Ground) -> Non
     assert ground.sockets.throttled == [THROTTLED, RELEASED]
 
 
-def test_a_stranger_is_muted_once_beyond_many_more(ground: Ground) -> None:
+def test_a_stranger_is_closed_and_its_address_blocked_beyond_many_more(ground: Ground) -> None:
     ground.look(STRANGER=PENDING_BYTES)
-    assert ground.sockets.muted == []
-    ground.look(STRANGER=PENDING_BYTES + 1)
-    ground.look(STRANGER=2 * PENDING_BYTES)
-    assert ground.sockets.muted == [STRANGER]
-    assert (ground.guard.muted, ground.guard.closed, ground.sockets.closed) == (1, 0, [])
-
-
-def test_where_the_kernel_does_not_permit_it_the_stranger_is_cut_off() -> None:
-    ground = Ground(mutes=False)
+    assert ground.sockets.closed == []
     ground.look(STRANGER=PENDING_BYTES + 1)
     ground.look()
     assert ground.sockets.closed == [STRANGER]
-    assert (ground.guard.muted, ground.guard.closed) == (0, 1)
+    assert ground.sockets.applied == [ConnectPolicy(frozenset({"10.0.0.1"}))], "the kernel is told once"
+    assert (ground.guard.muted, ground.guard.closed, ground.guard.blocked) == (0, 1, 1)
+
+
+def test_one_that_may_share_its_address_with_an_operator_is_muted(ground: Ground) -> None:
+    ground.sockets.received[NEIGHBOUR] = 0
+    ground.look(NEIGHBOUR=PENDING_BYTES)
+    assert ground.sockets.muted == []
+    ground.look(NEIGHBOUR=PENDING_BYTES + 1)
+    ground.look(NEIGHBOUR=2 * PENDING_BYTES)
+    assert ground.sockets.muted == [NEIGHBOUR]
+    assert (ground.guard.muted, ground.guard.closed, ground.guard.blocked) == (1, 0, 0)
+
+
+def test_where_the_kernel_does_not_permit_it_the_stranger_is_closed() -> None:
+    ground = Ground(mutes=False)
+    ground.sockets.received[NEIGHBOUR] = 0
+    ground.look(STRANGER=PENDING_BYTES + 1, NEIGHBOUR=PENDING_BYTES + 1)
+    ground.look()
+    assert ground.sockets.closed == [STRANGER, NEIGHBOUR]
+    assert (ground.guard.muted, ground.guard.closed) == (0, 2)
+
+
+def test_amid_a_rush_a_stranger_may_send_less(ground: Ground) -> None:
+    ground.look(STRANGER=OVERRUN_BYTES + 1)
+    assert ground.sockets.closed == []
+    ground.sockets.received.update({f"10.1.{number}.1:1": 0 for number in range(BURST)})
+    ground.look()
+    assert STRANGER in ground.sockets.closed
+    assert ground.guard.one_in == RAISE_FACTOR
 
 
 def test_an_operator_may_send_as_much_as_it_likes(ground: Ground) -> None:
@@ -132,38 +159,38 @@ def test_what_was_sent_before_access_was_lost_does_not_count(ground: Ground) -> 
 
 
 def test_another_connection_of_the_same_address_begins_anew(ground: Ground) -> None:
-    ground.look(STRANGER=PENDING_BYTES + 1)
-    del ground.sockets.received[STRANGER]
+    ground.look(NEIGHBOUR=PENDING_BYTES + 1)
+    del ground.sockets.received[NEIGHBOUR]
     ground.look()
-    ground.look(STRANGER=PENDING_BYTES)
-    assert ground.sockets.muted == [STRANGER]
-    ground.look(STRANGER=PENDING_BYTES + 1)
-    assert ground.sockets.muted == [STRANGER, STRANGER]
+    ground.look(NEIGHBOUR=PENDING_BYTES)
+    assert ground.sockets.muted == [NEIGHBOUR]
+    ground.look(NEIGHBOUR=PENDING_BYTES + 1)
+    assert ground.sockets.muted == [NEIGHBOUR, NEIGHBOUR]
 
 
-def test_a_stranger_that_floods_is_muted_and_its_address_blocked(ground: Ground) -> None:
+def test_a_stranger_that_floods_is_closed_and_its_address_blocked(ground: Ground) -> None:
     ground.look()
-    ground.admission.note_flood(peer(STRANGER))
+    ground.admission.note_flood(STRANGER)
     ground.look()
     ground.look()
-    assert ground.sockets.muted == [STRANGER]
-    assert ground.sockets.blocked == [{"10.0.0.1"}], "the kernel is told once"
+    assert ground.sockets.closed == [STRANGER]
+    assert ground.sockets.applied == [ConnectPolicy(frozenset({"10.0.0.1"}))]
     assert ground.guard.blocked == 1
 
 
 def test_a_block_ends(ground: Ground) -> None:
-    ground.admission.note_flood(peer(STRANGER))
+    ground.admission.note_flood(STRANGER)
     ground.look()
     ground.admit(STRANGER)
     ground.look()
-    assert ground.sockets.blocked == [{"10.0.0.1"}, frozenset()]
+    assert ground.sockets.applied == [ConnectPolicy(frozenset({"10.0.0.1"})), ConnectPolicy()]
     assert ground.guard.blocked == 0
 
 
 def test_where_the_kernel_does_not_permit_it_no_address_is_blocked() -> None:
     ground = Ground(mutes=False)
     ground.look()
-    ground.admission.note_flood(peer(STRANGER))
+    ground.admission.note_flood(STRANGER)
     ground.look()
     assert ground.sockets.closed == [STRANGER]
     assert ground.guard.blocked == 0

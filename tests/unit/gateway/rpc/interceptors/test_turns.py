@@ -162,7 +162,7 @@ async def test_a_connection_of_which_many_calls_wait_for_long_floods(ground: Gro
     arrived += ground.arrive(1)
     await settle()
     assert ground.floods()
-    assert ground.admission.blocked() == {"10.0.0.5"}
+    assert ground.admission.connect_policy().blocked == {"10.0.0.5"}
     await leave(arrived)
 
 
@@ -186,12 +186,12 @@ async def test_with_too_many_calls_in_all_the_connection_with_most_floods(ground
     for peer in peers[1:]:
         arrived += ground.arrive(EXAMINED + 150, peer=peer)
     await settle()
-    assert ground.admission.blocked() == frozenset(), "950 wait"
+    assert ground.admission.connect_policy().blocked == frozenset(), "950 wait"
     arrived += ground.arrive(MAX_WAITING - 950 + EXAMINED, peer="ipv4:10.0.2.1:1")
     await settle()
-    assert ground.admission.blocked() == frozenset()
+    assert ground.admission.connect_policy().blocked == frozenset()
     arrived += ground.arrive(1, peer="ipv4:10.0.2.1:1")
     await settle()
-    assert ground.admission.blocked() == {"10.0.1.0"}
+    assert ground.admission.connect_policy().blocked == {"10.0.1.0"}
     await leave(arrived)
     assert vars(ground.turns)["_waiting"] == 0
