@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from common import ros_transport
-
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy/robot"
 PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge")
@@ -153,9 +151,7 @@ def test_paths_and_sockets_are_those_of_the_container(program: str) -> None:
 
 def test_the_graph_is_that_of_the_containers() -> None:
     anchors = yaml.safe_load((ROOT / "compose.yaml").read_text())["x-ros-environment"]
-    # The units run as users of their own, other than the robot's nodes.
-    own = {name: value for name, value in environment("ros").items() if name != ros_transport.VARIABLE}
-    assert own == {name: default_of(value) for name, value in anchors.items()}
+    assert environment("ros") == {name: default_of(value) for name, value in anchors.items()}
 
 
 def test_the_gateway_may_connect_to_the_sockets_of_all_others() -> None:
