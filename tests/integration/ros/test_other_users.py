@@ -1,5 +1,6 @@
-"""The gateway beside nodes of another user, with the environment that compose.yaml gives it."""
+"""The programs beside nodes of another user, with the environment of compose.yaml and without."""
 
+import json
 import re
 from pathlib import Path
 
@@ -52,3 +53,24 @@ def test_the_gateway_hears_the_robots_nodes_whoever_they_run_as(
         GatewayClient(f"127.0.0.1:{port}") as operator,
     ):
         wait_until(odometry_arrives, "odometry of another user's node reaches the operator", 20)
+
+
+@pytest.mark.parametrize("program", ["gateway", "recorder"])
+def test_the_doctor_says_why_nodes_of_another_user_would_stay_silent(
+    program: str,
+    ros_domain: int,  # noqa: ARG001  # for its effect
+) -> None:
+    def finding(**environment: str) -> dict[str, str]:
+        main = ("-c", f"from {program}.cli import main; main()", "doctor", "--json")
+        with running_as(GATEWAY, home, *main, environment=environment) as process:
+            listed = json.loads(process.communicate(timeout=60)[0])["findings"]
+        (found,) = [each for each in listed if each["check"] == "ros.transport"]
+        return dict(found)
+
+    with simulated_robot_as(ORDINARY), directory_of(GATEWAY) as home:
+        silent = finding()
+        assert (silent["verdict"], "user 1000" in silent["what"]) == ("wrong", True)
+        name, _, value = (
+            silent["remedy"].partition(" in the environment")[0].removeprefix("Set ").partition("=")
+        )
+        assert finding(**{name: value})["verdict"] == "good"
