@@ -9,6 +9,7 @@ from typing import Any, Final
 from common.errors import UserError
 from common.findings import Finding, Verdict, good, note, wrong
 from common.ros_node import TypeMissingError, message_class, middleware_name, ros_node, share_directory
+from common.ros_transport_findings import transport_finding
 from gateway.config import SourceSettings
 from gateway.ros.field_types import FieldMissingError, check_field
 from gateway.ros.publishers import publishers_of
@@ -32,6 +33,8 @@ class _Announced:
 def ros_findings(sources: Sequence[SourceSettings]) -> Iterator[Finding]:
     """Yields the findings on the ROS 2 graph, without subscribing to anything."""
     yield from _environment()
+    # Before a node is made, which may set variables for itself.
+    yield from transport_finding(middleware_name())
     readable = []
     for source in sources:
         finding = _type_finding(source)

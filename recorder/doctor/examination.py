@@ -9,6 +9,7 @@ import grpc
 from common.config import load
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
+from common.ros_transport_findings import transport_finding
 from common.start_command import start_command
 from recorder.config import RecorderSettings
 from recorder.doctor.judgement import folder_findings, preset_findings, program_findings
@@ -66,6 +67,8 @@ def _folder(settings: RecorderSettings) -> Iterator[Finding]:
 
 def _graph(settings: RecorderSettings) -> Iterator[Finding]:
     # Late: without ROS 2 the rest is still examined.
+    from common.ros_node import middleware_name  # noqa: PLC0415
     from recorder.doctor.graph import look  # noqa: PLC0415
 
+    yield from transport_finding(middleware_name())
     yield from preset_findings(settings, *look(settings))

@@ -1,13 +1,13 @@
 """The units of a robot without Docker: judged by systemd's own tools, and compared with the containers."""
 
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import yaml
-
-from common import ros_transport
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy/robot"
@@ -153,9 +153,32 @@ def test_paths_and_sockets_are_those_of_the_container(program: str) -> None:
 
 def test_the_graph_is_that_of_the_containers() -> None:
     anchors = yaml.safe_load((ROOT / "compose.yaml").read_text())["x-ros-environment"]
-    # The units run as users of their own, other than the robot's nodes.
-    own = {name: value for name, value in environment("ros").items() if name != ros_transport.VARIABLE}
-    assert own == {name: default_of(value) for name, value in anchors.items()}
+    assert environment("ros") == {name: default_of(value) for name, value in anchors.items()}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_what_is_installed_first_is_accepted_by_the_program(program: str, tmp_path: Path) -> None:
+    """The files that `scripts/install-robot` gives a release, and its own check of them."""
+    script = (ROOT / "scripts/install-robot").read_text(encoding="utf-8")
+    copying = re.search(r"^share_files\(\) \{.*?^\}$", script, re.MULTILINE | re.DOTALL)
+    assert copying
+    command = f'set -eu; {copying[0]}; share_files "$1"'
+    subprocess.run(["bash", "-c", command, "bash", tmp_path], cwd=ROOT, timeout=60, check=True)
+    config = tmp_path / f"{program}.yaml"
+    own = DEPLOY / config.name
+    if own.exists():
+        assert config.read_text(encoding="utf-8") == own.read_text(encoding="utf-8")
+    module = f"from {program}.cli import main; main()"
+    checked = subprocess.run(
+        [sys.executable, "-c", module, "check", "--config", config],
+        cwd=ROOT,
+        env={**os.environ, **environment("ros"), **environment(program)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (checked.returncode, checked.stderr) == (0, "")
 
 
 def test_the_gateway_may_connect_to_the_sockets_of_all_others() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from common import ros_transport
 from tests.support.engine import ROOT
 
 pytestmark = pytest.mark.docker
@@ -56,7 +57,6 @@ def test_driving_is_off_unless_its_profile_is_asked_for() -> None:
     assert not {"drive", "drive-config"} & config()["services"].keys()
     drive = config(profile="drive")["services"]["drive"]
     assert drive["cpu_shares"] > 1024
-    assert (drive["network_mode"], drive["ipc"]) == ("host", "host")
 
 
 def test_recording_is_off_unless_its_profile_is_asked_for_and_yields_to_the_mission() -> None:
@@ -64,7 +64,6 @@ def test_recording_is_off_unless_its_profile_is_asked_for_and_yields_to_the_miss
     recorder = config(profile="record")["services"]["recorder"]
     assert recorder["cpu_shares"] < 1024
     assert recorder["oom_score_adj"] > 0
-    assert (recorder["network_mode"], recorder["ipc"]) == ("host", "host")
 
 
 def test_the_fleet_is_off_unless_its_profile_is_asked_for_and_yields_to_the_mission() -> None:
@@ -118,10 +117,22 @@ def test_what_a_robot_without_credentials_accepted_ends_with_the_overlay() -> No
         assert config(*order)["services"]["gateway"]["environment"]["GATEWAY__SECURITY__INSECURE"] == "false"
 
 
-def test_the_gateway_is_where_the_robots_nodes_are() -> None:
-    gateway = config()["services"]["gateway"]
-    assert (gateway["network_mode"], gateway["ipc"]) == ("host", "host")
-    assert {"ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"} <= gateway["environment"].keys()
+@pytest.mark.parametrize(
+    ("program", "profile"), [("gateway", ""), ("drive", "drive"), ("recorder", "record")]
+)
+def test_what_speaks_ros_is_where_the_robots_nodes_are(program: str, profile: str) -> None:
+    """And shares no memory with them: they are other users (tests/integration/ros/test_other_users.py)."""
+    service = config(profile=profile)["services"][program]
+    assert service["network_mode"] == "host"
+    assert "ipc" not in service
+    assert {"ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"} <= service["environment"].keys()
+    assert service["environment"][ros_transport.VARIABLE] == "udp"
+
+
+@pytest.mark.parametrize("program", ["gateway", "drive", "recorder"])
+def test_the_demo_carries_ros_as_a_robot_does(program: str) -> None:
+    services = config("demo", profile={"drive": "drive", "recorder": "record"}.get(program, ""))["services"]
+    assert services[program]["environment"][ros_transport.VARIABLE] == "udp"
 
 
 @pytest.mark.parametrize("overlay", ["", "rockchip", "v4l2", "vaapi"])

@@ -1,4 +1,4 @@
-"""compose.yaml as the robot runs it: the host's network and shared memory, beside the robot's own nodes."""
+"""compose.yaml as the robot runs it: in the host's network, beside the robot's own nodes."""
 
 import json
 import signal
@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 
 from console.client import GatewayClient, PreviewState, Unreachable
-from console.client.results import StreamEndpoint
+from console.client.results import RecorderState, StreamEndpoint
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamRefusedError
 from tests.e2e.containers.deployment import Deployment, deployed
 from tests.support.helper import helper
+from tests.support.other_user import ORDINARY, simulated_robot_as
 from tests.support.receiver import Receiver
+from tests.support.robotctl import robotctl_process
 from tests.support.ros import simulated_robot
 from tests.support.waiting import wait_until
 from tests.support.watcher import Watcher
@@ -96,6 +98,42 @@ def test_the_published_address_decides_whether_the_video_is_encrypted(
             watcher.wait_for_frames(10)
         warned = f"anyone who reaches its listener at {bind}" in deployment.logs("gateway")
         assert warned is encrypted, "where other machines reach it"
+
+
+@pytest.mark.usefixtures("images")
+def test_nodes_of_another_user_reach_the_operator_and_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The gateway is user 10001 and the recorder 10004; an ordinary user of the host publishes."""
+    (tmp_path / "recorder.yaml").write_text(
+        "room: {min_free_bytes: 0}\npresets: {motion: {topics: [/odometry/filtered]}}\n", encoding="utf-8"
+    )
+    with deployed(
+        tmp_path,
+        up=False,
+        GATEWAY_CONFIG=str(tmp_path / "gateway.yaml"),
+        RECORDER_CONFIG=str(tmp_path / "recorder.yaml"),
+        COMPOSE_PROFILES="record",
+    ) as deployment:
+        configure(tmp_path, deployment, "recording: {socket: /run/robot-recorder/recorder.sock}\n")
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(deployment.domain))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        with simulated_robot_as(ORDINARY), deployment.client() as operator:
+
+            def recorder_is_idle() -> bool:
+                recording = operator.status().recording
+                return recording is not None and recording.state is RecorderState.IDLE
+
+            def messages_are_written() -> bool:
+                recording = operator.status().recording
+                return recording is not None and recording.messages_written > 0
+
+            deployment.compose.start()
+            deployment.wait_for_status(operator)
+            wait_until(recorder_is_idle, "the recorder is idle", 60)
+            begun = robotctl_process("--target", deployment.target, "record", "start", "--json")
+            assert begun.returncode == 0, begun.stderr
+            wait_until(messages_are_written, "messages are recorded", 30)
 
 
 @pytest.mark.usefixtures("images")

@@ -23,7 +23,7 @@ def test_what_is_published_as_configured_is_good(talker: Talker) -> None:
     talker.publisher(ODOMETRY.topic, Odometry)
     findings = examined(ODOMETRY)
     assert {finding.verdict for finding in findings.values()} == {Verdict.GOOD}
-    assert set(findings) == {"ros.domain", "type.odometry", "ros", "topic.odometry"}
+    assert set(findings) == {"ros.domain", "ros.transport", "type.odometry", "ros", "topic.odometry"}
 
 
 def test_another_type_says_which_to_configure(talker: Talker) -> None:
