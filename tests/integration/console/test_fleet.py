@@ -27,6 +27,7 @@ from omniseer.fleet.v1.state_pb2 import RobotState
 from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt, StoredRecording
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.recording_pb2 import Recording
+from omniseer.gateway.v1.value_pb2 import NUMBER_LEVEL_ERROR_HIGH, TEXT_LEVEL_GOOD
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import fill
 from tests.support.fleet_hub import FleetHub, fleet_hub
@@ -84,6 +85,36 @@ def test_the_whole_fleet_at_a_glance(hub: FleetHub) -> None:
     # By the hub's clock, a moment ago.
     assert 0 <= document["robots"][0]["last_seen_ms"] < 10_000
     assert document["summary"]["with_errors"] == 1
+
+
+def test_the_values_of_a_robots_configuration(hub: FleetHub) -> None:
+    hub.enroll("lab1", "lab2")
+    state = healthy_state("lab1")
+    state.numbers.add(
+        label="motor", title="Motor", available=True, value=91.5, unit="°C", level=NUMBER_LEVEL_ERROR_HIGH
+    )
+    state.texts.add(label="arm", title="Arm", available=True, text="open", level=TEXT_LEVEL_GOOD)
+    state.position.available = True
+    state.position.latitude_deg, state.position.longitude_deg = 47.5, 8.25
+    hub.put_state(state)
+    lines = shown(hub, "show", "lab1")
+    assert lines[0].startswith("lab1  seen ")
+    assert ["Motor", "TOO", "HIGH", "91.5", "°C"] in [line.split()[:5] for line in lines]
+    assert ["Arm", "fresh", "open"] in [line.split()[:3] for line in lines]
+    assert any("47.500000°, 8.250000°" in line for line in lines)
+    document = answer(hub, "show", "lab1")
+    assert document["standing"] == "up"
+    (number,) = document["state"]["numbers"]
+    assert (number["label"], number["value"], number["level"]) == ("motor", 91.5, "error_high")
+    assert document == answer(hub, "list")["robots"][0] | {
+        key: document[key] for key in ("last_seen_ms", "since_ms")
+    }
+    (first,) = (line for line in shown(hub, "watch", "--count", "1") if "lab1" in line)
+    assert "Motor 91.5 °C TOO HIGH, Arm open" in first
+    assert shown(hub, "show", "lab2")[-1].split()[:3] == ["standing", "NEVER", "SEEN"]
+    unknown = robotctl("fleet", "show", "lab3", "--hub", hub.urls)
+    assert unknown.returncode == 2
+    assert "no robot of the fleet is called 'lab3'" in unknown.stderr
 
 
 def test_a_fleet_without_robots(hub: FleetHub) -> None:
@@ -378,7 +409,9 @@ def hostile_hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetHub]:
 
 @pytest.mark.parametrize("form", [(), ("--json",)], ids=["table", "json"])
 @pytest.mark.parametrize(
-    "words", [("list",), ("watch", "--count", "1"), ("events",), ("recordings",)], ids=" ".join
+    "words",
+    [("list",), ("watch", "--count", "1"), ("show", "control"), ("events",), ("recordings",)],
+    ids=" ".join,
 )
 def test_nothing_reaches_the_terminal_but_text(
     hostile_hub: FleetHub, words: tuple[str, ...], form: tuple[str, ...]
