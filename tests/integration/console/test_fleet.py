@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import select
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -13,8 +14,10 @@ from unittest import mock
 import pytest
 from nacl.signing import SigningKey
 
-from console.fleet.hub import read_recordings
+from console.fleet.hub import EventQuery, read_events, read_recordings
+from console.fleet.values import FleetItem, RobotEvent
 from console.fleet.values import StoredRecording as Stored
+from fleet.connection import Hub
 from fleet.receipts import PURPOSE, key_id
 from omniseer.fleet.v1.command_pb2 import (
     COMMAND_OUTCOME_DONE,
@@ -170,6 +173,54 @@ def test_events_are_followed_until_ctrl_c(hub: FleetHub) -> None:
         finally:
             process.kill()
     assert [each["event"]["event"]["position"]["sequence"] for each in (first, second)] == [1, 2]
+
+
+def test_only_new_events_are_followed_each_once_and_in_order(hub: FleetHub) -> None:
+    hub.put_events(batch("lab1", event(1)), batch("lab2", event(1)))
+    words = ["fleet", "events", "--follow", "--since", "new", "--json", "--hub", hub.urls]
+    with subprocess.Popen(
+        [ROBOTCTL, *words], stdout=subprocess.PIPE, text=True, env=environment()
+    ) as process:
+        try:
+            assert process.stdout
+            # When it begins to listen only its first line shows.
+            last = 1
+            while last < 1000 and not select.select([process.stdout], [], [], 0.1)[0]:
+                last += 1
+                hub.put_events(batch("lab1", event(last)))
+            hub.put_events(batch("lab1", event(last + 1)))
+            seen: list[int] = []
+            while not seen or seen[-1] <= last:
+                item = json.loads(process.stdout.readline())["event"]
+                assert item["robot"] == "lab1"
+                seen.append(item["event"]["position"]["sequence"])
+            process.terminate()
+            assert process.wait(ENDS_WITHIN_S) == 0
+        finally:
+            process.kill()
+    assert seen[0] > 1
+    assert seen == list(range(seen[0], last + 2))
+
+
+def test_new_events_of_a_robot_without_any(hub: FleetHub) -> None:
+    hub.put_events(batch("lab1", event(1)))
+
+    async def first(connection: Hub) -> FleetItem:
+        items = read_events(connection, EventQuery("lab2", None, follow=True))
+        coming = asyncio.ensure_future(anext(items))
+        # Whenever it begins: of this robot the hub had nothing.
+        await asyncio.to_thread(hub.put_events, batch("lab1", event(2)), batch("lab2", event(1)))
+        return await asyncio.wait_for(coming, ENDS_WITHIN_S)
+
+    found = hub.run(first)
+    assert isinstance(found, RobotEvent)
+    assert found.robot == "lab2"
+
+
+def test_new_alone_is_a_mistake() -> None:
+    done = robotctl("fleet", "events", "--since", "new", "--hub", "nats://127.0.0.1:1")
+    assert done.returncode == 2
+    assert "fleet events --follow --since new" in done.stderr
 
 
 def stored(robot: str, recording_id: str, key: SigningKey, **wrong: Any) -> StoredRecording:
