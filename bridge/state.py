@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.configured_values import add_values, without_measurements
 from bridge.values import INFO
 from omniseer.fleet.v1 import state_pb2 as pb
 from omniseer.fleet.v1.upload_pb2 import UploadBrief
@@ -68,10 +69,14 @@ def is_charging(status: SystemStatus | None) -> bool | None:
 
 
 def same_but_for_time(state: pb.RobotState) -> bytes:
-    """Returns what two states have in common if nothing but time has passed between them."""
+    """Returns what two states have in common if nothing has happened between them.
+
+    Time and what is measured change by themselves: they come with the next state, after 10 s at the latest.
+    """
     key = pb.RobotState()
     key.CopyFrom(state)
     key.ClearField("gateway_uptime_s")
+    without_measurements(key)
     return key.SerializeToString(deterministic=True)
 
 
@@ -104,6 +109,7 @@ def _add_status(state: pb.RobotState, status: SystemStatus) -> None:
     if (charging := is_charging(status)) is not None:
         state.charging = charging
     _add_platform(state, status.platform)
+    add_values(state, status)
 
 
 def _add_platform(state: pb.RobotState, platform: PlatformStatus) -> None:

@@ -45,6 +45,11 @@ NAMES: Final = (
     "drives_report",
     "recorders_report",
     "bridges_report",
+    "hubs_content",
+    "gateways_status",
+    "receivers_request",
+    "kernels_answer",
+    "field_path",
 )
 """Of `targets.TARGETS`, which only a worker loads (a test compares)."""
 

@@ -1,5 +1,6 @@
 """Good inputs to begin with: a fuzzer that starts from nothing takes long to learn a format."""
 
+import struct
 from typing import Any, Final
 
 from mcap.records import Channel, Message, Schema
@@ -8,20 +9,23 @@ from rclpy.serialization import serialize_message
 from common.ca import new_ca
 from common.video_tap import Header, Kind, encode_object
 from fuzz import recording
+from fuzz.fleet import REQUESTS, ROBOT
 from fuzz.programs import NOW_NS
 from fuzz.robot import SOURCES, type_of
 from omniseer.bridge.v1 import bridge_service_pb2 as bridge_pb
 from omniseer.drive.v1 import drive_pb2
-from omniseer.fleet.v1 import command_pb2
+from omniseer.fleet.v1 import command_pb2, state_pb2, upload_pb2
 from omniseer.gateway.v1 import (
     cloud_pb2,
     event_pb2,
     overlay_pb2,
+    pose_pb2,
     preview_pb2,
     recording_pb2,
     robot_gateway_pb2,
     states_pb2,
     system_status_pb2,
+    value_pb2,
 )
 from omniseer.preview.v1 import preview_service_pb2 as preview_pb
 from omniseer.recorder.v1 import recorder_service_pb2 as recorder_pb
@@ -47,6 +51,22 @@ _DESIRED_STATE: Final = preview_pb.DesiredState(
     enabled=True,
     profile=preview_pb.PROFILE_LOW_BW,
     passphrase="0123456789",  # noqa: S106  # made up
+)
+
+
+_VALUES: Final = system_status_pb2.SystemStatus(
+    numbers=[value_pb2.NumberStatus(label="motor", title="Motor", available=True, value=61.5, unit="V")],
+    texts=[value_pb2.TextStatus(label="arm", available=True, text="open", level=value_pb2.TEXT_LEVEL_ERROR)],
+    position=pose_pb2.PositionStatus(available=True, latitude_deg=47.5, longitude_deg=8.25),
+    orientation=pose_pb2.OrientationStatus(available=True, roll_deg=1.5, pitch_deg=0.5, yaw_deg=3.5),
+)
+_FLEET_STATE: Final = state_pb2.RobotState(
+    robot=ROBOT,
+    gateway_reachable=True,
+    faults=[state_pb2.FaultBrief(fault_id="lidar.stale", message="lidar silent")],
+    numbers=_VALUES.numbers,
+    texts=_VALUES.texts,
+    position=_VALUES.position,
 )
 
 
@@ -90,6 +110,27 @@ def _chunk_content() -> bytes:
             ]
         )
     )
+
+
+def _receivers_requests() -> list[bytes]:
+    """One of each, in the form of the target."""
+    file = recording_pb2.RecordingFile(name="data.mcap", size=3, sha256=bytes(32))
+    requests = {
+        "begin_upload": upload_pb2.BeginUploadRequest(recording=recording_pb2.Recording(id="r1")),
+        "begin_file": upload_pb2.BeginFileRequest(recording_id="r1", file=file),
+        "get_parts": upload_pb2.GetPartsRequest(
+            recording_id="r1", file_name="data.mcap", file_size=3, upload_id="u1", numbers=[1]
+        ),
+        "complete_file": upload_pb2.CompleteFileRequest(
+            recording_id="r1", file_name="a", upload_id="u1", parts=[upload_pb2.Part(number=1, etag="e")]
+        ),
+        "verify_file": upload_pb2.VerifyFileRequest(recording_id="r1", file=file),
+        "complete_upload": upload_pb2.CompleteUploadRequest(
+            recording=recording_pb2.Recording(id="r1", size=3), file_names=["a"]
+        ),
+        "get_files": upload_pb2.GetFilesRequest(recording_id="r1", file_names=["a"]),
+    }
+    return [bytes([REQUESTS.index(name)]) + each.SerializeToString() for name, each in requests.items()]
 
 
 def _drive_packets() -> bytes:
@@ -216,6 +257,15 @@ _SEEDS: Final = {
             requests=[bridge_pb.HubRequest(request_id="c1", issued_by="anna", remaining_ms=5000)],
         ).SerializeToString()
     ],
+    "hubs_content": [_FLEET_STATE.SerializeToString(), _FLEET_STATE.SerializeToString()[:40]],
+    "gateways_status": [_VALUES.SerializeToString()],
+    "receivers_request": _receivers_requests(),
+    "kernels_answer": [
+        struct.pack("=IHHII", 36, 24, 0, 1, 0)
+        + struct.pack("=BBBBBBBBI", 2, 32, 0, 0, 0, 0, 0, 1, 0)
+        + struct.pack("=HHi", 8, 4, 2)
+    ],
+    "field_path": [b"\0cell_voltage[1]", b"\1status[0].level", b"\2pose.covariance[35]"],
     "known_robots": [b'default = "lab2"\n[robots.lab2]\ntarget = "10.0.0.5:50051"\n'],
 }
 

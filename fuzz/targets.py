@@ -31,6 +31,7 @@ from console.receiver.transport_stream import PACKET_BYTES, TransportStream, Unk
 from console.robots.login import parse_login
 from console.robots.robots_file import parse_robots_file
 from fuzz.admission import admission
+from fuzz.fleet import field_path, gateways_status, hubs_content, kernels_answer, receivers_request
 from fuzz.programs import bridges_report, drives_report, gateways_packets, recorders_report
 from fuzz.recording import export_request, segment, video_tap
 from fuzz.robot import robots_message
@@ -259,6 +260,11 @@ TARGETS: Final[Mapping[str, Target]] = MappingProxyType(
             drives_report,
             recorders_report,
             bridges_report,
+            hubs_content,
+            gateways_status,
+            receivers_request,
+            kernels_answer,
+            field_path,
         )
     }
 )

@@ -8,7 +8,6 @@ import asyncio
 import ipaddress
 import socket
 import struct
-import sys
 from contextlib import suppress
 from typing import Final
 
@@ -24,6 +23,7 @@ _ROUTE: Final = struct.Struct("=BBBBBBBBI")
 """rtmsg: family, length of the destination in bits, what a request leaves at 0. The eighth: type."""
 _ATTRIBUTE: Final = struct.Struct("=HH")
 """rtattr: length with this header, type."""
+_INDEX: Final = struct.Struct("=i")
 _NLM_F_REQUEST: Final = 1
 _RTM_NEWROUTE: Final = 24
 _RTM_GETROUTE: Final = 26
@@ -64,7 +64,7 @@ def _interface(address: str) -> str:
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW | socket.SOCK_CLOEXEC, _NETLINK_ROUTE) as kernel:
         kernel.settimeout(_ANSWER_S)
         kernel.sendto(_request(family, to.packed), (0, 0))
-        index = _index(kernel.recv(_LONGEST_ANSWER))
+        index = index_of(kernel.recv(_LONGEST_ANSWER))
     if index is None:
         raise OSError(f"no route to {to}")
     return socket.if_indextoname(index)
@@ -77,16 +77,19 @@ def _request(family: int, destination: bytes) -> bytes:
     return _HEADER.pack(_HEADER.size + len(body), _RTM_GETROUTE, _NLM_F_REQUEST, 1, 0) + body
 
 
-def _index(answer: bytes) -> int | None:
-    """Returns the number of the interface that the kernel's answer names; None if it is an error."""
+def index_of(answer: bytes) -> int | None:
+    """Returns the number of the interface that the kernel's answer names; None if it names none."""
+    if len(answer) < _HEADER.size + _ROUTE.size:
+        return None
     length, kind, *_ = _HEADER.unpack_from(answer)
     if kind != _RTM_NEWROUTE or _ROUTE.unpack_from(answer, _HEADER.size)[7] not in _USABLE:
         return None
     offset = _HEADER.size + _ROUTE.size
     while offset + _ATTRIBUTE.size <= min(length, len(answer)):
         size, name = _ATTRIBUTE.unpack_from(answer, offset)
-        if name == _RTA_OIF:
-            return int.from_bytes(answer[offset + _ATTRIBUTE.size : offset + size], sys.byteorder)
+        if name == _RTA_OIF and size == _ATTRIBUTE.size + _INDEX.size and offset + size <= len(answer):
+            index: int = _INDEX.unpack_from(answer, offset + _ATTRIBUTE.size)[0]
+            return index if index > 0 else None
         # Attributes begin at multiples of 4.
         offset += max(_ATTRIBUTE.size, size + 3 & ~3)
     return None

@@ -15,7 +15,7 @@ import typer
 from common.errors import ExitCode, UserError
 from console.cli.fleet_events import events
 from console.cli.fleet_session import FleetSession, HubUnreachableError, with_fleet
-from console.cli.fleet_tables import answer_line, fleet_view, recordings_table
+from console.cli.fleet_tables import answer_line, fleet_view, recordings_table, robot_view
 from console.cli.fleet_watch import fleet_json, watch
 from console.cli.login import STANDARD_INPUT, login_text
 from console.cli.options import JsonOption, json_requested
@@ -57,6 +57,14 @@ def list_all(session: FleetSession) -> None:
     """Show all robots at a glance, once: who is up, since when, faults, battery, disk, uploads."""
     rows = asyncio.run(_rows(session))
     session.show(fleet_json(rows), fleet_view(rows, session.out.width))
+
+
+@fleet_app.command("show")
+@with_fleet
+def show(session: FleetSession, *, robot: RobotArgument) -> None:
+    """Show one robot as its hub has it: faults, battery, uploads, and the values of its configuration."""
+    row = _row(asyncio.run(_rows(session)), robot)
+    session.show(json_form(row), robot_view(row))
 
 
 @fleet_app.command("recordings")

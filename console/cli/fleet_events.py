@@ -17,6 +17,8 @@ from console.client.results import FaultSeverity
 from console.fleet.values import EventsDropped, FleetItem, RobotEvent, Unreadable
 from console.presentation.json_form import json_form
 
+NEW: Final = "new"
+"""As --since: only what the hub takes from now on."""
 _AGO: Final = re.compile(r"(\d{1,6})([smhd])")
 _UNITS: Final = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days"}
 _ORDER: Final = (FaultSeverity.INFO, FaultSeverity.WARNING, FaultSeverity.ERROR)
@@ -33,7 +35,9 @@ def events(
     since: Annotated[
         str,
         typer.Option(
-            "--since", metavar="TIME", help="30m, 6h or 2d ago, or a time in UTC: 2026-11-22T09:30."
+            "--since",
+            metavar="TIME",
+            help="30m, 6h or 2d ago, a time in UTC: 2026-11-22T09:30, or with --follow: new.",
         ),
     ] = "1d",
     severity: SeverityOption = "info",
@@ -43,7 +47,13 @@ def events(
 
     With --follow also new ones, each once, across lost connections.
     """
-    ago_or_time = parse_since(since)
+    if since.strip() == NEW and not follow:
+        raise UserError(
+            "--since new shows no event of the past, and without --follow there are no others",
+            "Type: robotctl fleet events --follow --since new",
+            exit_code=ExitCode.USAGE,
+        )
+    ago_or_time = None if since.strip() == NEW else parse_since(since)
     asyncio.run(_events(session, robot, ago_or_time, follow=follow, severity=severity, clients=clients))
 
 
@@ -61,7 +71,7 @@ def parse_since(text: str) -> timedelta | datetime:
     except (ValueError, OverflowError):
         raise UserError(
             f"--since {text} is no time",
-            "Write 30m, 6h or 2d, or a time in UTC: 2026-11-22 or 2026-11-22T09:30",
+            "Write 30m, 6h or 2d, a time in UTC (2026-11-22 or 2026-11-22T09:30), or with --follow: new",
             exit_code=ExitCode.USAGE,
         ) from None
 
@@ -82,7 +92,7 @@ def is_shown(item: FleetItem, least: FaultSeverity, *, clients: bool) -> bool:
 async def _events(
     session: FleetSession,
     robot: str,
-    since: timedelta | datetime,
+    since: timedelta | datetime | None,
     *,
     follow: bool,
     severity: str,
@@ -98,8 +108,8 @@ async def _events(
     try:
         with handled(signals):
             async with session.connect() as hub:
-                clock = await read_clock(hub)
-                query = EventQuery(robot, _unix_ms(since, clock.unix_ms()), follow)
+                since_unix_ms = None if since is None else _unix_ms(since, (await read_clock(hub)).unix_ms())
+                query = EventQuery(robot, since_unix_ms, follow)
                 async for item in read_events(hub, query):
                     if is_shown(item, least, clients=clients or session.as_json):
                         _show(session, item)

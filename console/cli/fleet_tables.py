@@ -5,8 +5,10 @@ from rich.table import Table
 from rich.text import Text
 
 from console.cli.tables import STYLES, grid
+from console.cli.tables import rows_table as detail_table
 from console.client.results import FaultSeverity
 from console.fleet.columns import Cell, columns_for, shortened, summary_line
+from console.fleet.details import detail_rows
 from console.fleet.model import summary
 from console.fleet.values import (
     CommandAnswer,
@@ -20,7 +22,7 @@ from console.fleet.values import (
     StoredRecording,
     Unreadable,
 )
-from console.presentation.formatting import plural, size, wall_clock
+from console.presentation.formatting import age, plural, size, wall_clock
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 
 _LONGEST_MESSAGE = 500
@@ -71,6 +73,13 @@ def fleet_view(rows: tuple[FleetRow, ...], width: int) -> RenderableType:
         if rows
         else Text("No robot is enrolled yet.", style="dim")
     )
+
+
+def robot_view(row: FleetRow) -> RenderableType:
+    """Returns one robot whole, under its name."""
+    seen = "" if row.last_seen_ms is None else f"  seen {age(row.last_seen_ms)} ago"
+    head = Text.assemble((shortened(row.robot), "bold"), (seen, "dim"))
+    return Group(head, Text(), detail_table(detail_rows(row)))
 
 
 def item_line(item: FleetItem) -> Text:

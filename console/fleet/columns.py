@@ -1,15 +1,22 @@
 """The columns of the fleet's table, in the order of an operator's interest. Pure text with styles."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from console.client.results import FaultSeverity, RecordingCopyState
+from console.client.results import FaultSeverity, Freshness, RecordingCopyState, Sample
 from console.fleet.model import FleetSummary, worst_fault
 from console.fleet.values import FleetRow, RobotState
 from console.presentation.formatting import UNKNOWN, age, joined, plural, quantity, size
 from console.presentation.severity_style import FAULT_STYLES, HEALTH_STYLES, SeverityStyle
-from console.presentation.value_style import CHARGE_PERCENT, DISK_PERCENT, Judgement
+from console.presentation.status_table import number_text
+from console.presentation.value_style import (
+    CHARGE_PERCENT,
+    DISK_PERCENT,
+    Judgement,
+    of_number,
+    of_text,
+)
 from fleet.standing import Standing
 
 STANDING_STYLES: Final[Mapping[Standing, SeverityStyle]] = {
@@ -43,14 +50,14 @@ class Column:
         width: Characters that it takes at the most, as a rule.
         cell: Its cell of a row.
         right: Whether it is aligned right, as numbers are.
-        wide: Whether only a wide terminal shows it.
+        rank: 0 is shown at any width; of the others a narrow terminal leaves out the highest first.
     """
 
     title: str
     width: int
     cell: Callable[[FleetRow], Cell]
     right: bool = False
-    wide: bool = False
+    rank: int = 0
 
 
 def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
@@ -60,8 +67,11 @@ def shortened(text: str, longest: int = LONGEST_TEXT) -> str:
 
 def columns_for(width: int) -> tuple[Column, ...]:
     """Returns the columns for a terminal of so many characters: all, or those that matter most."""
-    total = sum(column.width + _GAP for column in COLUMNS)
-    return COLUMNS if total <= width else tuple(column for column in COLUMNS if not column.wide)
+    for rank in sorted({column.rank for column in COLUMNS}, reverse=True):
+        shown = tuple(column for column in COLUMNS if column.rank <= rank)
+        if not rank or sum(column.width + _GAP for column in shown) <= width:
+            break
+    return shown
 
 
 def summary_line(found: FleetSummary) -> str:
@@ -98,13 +108,15 @@ def _health(row: FleetRow) -> Cell:
     return Cell(f"{text}{others}", _last_known(row, FAULT_STYLES[worst.severity]))
 
 
-def _battery(state: RobotState) -> Cell:
+def battery_cell(state: RobotState) -> Cell:
+    """Returns the state of charge, with a plus while it is being charged."""
     found = CHARGE_PERCENT.judge(state.battery_percent)
     charging = " +" if state.charging else ""
     return _judged(found, f"{quantity(state.battery_percent, '%', 0)}{charging}")
 
 
-def _disk(state: RobotState) -> Cell:
+def disk_cell(state: RobotState) -> Cell:
+    """Returns the used part of the disk."""
     return _judged(DISK_PERCENT.judge(state.disk_used_percent), quantity(state.disk_used_percent, "%", 0))
 
 
@@ -125,6 +137,38 @@ def _outbox(state: RobotState) -> Cell:
     dropped = f", {state.events_dropped} dropped" if state.events_dropped else ""
     style = SeverityStyle.WARNING if dropped else SeverityStyle.QUIET
     return Cell(f"{state.outbox_events or UNKNOWN}{dropped}", style)
+
+
+def _values(state: RobotState) -> Cell:
+    """The values that the robot's configuration names, the worst first: a cell has room for a few."""
+    texts = [*_numbers(state), *_texts(state)]
+    if not texts:
+        return Cell(UNKNOWN, SeverityStyle.QUIET)
+    texts.sort(key=lambda one: _ORDER.index(one[1]), reverse=True)
+    more = f" (+{state.values_left_out})" if state.values_left_out else ""
+    shown = shortened(joined(*(text for text, _ in texts)), LONGEST_TEXT - len(more))
+    worst = texts[0][1]
+    return Cell(f"{shown}{more}", None if worst is SeverityStyle.GOOD else worst)
+
+
+def _numbers(state: RobotState) -> Iterator[tuple[str, SeverityStyle]]:
+    for each in state.numbers:
+        yield _value(each, each.title or each.label, number_text(each), of_number(each))
+
+
+def _texts(state: RobotState) -> Iterator[tuple[str, SeverityStyle]]:
+    for each in state.texts:
+        yield _value(each, each.title or each.label, each.text or UNKNOWN, of_text(each))
+
+
+def _value(sample: Sample, title: str, text: str, found: Judgement) -> tuple[str, SeverityStyle]:
+    match sample.freshness:
+        case Freshness.MISSING:
+            return f"{title} no data", SeverityStyle.QUIET
+        case Freshness.STALE:
+            return f"{title} {text} STALE", SeverityStyle.WARNING
+        case Freshness.FRESH:
+            return f"{title} {text} {found.word}".rstrip(), found.style
 
 
 def _judged(found: Judgement, text: str) -> Cell:
@@ -148,15 +192,17 @@ def _last_known(row: FleetRow, style: SeverityStyle | None) -> SeverityStyle | N
 
 
 _GAP: Final = 2
+_ORDER: Final = (SeverityStyle.QUIET, SeverityStyle.GOOD, SeverityStyle.WARNING, SeverityStyle.BAD)
 COLUMNS: Final = (
     Column("robot", 16, lambda row: Cell(shortened(row.robot))),
     Column("", 12, _standing),
     Column("since", 11, lambda row: Cell(age(row.since_ms)), right=True),
     Column("health", 36, _health),
-    Column("battery", 8, _of_state(_battery), right=True),
-    Column("disk", 5, _of_state(_disk), right=True, wide=True),
-    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), wide=True),
-    Column("uploads", 20, _of_state(_uploads), wide=True),
-    Column("outbox", 8, _of_state(_outbox), right=True, wide=True),
+    Column("battery", 8, _of_state(battery_cell), right=True),
+    Column("disk", 5, _of_state(disk_cell), right=True, rank=1),
+    Column("mode", 10, _of_state(lambda it: Cell(shortened(it.mode, 20) or UNKNOWN)), rank=1),
+    Column("values", 40, _of_state(_values), rank=2),
+    Column("uploads", 20, _of_state(_uploads), rank=1),
+    Column("outbox", 8, _of_state(_outbox), right=True, rank=1),
     Column("seen", 11, lambda row: Cell(age(row.last_seen_ms), SeverityStyle.QUIET), right=True),
 )

@@ -74,12 +74,12 @@ class EventQuery:
 
     Args:
         robot: One robot's; empty for all.
-        since_unix_ms: Those that the hub took from then on, by its clock.
+        since_unix_ms: Those that the hub took from then on, by its clock; None: new ones.
         follow: Whether new ones follow, for ever.
     """
 
     robot: str
-    since_unix_ms: int
+    since_unix_ms: int | None
     follow: bool
 
 
@@ -93,10 +93,15 @@ async def read_events(hub: Hub, query: EventQuery) -> AsyncIterator[FleetItem]:
     newest = await hub.last(names.EVENTS, subjects)
     if newest is None and not query.follow:
         return
-    since = datetime.fromtimestamp(max(0, query.since_unix_ms) / _MS_PER_S, UTC)
-    if newest and not query.follow and newest.unix_s * _MS_PER_S < query.since_unix_ms:
-        return
-    async for delivery in hub.follow(names.EVENTS, subjects, Start.at(since.isoformat())):
+    if query.since_unix_ms is None:
+        # By the number of the newest message, not by a clock: none is left out or shown twice at the border.
+        start = Start.after(newest.sequence if newest else 0)
+    else:
+        since = datetime.fromtimestamp(max(0, query.since_unix_ms) / _MS_PER_S, UTC)
+        start = Start.at(since.isoformat())
+        if newest and not query.follow and newest.unix_s * _MS_PER_S < query.since_unix_ms:
+            return
+    async for delivery in hub.follow(names.EVENTS, subjects, start):
         for item in _items(delivery):
             yield item
         if newest and not query.follow and delivery.sequence >= newest.sequence:

@@ -9,11 +9,15 @@ from console.client.results import (
     Event,
     FaultSeverity,
     HealthState,
+    NumberValue,
+    Orientation,
+    Position,
     PreviewState,
     RecorderState,
     Recording,
     RecordingCopy,
     RecordingFile,
+    TextValue,
 )
 from fleet.standing import Standing
 
@@ -116,6 +120,14 @@ class RobotState:
     events_dropped: int
     gateway_target: str
     """Where an operator near the robot reaches its gateway; empty if not configured."""
+    numbers: tuple[NumberValue, ...]
+    """Of its configuration, in that order, at most 16. Ages are as of the state, limits are unknown."""
+    texts: tuple[TextValue, ...]
+    """The same."""
+    values_left_out: int
+    """Numbers and texts that the robot has besides."""
+    position: Position
+    orientation: Orientation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,7 +4,7 @@ A terminal shows the whole of it with full texts; the monitor's side panel shows
 health, faults and preview have places of their own in the window.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
@@ -239,23 +239,47 @@ def _objects(view: View) -> Iterator[Row]:
         yield view.measured("objects", view.detections, plural(view.detections.count, "object"))
 
 
+def number_rows(numbers: Iterable[results.NumberValue], look: Look) -> Iterator[Row]:
+    """Yields a row for each number, judged by the robot's own limits."""
+    for each in numbers:
+        row = look.measured("", each, number_text(each), of_number(each))
+        yield replace(row, label=_title(each.title, look))
+
+
+def text_rows(texts: Iterable[results.TextValue], look: Look) -> Iterator[Row]:
+    """Yields a row for each text, judged by the robot's own levels."""
+    for each in texts:
+        row = look.measured("", each, UNKNOWN if each.text is None else each.text, of_text(each))
+        # The robot's own words: unlike a number and its unit they may be broken anywhere.
+        yield replace(row, label=_title(each.title, look), text=row.text.replace("\u00a0", " "))
+
+
+def pose_rows(position: results.Position, orientation: results.Orientation, look: Look) -> Iterator[Row]:
+    """Yields where the robot is and how it stands, as far as it reports that."""
+    if position.available:
+        text = _position(position, look.compact)
+        yield look.measured("position", position, text, of_position(position))
+    if orientation.available:
+        text = _attitude(orientation, look.compact)
+        yield look.measured("attitude", orientation, text, of_orientation(orientation))
+
+
+def _poses(view: View) -> Iterator[Row]:
+    return pose_rows(view.status.position, view.status.orientation, view)
+
+
 def _numbers(view: View) -> Iterator[Row]:
-    for each in view.status.numbers:
-        row = view.measured("", each, number_text(each), of_number(each))
-        yield replace(row, label=_title(each.title, view))
+    return number_rows(view.status.numbers, view)
 
 
 def _texts(view: View) -> Iterator[Row]:
-    for each in view.status.texts:
-        row = view.measured("", each, UNKNOWN if each.text is None else each.text, of_text(each))
-        # The robot's own words: unlike a number and its unit they may be broken anywhere.
-        yield replace(row, label=_title(each.title, view), text=row.text.replace("\u00a0", " "))
+    return text_rows(view.status.texts, view)
 
 
-def _title(title: str, view: View) -> str:
+def _title(title: str, look: Look) -> str:
     """Not as `Look.label` writes it: a title may have capitals of its own, CO2 for example."""
     short = title[:_LONGEST_TITLE]
-    return sentence(short) if view.compact else short
+    return sentence(short) if look.compact else short
 
 
 def _access(view: View) -> Iterator[Row]:
@@ -512,8 +536,7 @@ TABLE: Final[tuple[Rows, ...]] = (
         optional=True,
     ),
     _measured("network", lambda status: status.platform.network, _network, of_network, optional=True),
-    _measured("position", lambda status: status.position, _position, of_position, optional=True),
-    _measured("attitude", lambda status: status.orientation, _attitude, of_orientation, optional=True),
+    _poses,
     _numbers,
     _texts,
     _compact(_measured("video", lambda status: status.preview.measured, _video, of_video, optional=True)),

@@ -1,5 +1,7 @@
 """The metrics by name. docs/fleet.md explains each; a test holds the page and this module together."""
 
+import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,12 +17,22 @@ from fleet.names import ROBOT_NAME
 from fleet.reading import NotReadableError, robot_state
 from fleet.standing import Evidence, Standing, standing
 from omniseer.fleet.v1.state_pb2 import RobotState
-from omniseer.gateway.v1 import fault_pb2
+from omniseer.gateway.v1 import fault_pb2, value_pb2
 
 _PREFIX: Final = "robot_fleet"
 _MS_PER_S: Final = 1000
 MOST_ROBOTS: Final = 10_000
 """Further ones get no metrics: Prometheus keeps a time series for each name that it has ever seen."""
+MOST_SERIES: Final = 64
+"""Values of one robot that get time series until the exporter is started again: a thief of its key could name
+others in each state."""
+_LABEL: Final = re.compile(r"[a-z][a-z0-9_]{0,39}")
+_LONGEST_LABEL: Final = 64
+_TEXT_LEVELS: Final[Mapping["value_pb2.TextLevel.ValueType", int]] = {
+    value_pb2.TEXT_LEVEL_GOOD: 0,
+    value_pb2.TEXT_LEVEL_WARNING: 1,
+    value_pb2.TEXT_LEVEL_ERROR: 2,
+}
 _SEVERITIES: Final[Mapping["fault_pb2.FaultSeverity.ValueType", str]] = {
     fault_pb2.FAULT_SEVERITY_INFO: "info",
     fault_pb2.FAULT_SEVERITY_WARNING: "warning",
@@ -71,11 +83,13 @@ class FleetCollector(InstantCollector):
     connected: Callable[[], bool]
     _enrolled: dict[str, bool] = field(default_factory=dict)
     _states: dict[str, SeenState] = field(default_factory=dict)
+    _series: dict[str, set[tuple[str, ...]]] = field(default_factory=dict)
 
     def take_robot(self, name: str, entry: bytes, *, deleted: bool) -> None:
         """Takes an entry of the hub's list."""
         if deleted:
             self._enrolled.pop(name, None)
+            self._series.pop(name, None)
         elif ROBOT_NAME.fullmatch(name) and (name in self._enrolled or len(self._enrolled) < MOST_ROBOTS):
             self._enrolled[name] = is_revoked(entry)
 
@@ -96,7 +110,62 @@ class FleetCollector(InstantCollector):
         yield _gauge("up", "1 while bridge and gateway are up.", up)
         ages = {robot.name: robot.age_s for robot in current if robot.age_s is not None}
         yield _gauge("last_seen_seconds", "Age of the newest state, by the hub's clock.", ages)
-        yield from _of_states({robot.name: robot.state for robot in current if robot.state})
+        states = {robot.name: robot.state for robot in current if robot.state}
+        yield from _of_states(states)
+        yield self._numbers(states)
+        yield self._texts(states)
+
+    def _numbers(self, states: Mapping[str, RobotState]) -> Metric:
+        found: dict[tuple[str, ...], float] = {}
+        for name, state in states.items():
+            for each in state.numbers:
+                known = each.available and not each.stale and each.HasField("value")
+                if known and math.isfinite(each.value):
+                    self._take_value(found, name, each.label, (f"number.{each.label}", each.unit), each.value)
+        family = Gauge(
+            f"{_PREFIX}_number",
+            "Numbers that the robot's configuration names; absent while stale or unknown.",
+            labels=("robot", "source", "unit"),
+        )
+        for labels, value in found.items():
+            family.add_metric(labels, value)
+        return family
+
+    def _texts(self, states: Mapping[str, RobotState]) -> Metric:
+        found: dict[tuple[str, ...], float] = {}
+        for name, state in states.items():
+            for each in state.texts:
+                level = _TEXT_LEVELS.get(each.level)
+                if each.available and not each.stale and level is not None:
+                    self._take_value(found, name, each.label, (f"text.{each.label}",), level)
+        family = Gauge(
+            f"{_PREFIX}_text_level",
+            "Texts of the robot's configuration: 0 good, 1 warning, 2 error; absent while stale or unknown.",
+            labels=("robot", "source"),
+        )
+        for labels, value in found.items():
+            family.add_metric(labels, value)
+        return family
+
+    def _take_value(
+        self,
+        found: dict[tuple[str, ...], float],
+        robot: str,
+        label: str,
+        labels: tuple[str, ...],
+        value: float,
+    ) -> None:
+        """Takes a value that may be a time series: its label is one, and it is among the robot's first ones.
+
+        The first of equal names counts: with the same series twice Prometheus refuses the whole page.
+        """
+        if not _LABEL.fullmatch(label) or any(len(each) > _LONGEST_LABEL for each in labels):
+            return
+        known = self._series.setdefault(robot, set())
+        if labels not in known and len(known) < MOST_SERIES:
+            known.add(labels)
+        if labels in known:
+            found.setdefault((robot, *labels), value)
 
     def _sample(self, name: str) -> RobotSample:
         seen = self._states.get(name)

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 from common.errors import UserError
@@ -43,6 +44,8 @@ def check(ground: FleetGround, hub_s: float) -> None:
         say(f"{_RECORDING}: {answer['message']} ({recording_id})")
     with _step("upload", ground) as say:
         say(_uploaded(ground, recording_id))
+    with _step("get", ground) as say:
+        say(_copied(ground, recording_id))
     with _step("revoke", ground) as say:
         asyncio.run(administration.revoke(ground.hub.directory, "robot", _REVOKED))
         ground.programs.wait_until(lambda: _is_revoked(ground), "the robot is revoked", _REVOKED_WITHIN_S)
@@ -130,6 +133,19 @@ def _uploaded(ground: FleetGround, recording_id: str) -> str:
     return (
         f"{len(stored['files'])} files, {stored['recording']['size']} bytes, verified at {stored['location']}"
     )
+
+
+def _copied(ground: FleetGround, recording_id: str) -> str:
+    """Copies the recording from the store, without asking the robot, and compares it with the robot's."""
+    to = ground.directory / "laptop"
+    answer = ground.robotctl("get", _RECORDING, recording_id, "--to", str(to))
+    folder = Path(answer["folder"])
+    copied = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    own = ground.directory / _RECORDING / "recordings"
+    for name, content in copied.items():
+        if not any(path.read_bytes() == content for path in own.rglob(name.name) if path.is_file()):
+            raise UserError(f"{name} on this computer is not the robot's file")
+    return f"{answer['files']} files, {answer['size']} bytes, from the store; each is as the robot has it"
 
 
 def _is_revoked(ground: FleetGround) -> bool:

@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
-STEPS = ["hub", "robots", "event", "node killed", "snapshot", "upload", "revoke", "stop"]
+STEPS = ["hub", "robots", "event", "node killed", "snapshot", "upload", "get", "revoke", "stop"]
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(300)]
 

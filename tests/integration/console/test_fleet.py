@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import select
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
@@ -13,8 +14,10 @@ from unittest import mock
 import pytest
 from nacl.signing import SigningKey
 
-from console.fleet.hub import read_recordings
+from console.fleet.hub import EventQuery, read_events, read_recordings
+from console.fleet.values import FleetItem, RobotEvent
 from console.fleet.values import StoredRecording as Stored
+from fleet.connection import Hub
 from fleet.receipts import PURPOSE, key_id
 from omniseer.fleet.v1.command_pb2 import (
     COMMAND_OUTCOME_DONE,
@@ -27,6 +30,7 @@ from omniseer.fleet.v1.state_pb2 import RobotState
 from omniseer.fleet.v1.upload_pb2 import Receipt, SignedReceipt, StoredRecording
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
 from omniseer.gateway.v1.recording_pb2 import Recording
+from omniseer.gateway.v1.value_pb2 import NUMBER_LEVEL_ERROR_HIGH, TEXT_LEVEL_GOOD
 from tests.support.control_characters import CONTROL_CHARACTERS, change_texts
 from tests.support.filled import fill
 from tests.support.fleet_hub import FleetHub, fleet_hub
@@ -86,6 +90,36 @@ def test_the_whole_fleet_at_a_glance(hub: FleetHub) -> None:
     assert document["summary"]["with_errors"] == 1
 
 
+def test_the_values_of_a_robots_configuration(hub: FleetHub) -> None:
+    hub.enroll("lab1", "lab2")
+    state = healthy_state("lab1")
+    state.numbers.add(
+        label="motor", title="Motor", available=True, value=91.5, unit="°C", level=NUMBER_LEVEL_ERROR_HIGH
+    )
+    state.texts.add(label="arm", title="Arm", available=True, text="open", level=TEXT_LEVEL_GOOD)
+    state.position.available = True
+    state.position.latitude_deg, state.position.longitude_deg = 47.5, 8.25
+    hub.put_state(state)
+    lines = shown(hub, "show", "lab1")
+    assert lines[0].startswith("lab1  seen ")
+    assert ["Motor", "TOO", "HIGH", "91.5", "°C"] in [line.split()[:5] for line in lines]
+    assert ["Arm", "fresh", "open"] in [line.split()[:3] for line in lines]
+    assert any("47.500000°, 8.250000°" in line for line in lines)
+    document = answer(hub, "show", "lab1")
+    assert document["standing"] == "up"
+    (number,) = document["state"]["numbers"]
+    assert (number["label"], number["value"], number["level"]) == ("motor", 91.5, "error_high")
+    assert document == answer(hub, "list")["robots"][0] | {
+        key: document[key] for key in ("last_seen_ms", "since_ms")
+    }
+    (first,) = (line for line in shown(hub, "watch", "--count", "1") if "lab1" in line)
+    assert "Motor 91.5 °C TOO HIGH, Arm open" in first
+    assert shown(hub, "show", "lab2")[-1].split()[:3] == ["standing", "NEVER", "SEEN"]
+    unknown = robotctl("fleet", "show", "lab3", "--hub", hub.urls)
+    assert unknown.returncode == 2
+    assert "no robot of the fleet is called 'lab3'" in unknown.stderr
+
+
 def test_a_fleet_without_robots(hub: FleetHub) -> None:
     assert shown(hub, "list") == ["No robot is enrolled yet."]
     assert shown(hub, "recordings") == ["No recording was uploaded yet."]
@@ -139,6 +173,54 @@ def test_events_are_followed_until_ctrl_c(hub: FleetHub) -> None:
         finally:
             process.kill()
     assert [each["event"]["event"]["position"]["sequence"] for each in (first, second)] == [1, 2]
+
+
+def test_only_new_events_are_followed_each_once_and_in_order(hub: FleetHub) -> None:
+    hub.put_events(batch("lab1", event(1)), batch("lab2", event(1)))
+    words = ["fleet", "events", "--follow", "--since", "new", "--json", "--hub", hub.urls]
+    with subprocess.Popen(
+        [ROBOTCTL, *words], stdout=subprocess.PIPE, text=True, env=environment()
+    ) as process:
+        try:
+            assert process.stdout
+            # When it begins to listen only its first line shows.
+            last = 1
+            while last < 1000 and not select.select([process.stdout], [], [], 0.1)[0]:
+                last += 1
+                hub.put_events(batch("lab1", event(last)))
+            hub.put_events(batch("lab1", event(last + 1)))
+            seen: list[int] = []
+            while not seen or seen[-1] <= last:
+                item = json.loads(process.stdout.readline())["event"]
+                assert item["robot"] == "lab1"
+                seen.append(item["event"]["position"]["sequence"])
+            process.terminate()
+            assert process.wait(ENDS_WITHIN_S) == 0
+        finally:
+            process.kill()
+    assert seen[0] > 1
+    assert seen == list(range(seen[0], last + 2))
+
+
+def test_new_events_of_a_robot_without_any(hub: FleetHub) -> None:
+    hub.put_events(batch("lab1", event(1)))
+
+    async def first(connection: Hub) -> FleetItem:
+        items = read_events(connection, EventQuery("lab2", None, follow=True))
+        coming = asyncio.ensure_future(anext(items))
+        # Whenever it begins: of this robot the hub had nothing.
+        await asyncio.to_thread(hub.put_events, batch("lab1", event(2)), batch("lab2", event(1)))
+        return await asyncio.wait_for(coming, ENDS_WITHIN_S)
+
+    found = hub.run(first)
+    assert isinstance(found, RobotEvent)
+    assert found.robot == "lab2"
+
+
+def test_new_alone_is_a_mistake() -> None:
+    done = robotctl("fleet", "events", "--since", "new", "--hub", "nats://127.0.0.1:1")
+    assert done.returncode == 2
+    assert "fleet events --follow --since new" in done.stderr
 
 
 def stored(robot: str, recording_id: str, key: SigningKey, **wrong: Any) -> StoredRecording:
@@ -378,7 +460,9 @@ def hostile_hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FleetHub]:
 
 @pytest.mark.parametrize("form", [(), ("--json",)], ids=["table", "json"])
 @pytest.mark.parametrize(
-    "words", [("list",), ("watch", "--count", "1"), ("events",), ("recordings",)], ids=" ".join
+    "words",
+    [("list",), ("watch", "--count", "1"), ("show", "control"), ("events",), ("recordings",)],
+    ids=" ".join,
 )
 def test_nothing_reaches_the_terminal_but_text(
     hostile_hub: FleetHub, words: tuple[str, ...], form: tuple[str, ...]

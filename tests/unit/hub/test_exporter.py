@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from hub.exporter.collector import MOST_ROBOTS, FleetCollector
+from hub.exporter.collector import MOST_ROBOTS, MOST_SERIES, FleetCollector
 from omniseer.gateway.v1.fault_pb2 import FAULT_SEVERITY_ERROR, FAULT_SEVERITY_WARNING
+from omniseer.gateway.v1.value_pb2 import TEXT_LEVEL_ERROR
 from tests.support.fleet_values import healthy_state, wrong_bytes
 
 ROOT = Path(__file__).parents[3]
@@ -32,6 +33,8 @@ def report(collector: FleetCollector, name: str, *, age_ms: int = 1000) -> None:
     state.outbox_events, state.events_dropped, state.upload_count = 3, 4, 5
     state.uploads.add(bytes_per_s=1000)
     state.uploads.add(bytes_per_s=500)
+    state.numbers.add(label="motor", unit="°C", available=True, value=61.5)
+    state.texts.add(label="arm", available=True, text="jammed", level=TEXT_LEVEL_ERROR)
     collector.take_state(name, state.SerializeToString(), NOW - age_ms, deleted=False)
 
 
@@ -58,6 +61,8 @@ def test_what_a_robot_reports(collector: FleetCollector) -> None:
     assert (found["battery_percent", "a"], found["disk_used_percent", "a"]) == (78, 40)
     assert (found["outbox_events", "a"], found["events_dropped_total", "a"]) == (3, 4)
     assert (found["uploads", "a"], found["upload_bytes_per_second", "a"]) == (5, 1500)
+    assert found["number", "a", "number.motor", "°C"] == 61.5
+    assert found["text_level", "a", "text.arm"] == 2
     assert found["hub_connected",] == 1
 
 
@@ -102,6 +107,39 @@ def test_a_robot_that_is_taken_from_the_list_has_no_metrics(collector: FleetColl
 def test_the_number_of_robots_is_bounded(collector: FleetCollector) -> None:
     enroll(collector, *(f"r{number}" for number in range(MOST_ROBOTS + 5)))
     assert sum(labels[0] == "up" for labels in samples(collector)) == MOST_ROBOTS
+
+
+def test_values_that_are_not_known_have_no_metric(collector: FleetCollector) -> None:
+    enroll(collector, "a")
+    state = healthy_state("a")
+    state.numbers.add(label="never")
+    state.numbers.add(label="none", available=True)
+    state.numbers.add(label="old", available=True, stale=True, value=1)
+    state.numbers.add(label="nan", available=True, value=float("nan"))
+    state.texts.add(label="newer", available=True, text="x", level=77)
+    collector.take_state("a", state.SerializeToString(), NOW, deleted=False)
+    assert not {labels for labels in samples(collector) if labels[0] in ("number", "text_level")}
+
+
+def test_no_robot_fills_prometheus_or_breaks_the_page(collector: FleetCollector) -> None:
+    enroll(collector, "a", "b")
+    report(collector, "b")
+    for start in range(0, 4 * MOST_SERIES, 16):
+        state = healthy_state("a")
+        for index in range(start, start + 16):
+            for value in (1, 2):
+                state.numbers.add(label=f"n{index}", available=True, value=value)
+        state.numbers.add(label='x"} 1\nrobot_fleet_up{robot="b', available=True, value=1)
+        state.numbers.add(label="ok", unit="x" * 500, available=True, value=1)
+        collector.take_state("a", state.SerializeToString(), NOW, deleted=False)
+        found = [labels for labels in samples(collector) if labels[:2] == ("number", "a")]
+        # Names that came later than the first ones are never taken.
+        assert all(int(labels[2].removeprefix("number.n")) < MOST_SERIES for labels in found)
+        # The same series twice would make Prometheus refuse the page, with all other robots' metrics.
+        page = collector.text().decode().splitlines()
+        names = [line.rsplit(" ", 1)[0] for line in page if not line.startswith("#")]
+        assert len(names) == len(set(names))
+    assert samples(collector)["number", "b", "number.motor", "°C"] == 61.5
 
 
 def shown(collector: FleetCollector) -> set[str]:

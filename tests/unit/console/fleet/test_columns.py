@@ -10,7 +10,7 @@ from console.fleet.wire import state_of
 from console.presentation.severity_style import SeverityStyle
 from fleet.standing import Standing
 from omniseer.fleet.v1.state_pb2 import RobotState
-from omniseer.gateway.v1 import fault_pb2, recording_pb2
+from omniseer.gateway.v1 import fault_pb2, recording_pb2, value_pb2
 from tests.support.filled import fill
 from tests.support.fleet_values import healthy_state
 
@@ -39,6 +39,7 @@ def test_a_healthy_robot() -> None:
         "battery": "78 %",
         "disk": "40 %",
         "mode": "idle",
+        "values": "-",
         "uploads": "-",
         "outbox": "-",
         "seen": "0 ms",
@@ -91,6 +92,24 @@ def test_an_upload(
     assert COLUMN["uploads"].cell(row_of(message)) == Cell(text, style)
 
 
+def test_the_worst_values_come_first() -> None:
+    message = healthy_state("a")
+    message.numbers.add(label="cell", title="Cell", available=True, value=3.9, unit="V", decimals=2)
+    message.numbers.add(label="wheel", title="Wheel", available=True, stale=True, value=2)
+    message.numbers.add(label="never", title="Never")
+    message.texts.add(
+        label="arm", title="Arm", available=True, text="jammed", level=value_pb2.TEXT_LEVEL_ERROR
+    )
+    message.values_left_out = 3
+    assert COLUMN["values"].cell(row_of(message)) == Cell(
+        "Arm jammed ERROR, Wheel 2 STALE, Cell 3.90 V, Never ... (+3)", SeverityStyle.BAD
+    )
+    del message.numbers[1:], message.texts[:]
+    message.values_left_out = 0
+    assert COLUMN["values"].cell(row_of(message)) == Cell("Cell 3.90 V")
+    assert COLUMN["values"].cell(row_of(message, age_ms=60_000)).style is SeverityStyle.QUIET
+
+
 def test_events_that_wait_or_were_dropped() -> None:
     message = healthy_state("a")
     message.outbox_events, message.events_dropped = 12, 3
@@ -111,6 +130,8 @@ def test_no_cell_of_a_giant_state_is_long() -> None:
     message.summary = message.mode = message.faults[0].message = "x" * 5000
     message.fault_count = message.upload_count = 2**32 - 1
     message.gateway_uptime_s = message.outbox_events = message.events_dropped = 2**64 - 1
+    message.numbers[0].title = message.texts[0].text = "x" * 5000
+    message.values_left_out = 2**32 - 1
     message.uploads[0].size = message.uploads[0].bytes_per_s = 2**64 - 1
     row = row_of(message)
     assert row.state
@@ -119,7 +140,8 @@ def test_no_cell_of_a_giant_state_is_long() -> None:
 
 
 def test_a_narrow_terminal_gets_the_columns_that_matter_most() -> None:
-    assert columns_for(200) == COLUMNS
+    assert columns_for(220) == COLUMNS
+    assert [column.title for column in COLUMNS if column not in columns_for(170)] == ["values"]
     titles = [column.title for column in columns_for(100)]
     assert titles == ["robot", "", "since", "health", "battery", "seen"]
 

@@ -9,9 +9,11 @@ from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
 from omniseer.fleet.v1 import upload_pb2 as _upload_pb2
 from omniseer.gateway.v1 import fault_pb2 as _fault_pb2
+from omniseer.gateway.v1 import pose_pb2 as _pose_pb2
 from omniseer.gateway.v1 import recording_pb2 as _recording_pb2
 from omniseer.gateway.v1 import states_pb2 as _states_pb2
 from omniseer.gateway.v1 import teleop_pb2 as _teleop_pb2
+from omniseer.gateway.v1 import value_pb2 as _value_pb2
 import builtins as _builtins
 import sys
 import typing as _typing
@@ -60,6 +62,11 @@ class RobotState(_message.Message):
     OUTBOX_EVENTS_FIELD_NUMBER: _builtins.int
     EVENTS_DROPPED_FIELD_NUMBER: _builtins.int
     GATEWAY_TARGET_FIELD_NUMBER: _builtins.int
+    NUMBERS_FIELD_NUMBER: _builtins.int
+    TEXTS_FIELD_NUMBER: _builtins.int
+    VALUES_LEFT_OUT_FIELD_NUMBER: _builtins.int
+    POSITION_FIELD_NUMBER: _builtins.int
+    ORIENTATION_FIELD_NUMBER: _builtins.int
     robot: _builtins.str
     """The robot, by the name under which it is enrolled. A value whose robot is not its key is invalid."""
     bridge_run_id: _builtins.str
@@ -112,6 +119,8 @@ class RobotState(_message.Message):
     """Events dropped since the outbox was made."""
     gateway_target: _builtins.str
     """Where an operator near the robot reaches its gateway, as "host:port". Empty when not configured."""
+    values_left_out: _builtins.int
+    """Numbers and texts that are not listed, because there are more."""
     @_builtins.property
     def faults(self) -> _containers.RepeatedCompositeFieldContainer[Global___FaultBrief]:
         """Active faults, the worst and then the oldest first, at most 8."""
@@ -119,6 +128,28 @@ class RobotState(_message.Message):
     @_builtins.property
     def uploads(self) -> _containers.RepeatedCompositeFieldContainer[_upload_pb2.UploadBrief]:
         """The uploads that run or wait, in their order, at most 4."""
+
+    @_builtins.property
+    def numbers(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.NumberStatus]:
+        """As SystemStatus.numbers, in the same order, without limits; at most 16, of more the worst ones. Ages are as of this
+        state. A new number alone is no change: it comes with the next state. A new level is a change.
+        """
+
+    @_builtins.property
+    def texts(self) -> _containers.RepeatedCompositeFieldContainer[_value_pb2.TextStatus]:
+        """As SystemStatus.texts, in the same order; at most 16, of more the worst ones. Ages are as of this state."""
+
+    @_builtins.property
+    def position(self) -> _pose_pb2.PositionStatus:
+        """As SystemStatus.position, with coordinates rounded to 1e-6 degrees. A new position alone is no change. Unset where
+        the robot does not report it.
+        """
+
+    @_builtins.property
+    def orientation(self) -> _pose_pb2.OrientationStatus:
+        """As SystemStatus.orientation, with angles rounded to 0.1 degrees. New angles alone are no change. Unset where the
+        robot does not report it.
+        """
 
     def __init__(
         self,
@@ -151,10 +182,15 @@ class RobotState(_message.Message):
         outbox_events: _builtins.int = ...,
         events_dropped: _builtins.int = ...,
         gateway_target: _builtins.str = ...,
+        numbers: _abc.Iterable[_value_pb2.NumberStatus] | None = ...,
+        texts: _abc.Iterable[_value_pb2.TextStatus] | None = ...,
+        values_left_out: _builtins.int = ...,
+        position: _pose_pb2.PositionStatus | None = ...,
+        orientation: _pose_pb2.OrientationStatus | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_battery_percent", b"_battery_percent", "_charging", b"_charging", "_disk_used_percent", b"_disk_used_percent", "battery_percent", b"battery_percent", "charging", b"charging", "disk_used_percent", b"disk_used_percent"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_battery_percent", b"_battery_percent", "_charging", b"_charging", "_disk_used_percent", b"_disk_used_percent", "battery_percent", b"battery_percent", "charging", b"charging", "disk_used_percent", b"disk_used_percent", "orientation", b"orientation", "position", b"position"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_battery_percent", b"_battery_percent", "_charging", b"_charging", "_disk_used_percent", b"_disk_used_percent", "battery_percent", b"battery_percent", "bridge_run_id", b"bridge_run_id", "bridge_version", b"bridge_version", "charging", b"charging", "disk_used_percent", b"disk_used_percent", "drive", b"drive", "events_dropped", b"events_dropped", "fault_count", b"fault_count", "faults", b"faults", "gateway_name", b"gateway_name", "gateway_reachable", b"gateway_reachable", "gateway_run_id", b"gateway_run_id", "gateway_target", b"gateway_target", "gateway_uptime_s", b"gateway_uptime_s", "gateway_version", b"gateway_version", "health", b"health", "mode", b"mode", "outbox_events", b"outbox_events", "preview", b"preview", "ready", b"ready", "recorder", b"recorder", "recordings_to_copy", b"recordings_to_copy", "robot", b"robot", "sequence", b"sequence", "summary", b"summary", "upload_count", b"upload_count", "uploads", b"uploads", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_battery_percent", b"_battery_percent", "_charging", b"_charging", "_disk_used_percent", b"_disk_used_percent", "battery_percent", b"battery_percent", "bridge_run_id", b"bridge_run_id", "bridge_version", b"bridge_version", "charging", b"charging", "disk_used_percent", b"disk_used_percent", "drive", b"drive", "events_dropped", b"events_dropped", "fault_count", b"fault_count", "faults", b"faults", "gateway_name", b"gateway_name", "gateway_reachable", b"gateway_reachable", "gateway_run_id", b"gateway_run_id", "gateway_target", b"gateway_target", "gateway_uptime_s", b"gateway_uptime_s", "gateway_version", b"gateway_version", "health", b"health", "mode", b"mode", "numbers", b"numbers", "orientation", b"orientation", "outbox_events", b"outbox_events", "position", b"position", "preview", b"preview", "ready", b"ready", "recorder", b"recorder", "recordings_to_copy", b"recordings_to_copy", "robot", b"robot", "sequence", b"sequence", "summary", b"summary", "texts", b"texts", "upload_count", b"upload_count", "uploads", b"uploads", "values_left_out", b"values_left_out", "wall_clock_unix_ms", b"wall_clock_unix_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__battery_percent: _TypeAlias = _typing.Literal["battery_percent"]  # noqa: Y015
     _WhichOneofArgType__battery_percent: _TypeAlias = _typing.Literal["_battery_percent", b"_battery_percent"]  # noqa: Y015
