@@ -29,6 +29,7 @@ from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
 from recorder.rpc.export_connections import MAX_UNKNOWN, ExportConnections
 from recorder.rpc.servicer import RecorderServicer
+from recorder.store.export import CHUNK_BYTES
 from recorder.store.run_bundles import RunBundles
 from tests.support.eventually import eventually
 from tests.support.recorder_in_process import Running, Source, running_recorder
@@ -132,7 +133,7 @@ async def disconnects(peer: socket.socket) -> bool:
         return True
 
 
-@pytest.mark.parametrize("offset", [0, 1, 256 * 1024, 1_000_001])
+@pytest.mark.parametrize("offset", [0, 1, CHUNK_BYTES, 1_000_001])
 async def test_the_connection_carries_what_the_call_would(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offset: int
 ) -> None:
