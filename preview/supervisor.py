@@ -240,7 +240,8 @@ class Supervisor:
             self._listener_backoff.reset()
             self._desired = replace(desired, profile=profile)
             self._cameras.want(desired.camera if known else "")
-            mode = f"on, {profile.value}, camera {self._cameras.wanted}" if desired.enabled else "off"
+            camera = f", camera {self._cameras.wanted}" if len(self._cameras.names) > 1 else ""
+            mode = f"on, {profile.value}{camera}" if desired.enabled else "off"
             _log.info("desired state %d: %s", desired.revision, mode)
             self._follow_desired(new_request=True)
         self._restart_unwatched_timer()

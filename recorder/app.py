@@ -13,6 +13,7 @@ from recorder.parts import parts_of
 from recorder.priority import step_back
 from recorder.readings import Readings
 from recorder.recorder import Recorder
+from recorder.rpc.export_connections import ExportConnections
 from recorder.rpc.servicer import SERVICE, RecorderServicer
 from recorder.sources import RobotSources
 from recorder.store.lock import folder_lock
@@ -48,14 +49,16 @@ async def serve(settings: RecorderSettings, stop: asyncio.Event) -> None:
             operations = Operations(parts, readings, recorder)
             bundles = RunBundles(settings.run_bundles)
             server = rpc.new_server()
-            RecorderServicer(operations, readings, bundles, settings).register(server)
+            connections = ExportConnections()
+            RecorderServicer(operations, readings, bundles, settings, connections).register(server)
             Health(SERVICE).register(server)
             bind.bind_unix(server, settings.socket)
             await server.start()
             heartbeat.own().ready()
             _log.info("serving on %s; recordings are in %s", settings.socket, settings.root)
-            try:
-                await recorder.run(stop)
-            finally:
-                await server.stop(rpc.STOP_GRACE_S)
-                settings.socket.unlink(missing_ok=True)
+            async with connections.listening(settings.socket):
+                try:
+                    await recorder.run(stop)
+                finally:
+                    await server.stop(rpc.STOP_GRACE_S)
+                    settings.socket.unlink(missing_ok=True)

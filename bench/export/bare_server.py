@@ -15,9 +15,9 @@ import grpc
 import uvloop
 
 from omniseer.gateway.v1 import recording_pb2 as pb
+from recorder.store.export import CHUNK_BYTES
 
 METHOD: Final = "/bench.Export/Copy"
-_CHUNK_BYTES: Final = 256 * 1024
 
 
 def messages(files: Sequence[Path]) -> list[bytes]:
@@ -26,8 +26,8 @@ def messages(files: Sequence[Path]) -> list[bytes]:
     for file in files:
         content = file.read_bytes()
         made.append(pb.ExportRecordingResponse(header=pb.ExportHeader(size=len(content), sha256=bytes(32))))
-        for offset in range(0, len(content), _CHUNK_BYTES):
-            data = content[offset : offset + _CHUNK_BYTES]
+        for offset in range(0, len(content), CHUNK_BYTES):
+            data = content[offset : offset + CHUNK_BYTES]
             chunk = pb.ExportChunk(offset=offset, data=data, crc32c=google_crc32c.value(data))
             made.append(pb.ExportRecordingResponse(chunk=chunk))
     return [each.SerializeToString() for each in made]

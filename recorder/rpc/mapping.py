@@ -11,6 +11,7 @@ from recorder.config import RecorderSettings
 from recorder.lifecycle import State
 from recorder.readings import Readings
 from recorder.requests import Live
+from recorder.store.export import Chunk
 from recorder.store.manifest import Copy, CopyState, Kind, Manifest, RecordingState, StopReason
 from recorder.store.run_bundles import Bundle
 from recorder.values import Gap, GapCause
@@ -204,3 +205,9 @@ def _gap(gap: Gap) -> pb.RecordingGap:
         ended_unix_ms=max(gap.ended_ns, 0) // _NS_PER_MS,
         **update,
     )
+
+
+def export_chunk(chunk: Chunk) -> pb.ExportRecordingResponse:
+    """Returns the message of a chunk."""
+    message = pb.ExportChunk(offset=chunk.offset, data=chunk.data, crc32c=chunk.crc32c)
+    return pb.ExportRecordingResponse(chunk=message)

@@ -2,10 +2,12 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Sequence
+from contextlib import aclosing
 from typing import Any, Final
 
 import grpc
 
+from common.deadline import within
 from common.errors import (
     ConflictError,
     DamagedError,
@@ -13,6 +15,7 @@ from common.errors import (
     NotFoundError,
     PreconditionError,
 )
+from common.export_connection import CARRIED_HEADER, CONNECT_WITHIN_S, KEY_HEADER, key_of
 from common.pace import Pace
 from common.reasons import Reason
 from omniseer.gateway.v1 import recording_pb2 as pb
@@ -23,6 +26,7 @@ from recorder.operations import Operations
 from recorder.readings import Readings
 from recorder.requests import Result, SnapshotOptions, StartOptions
 from recorder.rpc import mapping
+from recorder.rpc.export_connections import ExportConnection, ExportConnections
 from recorder.store.export import Content, UnreadableError, chunks
 from recorder.store.manifest import Manifest
 from recorder.store.run_bundles import Bundle, RunBundles
@@ -46,16 +50,23 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         readings: of the same.
         bundles: the robot's own experiments.
         settings: of the program.
+        connections: carry exports to a gateway that connects there; None: gRPC carries all of them.
     """
 
     def __init__(
-        self, operations: Operations, readings: Readings, bundles: RunBundles, settings: RecorderSettings
+        self,
+        operations: Operations,
+        readings: Readings,
+        bundles: RunBundles,
+        settings: RecorderSettings,
+        connections: ExportConnections | None = None,
     ) -> None:
         self._operations = operations
         self._readings = readings
         self._bundles = bundles
         self._settings = settings
         self._pace = Pace(settings.export.max_bytes_per_s)
+        self._connections = connections or ExportConnections()
 
     def register(self, server: grpc.aio.Server) -> None:
         """Adds the methods to a server."""
@@ -131,7 +142,7 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         return pb.GetRecordingResponse(recording=mapping.recording(self._readings, manifest, whole=True))
 
     async def ExportRecording(  # noqa: N802  # the schema names it
-        self, request: pb.ExportRecordingRequest, _context: grpc.aio.ServicerContext[Any, Any]
+        self, request: pb.ExportRecordingRequest, context: grpc.aio.ServicerContext[Any, Any]
     ) -> AsyncIterator[pb.ExportRecordingResponse]:
         """Streams a final file."""
         bundle = await self._bundle(request.recording_id)
@@ -144,7 +155,6 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
         if request.offset > content.size:
             raise InvalidRequestError(f"offset {request.offset} is beyond the end, {content.size}")
         header = pb.ExportHeader(size=content.size, sha256=content.sha256)
-        yield pb.ExportRecordingResponse(header=header)
 
         def check() -> None:
             if bundle is None and not self._readings.has(request.recording_id):
@@ -153,11 +163,21 @@ class RecorderServicer(pb_grpc.RecorderServiceServicer):
                 )
 
         paces = (self._pace, Pace(request.max_bytes_per_s))
+        key = key_of(_metadata(context, KEY_HEADER))
         try:
-            async for chunk in chunks(content, request.offset, paces, check):
-                yield pb.ExportRecordingResponse(
-                    chunk=pb.ExportChunk(offset=chunk.offset, data=chunk.data, crc32c=chunk.crc32c)
-                )
+            with self._connections.expected(key) as coming:
+                if coming:
+                    await context.send_initial_metadata(((CARRIED_HEADER, "1"),))
+                yield pb.ExportRecordingResponse(header=header)
+                connection = await _in_time(coming) if coming else None
+                async with aclosing(chunks(content, request.offset, paces, check)) as parts:
+                    async for chunk in parts:
+                        if connection:
+                            await connection.send(chunk)
+                        else:
+                            yield mapping.export_chunk(chunk)
+        except ConnectionError:
+            await context.abort(grpc.StatusCode.UNAVAILABLE, "the connection of the export was closed")
         except UnreadableError as error:
             check()
             raise DamagedError(f"{request.file}: {error}") from error
@@ -281,9 +301,21 @@ def _request_id(request: Any) -> str:
 
 
 def _caller(context: grpc.aio.ServicerContext[Any, Any]) -> str:
+    return str(_metadata(context, _CALLER))[:_LONGEST_CALLER]
+
+
+def _metadata(context: grpc.aio.ServicerContext[Any, Any], wanted: str) -> str | bytes:
+    """Returns the first value of a key; empty without one."""
     metadata: Sequence[tuple[str, str | bytes]] = tuple(context.invocation_metadata() or ())
-    named = next((value for key, value in metadata if key == _CALLER), "")
-    return str(named)[:_LONGEST_CALLER]
+    return next((value for key, value in metadata if key == wanted), "")
+
+
+async def _in_time(coming: "asyncio.Future[ExportConnection]") -> ExportConnection | None:
+    """Returns the connection of an export; None if the gateway does not connect."""
+    try:
+        return await within(CONNECT_WITHIN_S, coming)
+    except TimeoutError:
+        return None
 
 
 def _place(each: Manifest | Bundle) -> tuple[int, str]:

@@ -173,6 +173,8 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/supervisor.py", (*HEAVY, *WIRE, "common.gst", "preview.pipeline.runner", "preview.rpc")),
         ("preview/rpc/", ("common.gst",)),
         ("preview/tap.py", (*HEAVY, *WIRE, "common.gst", "omniseer", "preview.rpc", "preview.config")),
+        ("common/export_connection.py", (*HEAVY, *WIRE, "common", "asyncio", "time", "socket")),
+        ("gateway/links/recorder/export_connection.py", (*WIRE, "omniseer")),
         ("common/video_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time")),
         *(
             (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))

@@ -1,6 +1,7 @@
 """Desired and reported state of the preview."""
 
 from dataclasses import dataclass, field
+from typing import Final
 
 from gateway.status.preview import (
     Camera,
@@ -12,6 +13,9 @@ from gateway.status.preview import (
     Profile,
     Stream,
 )
+
+_ONLY_CAMERA: Final = "camera"
+"""What the preview service calls a camera that its configuration gives no name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,7 @@ class PreviewSpec:
         return PreviewSpec(enabled=True, profile=profile, passphrase=passphrase, camera=camera)
 
     def __str__(self) -> str:
-        camera = f", camera {self.camera}" if self.camera else ""
+        camera = f", camera {self.camera}" if self.camera not in ("", _ONLY_CAMERA) else ""
         return f"on, {self.profile_name}{camera}" if self.enabled else "off"
 
     @property

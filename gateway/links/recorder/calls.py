@@ -1,6 +1,7 @@
 """What can't be reconciled: the operators' calls, which the recorder answers, and reports of faults."""
 
 from collections.abc import AsyncGenerator, Mapping
+from contextlib import aclosing
 from typing import Final
 
 from gateway.links.grpc_client import call_metadata
@@ -42,13 +43,10 @@ class RecorderCalls(SharingConnector[RecorderClient]):
         Raises:
             DomainError: the recorder refuses, or is gone.
         """
-        stream = self._connected().export(request, call_metadata(caller))
-        try:
+        async with aclosing(self._connected().export(request, call_metadata(caller))) as responses:
             with REFUSALS.as_domain_errors():
-                async for response in stream:
+                async for response in responses:
                     yield response
-        finally:
-            stream.cancel()
 
     async def report_fault(self, fault: Condition) -> str:
         """Reports a fault; returns the incident that it became, empty for none.

@@ -4,15 +4,18 @@ Its messages are mostly those of the operators' contract. They are passed on as 
 no knowledge of them, and an export costs the gateway no parsing.
 """
 
-from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager
+import secrets
+from collections.abc import AsyncGenerator, AsyncIterator, Sequence
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import grpc
 
+from common.export_connection import CARRIED_HEADER, KEY_BYTES, KEY_HEADER, socket_beside
 from gateway.links.grpc_client import lost, unix_channel
+from gateway.links.recorder.export_connection import carried_messages
 from gateway.links.watch import LinkLostError
 from gateway.links.wire_values import by_number, same_fields
 from gateway.status.cloud import CopyReport, RecordingCopyState
@@ -70,14 +73,21 @@ class RecorderConnector:
             unix_channel(self.socket, _MAX_MESSAGE_BYTES) as channel,
             unix_channel(self.socket, _MAX_MESSAGE_BYTES, ahead_bytes=_EXPORT_AHEAD_BYTES) as exports,
         ):
-            yield RecorderClient(channel, exports)
+            yield RecorderClient(channel, exports, socket_beside(self.socket))
 
 
 class RecorderClient:
-    """A Reporter of the recorder, and its other methods. All but `reports` raise what gRPC raises."""
+    """A Reporter of the recorder, and its other methods. All but `reports` raise what gRPC raises.
 
-    def __init__(self, channel: grpc.aio.Channel, exports: grpc.aio.Channel) -> None:
+    Args:
+        channel: for all methods but one.
+        exports: for ExportRecording.
+        carried_at: where the recorder takes connections that carry the chunks of exports.
+    """
+
+    def __init__(self, channel: grpc.aio.Channel, exports: grpc.aio.Channel, carried_at: Path) -> None:
         self._channel = channel
+        self._carried_at = carried_at
         self._exports = exports
         self._stub: RecorderServiceAsyncStub = RecorderServiceStub(channel)
 
@@ -96,10 +106,24 @@ class RecorderClient:
         response: bytes = await call(request, timeout=timeout_s, metadata=tuple(metadata))
         return response
 
-    def export(self, request: bytes, metadata: Metadata) -> Any:
-        """Starts ExportRecording; its responses come as they are on the wire."""
-        call: Any = self._exports.unary_stream(f"{_SERVICE}/ExportRecording")
-        return call(request, metadata=tuple(metadata))
+    async def export(self, request: bytes, metadata: Metadata) -> AsyncGenerator[bytes]:
+        """Yields the responses of ExportRecording as they are on the wire."""
+        key = secrets.token_bytes(KEY_BYTES)
+        method: Any = self._exports.unary_stream(f"{_SERVICE}/ExportRecording")
+        call: Any = method(request, metadata=(*metadata, (KEY_HEADER, key.hex())))
+        try:
+            if (header := await call.read()) is grpc.aio.EOF:
+                return
+            yield header
+            if any(name == CARRIED_HEADER for name, _ in await call.initial_metadata()):
+                async with aclosing(carried_messages(self._carried_at, key)) as carried:
+                    async for response in carried:
+                        yield response
+            # The status, and the chunks that no connection has carried.
+            while (response := await call.read()) is not grpc.aio.EOF:
+                yield response
+        finally:
+            call.cancel()
 
     async def report_fault(self, fault_id: str, severity: Severity, message: str, timeout_s: float) -> str:
         """Reports a fault; returns the incident that it became or was merged with, empty for none."""

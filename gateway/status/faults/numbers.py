@@ -1,13 +1,11 @@
-"""Faults of the numbers that the configuration names: beyond a limit, or received without a value."""
+"""Faults of the numbers that the configuration names: beyond a limit."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
 
 from gateway.status.fault import Condition, Fault, Severity
-from gateway.status.faults.no_value import no_value_fault
 from gateway.status.freshness import Sample
 from gateway.status.meaning import NumberMeaning, Side, Violation
-from gateway.status.snapshot import Snapshot
 from gateway.status.sources import SourceSpec
 from gateway.status.values import Number
 
@@ -19,15 +17,22 @@ _WORDS: Final[Mapping[tuple[Side, Severity], tuple[str, str]]] = {
 }
 
 
-def number_faults(snapshot: Snapshot) -> Iterator[Condition]:
-    """Yields the present conditions. An unknown or stale value neither breaks a limit nor clears one."""
-    for source in snapshot.sources:
-        meaning = source.spec.meaning
-        if isinstance(meaning, NumberMeaning):
-            sample = snapshot[source.spec]
-            yield from _limit(source.spec, meaning, sample, snapshot.faults)
-            if sample.value and sample.value.value is None:
-                yield from no_value_fault(source, "a number", "it sends NaN, infinity, or a list too short")
+def number_conditions(
+    spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
+) -> Iterator[Condition]:
+    """Yields the condition of the newest number; one that is unknown or stale is judged as its fault says."""
+    found = violation_of(spec, meaning, sample, faults)
+    if found is None:
+        return
+    word, beyond = _WORDS[found.side, found.severity]
+    limit = f"{found.limit.raise_at:.10g} {meaning.unit}".strip()
+    yield Condition(
+        _fault_id(spec, found.side),
+        found.severity,
+        spec.display_name,
+        f"{spec.display_name} is {word}: {limit} {beyond}",
+        meaning.remedy or f"Check {spec.display_name} on the robot; its configuration has the limits",
+    )
 
 
 def violation_of(
@@ -52,20 +57,3 @@ def violation_of(
 
 def _fault_id(spec: SourceSpec[Number], side: Side) -> str:
     return f"{spec.name}.{side.value}"
-
-
-def _limit(
-    spec: SourceSpec[Number], meaning: NumberMeaning, sample: Sample[Number], faults: tuple[Fault, ...]
-) -> Iterator[Condition]:
-    found = violation_of(spec, meaning, sample, faults)
-    if found is None:
-        return
-    word, beyond = _WORDS[found.side, found.severity]
-    limit = f"{found.limit.raise_at:.10g} {meaning.unit}".strip()
-    yield Condition(
-        _fault_id(spec, found.side),
-        found.severity,
-        spec.display_name,
-        f"{spec.display_name} is {word}: {limit} {beyond}",
-        meaning.remedy or f"Check {spec.display_name} on the robot; its configuration has the limits",
-    )

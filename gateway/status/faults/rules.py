@@ -8,13 +8,12 @@ from gateway.status.faults.access import access_faults
 from gateway.status.faults.cloud import cloud_faults
 from gateway.status.faults.diagnostics import diagnostics_faults
 from gateway.status.faults.driving import driving_faults
-from gateway.status.faults.numbers import number_faults
 from gateway.status.faults.platform import PlatformLimits, platform_faults
 from gateway.status.faults.position import position_faults
 from gateway.status.faults.preview import preview_faults
 from gateway.status.faults.recording import recording_faults
 from gateway.status.faults.sources import sampler_fault, source_faults
-from gateway.status.faults.texts import text_faults
+from gateway.status.faults.values import value_faults
 from gateway.status.snapshot import Snapshot
 from gateway.status.sources import DIAGNOSTICS
 
@@ -63,7 +62,6 @@ def conditions(
         snapshot.cloud, snapshot.at_s, offline_after_s=rules.hub_offline_s, settled=settled
     )
     yield from position_faults(snapshot)
-    yield from number_faults(snapshot)
-    yield from text_faults(snapshot)
+    yield from value_faults(snapshot)
     yield from platform_faults(snapshot, rules.platform, active)
     yield from access_faults(snapshot.access, rules.expiry_days)

@@ -5,26 +5,13 @@ from collections.abc import Iterator
 from typing import Final
 
 from gateway.status.fault import Condition, Fault, Severity
-from gateway.status.faults.no_value import no_value_fault
 from gateway.status.freshness import Sample
 from gateway.status.meaning import TextMeaning
-from gateway.status.snapshot import Snapshot
 from gateway.status.sources import SourceSpec
 from gateway.status.values import Text
 
 _OTHER: Final = "other"
 _LONGEST_SLUG: Final = 40
-
-
-def text_faults(snapshot: Snapshot) -> Iterator[Condition]:
-    """Yields the present conditions. An unknown or stale text neither raises a fault nor clears one."""
-    for source in snapshot.sources:
-        meaning = source.spec.meaning
-        if isinstance(meaning, TextMeaning):
-            sample = snapshot[source.spec]
-            yield from text_conditions(source.spec, meaning, sample, snapshot.faults)
-            if sample.value and sample.value.text is None:
-                yield from no_value_fault(source, "a text", "it sends a list too short")
 
 
 def text_conditions(

@@ -1,6 +1,5 @@
 """What a recording loses when the programs beside the recorder are killed: what they did not deliver."""
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,8 +8,8 @@ import pytest
 
 from omniseer.gateway.v1 import recording_pb2 as pb
 from recorder.values import VIDEO_TOPIC
-from tests.support.gateway_program import GatewayProgram, gateway_program
-from tests.support.robotctl import robotctl
+from tests.support.gateway_program import gateway_program
+from tests.support.record_command import printed
 from tests.support.running_preview import RunningPreview
 from tests.support.running_recorder import RecorderProgram, recorder_program
 from tests.support.waiting import wait_until
@@ -19,12 +18,6 @@ pytestmark = [pytest.mark.ros, pytest.mark.gst]
 
 TOPIC = "/odom"
 FRAMES = 30
-
-
-def printed(gateway: GatewayProgram, *words: str) -> Any:
-    ran = robotctl("--target", f"127.0.0.1:{gateway.port}", "record", *words, "--json")
-    assert ran.returncode == 0, ran.stderr
-    return json.loads(ran.stdout)
 
 
 def written(program: RecorderProgram) -> int:

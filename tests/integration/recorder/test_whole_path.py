@@ -1,37 +1,23 @@
 """From robotctl to the file on the operator's disk: gateway, recorder and preview are the real programs."""
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import pytest
 from rosbags.rosbag2 import Reader
 
 from recorder.values import VIDEO_TOPIC
-from tests.support.gateway_program import GatewayProgram, gateway_program
-from tests.support.robotctl import only_line, robotctl
+from tests.support.gateway_program import gateway_program
+from tests.support.record_command import printed, record
+from tests.support.robotctl import only_line
 from tests.support.running_preview import RunningPreview
 from tests.support.running_recorder import recorder_program
 from tests.support.waiting import wait_until
-
-if TYPE_CHECKING:
-    import subprocess
 
 pytestmark = [pytest.mark.ros, pytest.mark.gst]
 
 TOPIC = "/odom"
 SENT = 200
 FRAMES = 30
-
-
-def record(gateway: GatewayProgram, *words: str) -> "subprocess.CompletedProcess[str]":
-    return robotctl("--target", f"127.0.0.1:{gateway.port}", "record", *words)
-
-
-def printed(gateway: GatewayProgram, *words: str) -> Any:
-    ran = record(gateway, *words, "--json")
-    assert ran.returncode == 0, ran.stderr
-    return json.loads(ran.stdout)
 
 
 @pytest.mark.usefixtures("ros_domain")

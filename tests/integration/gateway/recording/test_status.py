@@ -15,6 +15,7 @@ from omniseer.gateway.v1.robot_gateway_pb2 import (
 from tests.support.eventually import eventually
 from tests.support.recording_gateway import RecordingRobot, reaches, recording_robot
 
+ONE_SAMPLE = {"interval_ms": 60_000, "stale_after_ms": 120_000}
 QUICK = {"startup_grace_ms": 0, "clear_after_ms": 0}
 
 
@@ -55,7 +56,11 @@ async def test_a_recording_begins_loses_and_ends_in_events(tmp_path: Path) -> No
 
 @pytest.mark.timed
 async def test_a_recording_that_only_grows_wakes_no_watcher(tmp_path: Path) -> None:
-    async with recording_robot(tmp_path) as robot:
+    async with recording_robot(tmp_path, platform=ONE_SAMPLE) as robot:
+        # The computer's load is news, too: every sample of it wakes watchers.
+        await eventually(
+            robot.operator.status, lambda now: now.platform.network.available, "the platform's only sample"
+        )
         await robot.start()
         await reaches(robot, pb.RECORDER_STATE_RECORDING)
         request = WatchSystemStatusRequest(min_interval_ms=50)

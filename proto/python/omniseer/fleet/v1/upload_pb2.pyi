@@ -579,8 +579,8 @@ Global___GetFilesResponse: _TypeAlias = GetFilesResponse  # noqa: Y015
 
 @_typing.final
 class FileUrl(_message.Message):
-    """Where a file can be read with GET, whole or from any byte on. Its content is what counts: whoever reads it checks its
-    SHA-256 against the recording's receipt.
+    """Where a file can be read with GET, whole or from any byte on. Readers check the content: its SHA-256 is in the
+    recording's receipt.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

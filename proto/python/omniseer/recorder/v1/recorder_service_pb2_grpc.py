@@ -163,7 +163,11 @@ class RecorderServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ExportRecording(self, request, context):
-        """As RecordingService.ExportRecording.
+        """As RecordingService.ExportRecording. With the metadata "x-export-key" (16 random bytes in hexadecimal digits) and the
+        initial metadata "x-export-carried" in return, the call has the header and the status alone, and the chunks come over a
+        connection to the socket whose path is this service's with ".exports" appended: the gateway sends the key's bytes, the
+        recorder each message after its length (4 bytes, big endian), and closes the connection after the last one. They come
+        over the call all the same if the gateway has not connected within 2 s.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -60,7 +60,12 @@ class RecorderServiceStub:
     GetRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]
     """As RecordingService.GetRecording."""
     ExportRecording: _grpc.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]
-    """As RecordingService.ExportRecording."""
+    """As RecordingService.ExportRecording. With the metadata "x-export-key" (16 random bytes in hexadecimal digits) and the
+    initial metadata "x-export-carried" in return, the call has the header and the status alone, and the chunks come over a
+    connection to the socket whose path is this service's with ".exports" appended: the gateway sends the key's bytes, the
+    recorder each message after its length (4 bytes, big endian), and closes the connection after the last one. They come
+    over the call all the same if the gateway has not connected within 2 s.
+    """
     GetRecordingThumbnail: _grpc.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingThumbnailRequest, _recording_pb2.GetRecordingThumbnailResponse]
     """As RecordingService.GetRecordingThumbnail."""
     PinRecording: _grpc.UnaryUnaryMultiCallable[_recording_pb2.PinRecordingRequest, _recording_pb2.PinRecordingResponse]
@@ -107,7 +112,12 @@ class RecorderServiceAsyncStub(RecorderServiceStub):
     GetRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingRequest, _recording_pb2.GetRecordingResponse]  # type: ignore[assignment]
     """As RecordingService.GetRecording."""
     ExportRecording: _aio.UnaryStreamMultiCallable[_recording_pb2.ExportRecordingRequest, _recording_pb2.ExportRecordingResponse]  # type: ignore[assignment]
-    """As RecordingService.ExportRecording."""
+    """As RecordingService.ExportRecording. With the metadata "x-export-key" (16 random bytes in hexadecimal digits) and the
+    initial metadata "x-export-carried" in return, the call has the header and the status alone, and the chunks come over a
+    connection to the socket whose path is this service's with ".exports" appended: the gateway sends the key's bytes, the
+    recorder each message after its length (4 bytes, big endian), and closes the connection after the last one. They come
+    over the call all the same if the gateway has not connected within 2 s.
+    """
     GetRecordingThumbnail: _aio.UnaryUnaryMultiCallable[_recording_pb2.GetRecordingThumbnailRequest, _recording_pb2.GetRecordingThumbnailResponse]  # type: ignore[assignment]
     """As RecordingService.GetRecordingThumbnail."""
     PinRecording: _aio.UnaryUnaryMultiCallable[_recording_pb2.PinRecordingRequest, _recording_pb2.PinRecordingResponse]  # type: ignore[assignment]
@@ -193,7 +203,12 @@ class RecorderServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _recording_pb2.ExportRecordingRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_recording_pb2.ExportRecordingResponse], _abc.AsyncIterator[_recording_pb2.ExportRecordingResponse]]:
-        """As RecordingService.ExportRecording."""
+        """As RecordingService.ExportRecording. With the metadata "x-export-key" (16 random bytes in hexadecimal digits) and the
+        initial metadata "x-export-carried" in return, the call has the header and the status alone, and the chunks come over a
+        connection to the socket whose path is this service's with ".exports" appended: the gateway sends the key's bytes, the
+        recorder each message after its length (4 bytes, big endian), and closes the connection after the last one. They come
+        over the call all the same if the gateway has not connected within 2 s.
+        """
 
     @_abc_1.abstractmethod
     def GetRecordingThumbnail(

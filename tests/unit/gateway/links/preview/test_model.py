@@ -346,3 +346,16 @@ def test_the_view_agrees_with_every_history(steps: list[tuple[str, object, objec
         assert view.counters.faults >= previous.counters.faults
         assert (view is previous) == (view == previous), "a new object for each change, and for nothing else"
         previous = view
+
+
+@pytest.mark.parametrize(
+    ("spec", "text"),
+    [
+        (PreviewSpec(), "off"),
+        (PreviewSpec(True, Profile.BALANCED), "on, balanced"),
+        (PreviewSpec(True, Profile.BALANCED, camera="rear"), "on, balanced, camera rear"),
+        (PreviewSpec(True, Profile.BALANCED, camera="camera"), "on, balanced"),
+    ],
+)
+def test_a_request_names_the_camera_unless_it_is_the_only_one(spec: PreviewSpec, text: str) -> None:
+    assert str(spec) == text

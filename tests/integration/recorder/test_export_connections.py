@@ -1,0 +1,301 @@
+"""Exports over a connection of their own: the recorder's end and the gateway's, over real sockets."""
+
+import asyncio
+import os
+import socket
+from collections.abc import AsyncIterator
+from contextlib import aclosing, asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import grpc
+import psutil
+import pytest
+
+from common import bind, rpc
+from common.export_connection import (
+    CONNECT_WITHIN_S,
+    KEY_BYTES,
+    KEY_HEADER,
+    LENGTH,
+    MAX_MESSAGE_BYTES,
+    socket_beside,
+)
+from gateway.links.recorder import wire
+from gateway.links.recorder.export_connection import carried_messages
+from gateway.links.recorder.wire import RecorderClient, RecorderConnector
+from omniseer.gateway.v1 import recording_pb2 as pb
+from omniseer.recorder.v1 import recorder_service_pb2_grpc as pb_grpc
+from recorder.rpc.export_connections import MAX_UNKNOWN, ExportConnections
+from recorder.rpc.servicer import RecorderServicer
+from recorder.store.export import CHUNK_BYTES
+from recorder.store.run_bundles import RunBundles
+from tests.support.eventually import eventually
+from tests.support.recorder_in_process import Running, Source, running_recorder
+from tests.support.refusals import refused
+
+MIB = 1024 * 1024
+METADATA = (("x-caller", "ann"),)
+
+
+@dataclass
+class Robot:
+    """A recorder with a finished recording, and the gateway's client of it.
+
+    Attributes:
+        carried: keys of the connections that have carried chunks.
+    """
+
+    running: Running
+    socket: Path
+    client: RecorderClient
+    recording: pb.Recording
+    carried: list[bytes]
+
+    def request(self, **more: Any) -> bytes:
+        name = self.recording.files[0].name
+        request = pb.ExportRecordingRequest(recording_id=self.recording.id, file=name, **more)
+        return request.SerializeToString()
+
+    async def exported(self, **more: Any) -> list[bytes]:
+        return [each async for each in self.client.export(self.request(**more), METADATA)]
+
+    async def over_the_call(self, **more: Any) -> list[bytes]:
+        """The same without a connection, as a gateway takes it that knows none of this."""
+        async with grpc.aio.insecure_channel(f"unix:{self.socket}") as channel:
+            method: Any = channel.unary_stream("/omniseer.recorder.v1.RecorderService/ExportRecording")
+            return [each async for each in method(self.request(**more))]
+
+    @property
+    def path(self) -> Path:
+        root = self.running.settings.root
+        return root / "recordings" / self.recording.id / self.recording.files[0].name
+
+
+@asynccontextmanager
+async def robot(root: Path, monkeypatch: pytest.MonkeyPatch, size: int = 3 * MIB) -> AsyncIterator[Robot]:
+    carried: list[bytes] = []
+
+    async def counted(path: Path, key: bytes) -> Any:
+        messages = carried_messages(path, key)
+        async with aclosing(messages):
+            async for each in messages:
+                if key not in carried:
+                    carried.append(key)
+                yield each
+
+    monkeypatch.setattr(wire, "carried_messages", counted)
+    address = root / "recorder.sock"
+    async with running_recorder(root / "root") as running:
+        server, connections = rpc.new_server(), ExportConnections()
+        bundles = RunBundles(running.settings.run_bundles)
+        RecorderServicer(
+            running.operations, running.readings, bundles, running.settings, connections
+        ).register(server)
+        bind.bind_unix(server, address)
+        await server.start()
+        async with connections.listening(address):
+            try:
+                made = await recorded(address, running, size)
+                async with RecorderConnector(address).connect() as client:
+                    yield Robot(running, address, client, made, carried)
+            finally:
+                await server.stop(None)
+    assert not socket_beside(address).exists()
+
+
+async def recorded(address: Path, running: Running, size: int) -> pb.Recording:
+    async with grpc.aio.insecure_channel(f"unix:{address}") as channel:
+        stub: Any = pb_grpc.RecorderServiceStub(channel)
+        await stub.StartRecording(pb.StartRecordingRequest(request_id="start"))
+        Source(running.queue).send(10, size=size // 10)
+        stopped = await stub.StopRecording(pb.StopRecordingRequest(request_id="stop"))
+        asked = pb.GetRecordingRequest(recording_id=stopped.recording.id)
+        found: pb.Recording = (await stub.GetRecording(asked)).recording
+        return found
+
+
+def connected(address: Path) -> socket.socket:
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    made.connect(str(socket_beside(address)))
+    return made
+
+
+async def disconnects(peer: socket.socket) -> bool:
+    """Whether the recorder has closed a connection."""
+    peer.setblocking(False)
+    try:
+        return peer.recv(1) == b""
+    except BlockingIOError:
+        return False
+    except ConnectionResetError:
+        return True
+
+
+@pytest.mark.parametrize("offset", [0, 1, CHUNK_BYTES, 1_000_001])
+async def test_the_connection_carries_what_the_call_would(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offset: int
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        found = await recorder.exported(offset=offset)
+        assert len(recorder.carried) == 1
+        assert found == await recorder.over_the_call(offset=offset)
+        chunks = [pb.ExportRecordingResponse.FromString(each).chunk for each in found[1:]]
+        assert b"".join(each.data for each in chunks) == recorder.path.read_bytes()[offset:]
+        assert len(recorder.carried) == 1
+
+
+async def test_exports_at_once_have_a_connection_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        expected = await recorder.over_the_call()
+        found = await asyncio.gather(*(recorder.exported() for _ in range(8)))
+        assert all(each == expected for each in found)
+        assert len(recorder.carried) == 8
+
+
+async def test_chunks_go_over_the_call_where_nothing_listens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        expected = await recorder.over_the_call()
+        beside = socket_beside(recorder.socket)
+        away = beside.rename(tmp_path / "away")
+        assert await recorder.exported() == expected
+        assert recorder.carried == []
+        away.rename(beside)
+
+
+async def test_a_path_too_long_for_a_second_socket_makes_exports_slower_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    connections = ExportConnections()
+    address = tmp_path / ("a" * (107 - len(bytes(tmp_path)) - 1))
+    async with connections.listening(address):
+        with connections.expected(bytes(KEY_BYTES)) as coming:
+            assert coming is None
+    assert "exports will be slower" in caplog.text
+
+
+async def test_damage_and_deletion_end_the_call_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        exported = recorder.client.export(recorder.request(max_bytes_per_s=MIB), METADATA)
+        await anext(exported)
+        await anext(exported)
+        assert recorder.carried
+        await recorder.running.operations.delete("1", recorder.recording.id, b"", force=True)
+
+        async def rest() -> None:
+            async for _ in exported:
+                pass
+
+        assert await refused(rest()) == (grpc.StatusCode.ABORTED, "RECORDING_DELETED")
+    async with robot(tmp_path / "other", monkeypatch) as recorder:
+        with recorder.path.open("r+b") as file:
+            file.seek(100)
+            file.write(b"damaged")
+        received: list[bytes] = []
+
+        async def export() -> None:
+            async for each in recorder.client.export(recorder.request(), METADATA):
+                received.append(each)  # noqa: PERF401  # it ends with an error
+
+        assert await refused(export()) == (grpc.StatusCode.DATA_LOSS, "RECORDING_DAMAGED")
+        assert sum(map(len, received)) < recorder.recording.files[0].size
+
+
+async def test_a_caller_who_leaves_leaves_nothing_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch, 16 * MIB) as recorder:
+        await recorder.exported()
+        before = psutil.Process().num_fds()
+        for _ in range(3):
+            async with aclosing(recorder.client.export(recorder.request(), METADATA)) as exported:
+                for _ in range(3):
+                    await anext(exported)
+
+        async def open_now() -> int:
+            return psutil.Process().num_fds()
+
+        await eventually(open_now, lambda now: now <= before, "files and sockets are closed")
+
+
+async def test_a_gateway_that_does_not_read_makes_the_recorder_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch, 16 * MIB) as recorder:
+        expected = await recorder.over_the_call()
+        async with aclosing(recorder.client.export(recorder.request(), METADATA)) as exported:
+            found = [await anext(exported), await anext(exported)]
+            # Another one is served meanwhile, whole.
+            assert await recorder.exported() == expected
+            async for each in exported:
+                found.append(each)  # noqa: PERF401  # begun before
+        assert found == expected
+
+
+async def test_strangers_are_disconnected_and_hurt_no_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        expected = await recorder.over_the_call()
+        guess, silent = connected(recorder.socket), connected(recorder.socket)
+        guess.sendall(os.urandom(KEY_BYTES) + b"more than a key")
+        half = connected(recorder.socket)
+        half.sendall(b"ha")
+        half.close()
+        assert await recorder.exported() == expected
+        await eventually(lambda: disconnects(guess), bool, "a wrong key is disconnected")
+        within_s = CONNECT_WITHIN_S + 5
+        await eventually(lambda: disconnects(silent), bool, "so is who sends none", within_s)
+        crowd = [connected(recorder.socket) for _ in range(MAX_UNKNOWN + 8)]
+        await eventually(lambda: disconnects(crowd[-1]), bool, "more than MAX_UNKNOWN are disconnected")
+        # With no room for a connection the call carries the chunks.
+        assert await recorder.exported() == expected
+        for each in (guess, silent, *crowd):
+            each.close()
+
+
+@pytest.mark.parametrize("key", ["", "no digits", "00" * (KEY_BYTES + 1), "00" * (KEY_BYTES - 1)])
+async def test_a_call_with_another_key_gets_its_chunks_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    async with robot(tmp_path, monkeypatch) as recorder:
+        async with grpc.aio.insecure_channel(f"unix:{recorder.socket}") as channel:
+            method: Any = channel.unary_stream("/omniseer.recorder.v1.RecorderService/ExportRecording")
+            call = method(recorder.request(), metadata=((KEY_HEADER, key),))
+            found = [each async for each in call]
+        assert found == await recorder.over_the_call()
+
+
+@pytest.mark.parametrize(
+    ("sent", "expected"),
+    [
+        (b"", []),
+        (LENGTH.pack(3) + b"one" + LENGTH.pack(3) + b"two", [b"one", b"two"]),
+        (LENGTH.pack(3) + b"one" + LENGTH.pack(3) + b"tw", [b"one"]),
+        (LENGTH.pack(3) + b"one" + b"\0", [b"one"]),
+        (LENGTH.pack(MAX_MESSAGE_BYTES + 1) + b"x", []),
+        (LENGTH.pack(2**32 - 1), []),
+    ],
+)
+async def test_the_gateway_takes_whole_messages_of_bounded_size_alone(
+    tmp_path: Path, sent: bytes, expected: list[bytes]
+) -> None:
+    path, key = tmp_path / "socket", os.urandom(KEY_BYTES)
+    received: list[bytes] = []
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        received.append(await reader.readexactly(KEY_BYTES))
+        writer.write(sent)
+        writer.close()
+
+    async with await asyncio.start_unix_server(answer, path):
+        found = [each async for each in carried_messages(path, key)]
+    assert found == expected
+    assert received == [key]
