@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.release import ROOT, VERSION, alone, commit, git, release, released_repository
+from tests.support.release import ROOT, VERSION, alone, clone, commit, git, release, released_repository
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -56,12 +56,12 @@ def fresh_environment(directory: Path, *options: str) -> Path:
     return directory / "bin"
 
 
-def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, tmp_path: Path) -> None:
+def test_two_releases_of_a_commit_are_the_same_bytes(made: Path, repository: Path, tmp_path: Path) -> None:
     """From another clone, at another path, hour and place, and with another umask."""
-    other = released_repository(tmp_path / "elsewhere")
     output = tmp_path / "second"
     before = os.umask(0o077)
     try:
+        other = clone(repository, tmp_path / "elsewhere")
         ended = release(
             other,
             "--without-images",
@@ -235,8 +235,7 @@ def test_what_is_no_release_is_refused(directory: str, tmp_path: Path) -> None:
 
 
 def test_what_is_not_committed_is_refused_and_nothing_is_made(repository: Path, tmp_path: Path) -> None:
-    changed = tmp_path / "changed"
-    subprocess.run(["cp", "-a", repository, changed], check=True, timeout=60)
+    changed = clone(repository, tmp_path / "changed")
     (changed / "README.md").write_text("changed")
     (changed / "new").write_text("new")
     # Of the robot that the images are for.
@@ -256,8 +255,7 @@ def test_a_release_that_exists_is_not_overwritten(made: Path, repository: Path) 
 
 
 def test_a_failed_build_names_its_reason_and_leaves_nothing(repository: Path, tmp_path: Path) -> None:
-    broken = tmp_path / "broken"
-    subprocess.run(["cp", "-a", repository, broken], check=True, timeout=60)
+    broken = clone(repository, tmp_path / "broken")
     lock = broken / "requirements/console.txt"
     lock.write_text("typer==0.29.2\n")
     commit(broken)

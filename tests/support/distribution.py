@@ -1,9 +1,9 @@
 """Which tests run at the same time, and in which order.
 
-pytest-xdist's workers get whole files, the longest first. The files of tests/e2e/containers are two units,
-those that share the containers of `_shared_demo` (its conftest.py) and the others, because the start of a
-deployment takes all processors. What starts a whole robot with video or in containers, and measures time,
-gets the mark `alone` for the same reason.
+pytest-xdist's workers get whole files, the longest first. Those files of tests/e2e/containers that deploy the
+system are two units, those that share the containers of `_shared_demo` (its conftest.py) and the others,
+because the start of a deployment takes all processors. What starts a whole robot with video or in containers,
+and measures time, gets the mark `alone` for the same reason.
 """
 
 from typing import Any, Final
@@ -12,6 +12,10 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 _CONTAINERS: Final = "tests/e2e/containers/"
+_STAND_INS: Final = tuple(
+    f"{_CONTAINERS}test_{name}.py" for name in ("upgrade_robot", "images", "compose_files")
+)
+"""Without a deployment: containers that sleep, images of one file, compose's own words."""
 _SHARING: Final = tuple(
     f"{_CONTAINERS}test_{name}.py" for name in ("main_job", "hardening", "upgrade", "recording", "faults")
 )
@@ -104,10 +108,14 @@ class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
             self._reschedule(node)
 
     def _split_scope(self, nodeid: str) -> str:
-        file = _file_of(nodeid)
-        if file in _SHARING:
-            return _SHARING[0]
-        return _CONTAINERS if file.startswith(_CONTAINERS) else file
+        return unit_of(_file_of(nodeid))
+
+
+def unit_of(file: str) -> str:
+    """Returns what names the file's unit: files with the same name run on one worker, one after the other."""
+    if file in _SHARING:
+        return _SHARING[0]
+    return _CONTAINERS if file.startswith(_CONTAINERS) and file not in _STAND_INS else file
 
 
 def _file_of(nodeid: str) -> str:

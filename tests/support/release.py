@@ -31,11 +31,22 @@ def released_repository(target: Path, version: str = VERSION) -> Path:
     raise_version(target, version)
     git(target, "init", "--quiet")
     commit(target)
-    # The tools are those of this tree: to install them takes half a minute.
-    subprocess.run([ROOT / "scripts/release", "--help"], stdout=subprocess.DEVNULL, check=True, timeout=120)
-    (target / ".cache").mkdir()
-    (target / ".cache/release").symlink_to(ROOT / ".cache/release")
+    _use_tools(target)
     return target
+
+
+def clone(repository: Path, target: Path) -> Path:
+    """Returns a new clone of a released repository: its commit, and nothing that was made in it."""
+    git(repository, "clone", "--quiet", repository, target)
+    _use_tools(target)
+    return target
+
+
+def _use_tools(repository: Path) -> None:
+    """Gives a repository the tools of this tree: to install them takes half a minute."""
+    subprocess.run([ROOT / "scripts/release", "--help"], stdout=subprocess.DEVNULL, check=True, timeout=120)
+    (repository / ".cache").mkdir()
+    (repository / ".cache/release").symlink_to(ROOT / ".cache/release")
 
 
 def raise_version(repository: Path, version: str) -> None:
@@ -61,7 +72,7 @@ def commit(repository: Path) -> None:
     git(repository, "commit", "--quiet", "--message", "a release")
 
 
-def git(repository: Path, *words: str) -> str:
+def git(repository: Path, *words: str | Path) -> str:
     """The output of a git command, which reads no one's own settings."""
     environment = {
         **os.environ,

@@ -35,6 +35,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """Returns virtual seconds since the loop was created."""
         return self._jumping_selector.now_s
 
+    def spend(self, seconds: float) -> None:
+        """Moves the clock on while a callback runs, which has the loop for itself for this long."""
+        self._jumping_selector.now_s += seconds
+
 
 def in_virtual_time(test: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
     """Makes a test of a coroutine function that runs on a VirtualTimeLoop; no callback may raise."""

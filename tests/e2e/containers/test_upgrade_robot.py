@@ -49,6 +49,14 @@ volumes:
   state:
 # VERSION
 """
+DOCKERFILE = """
+FROM debian:bookworm-slim AS whole
+RUN programs="/bin/sh /bin/cat /bin/grep /bin/sleep /bin/touch /usr/bin/test" && mkdir /small && \\
+    cp -L --parents $programs $(ldd $programs | grep -o '/lib[^ ]*' | sort -u) /small
+FROM scratch
+COPY --from=whole /small /
+"""
+"""Only what the services run: a whole system takes seconds to be saved, verified and loaded, in each test."""
 
 
 class Robot:
@@ -73,7 +81,7 @@ class Robot:
     def image(self, tag: str, version: str, *, healthy: bool = True, revision: str = "") -> None:
         state = " && touch /healthy" if healthy else ""
         dockerfile = (
-            f"FROM debian:bookworm-slim\nRUN echo {version} > /name{state}\n"
+            f"{DOCKERFILE}RUN echo {version} > /name{state}\n"
             f"LABEL org.opencontainers.image.revision={revision or version}\n"
         )
         subprocess.run(
@@ -152,7 +160,7 @@ class Robot:
             ["docker", "image", "ls", "--format", "{{.Tag}}", "robot-gateway"],
             capture_output=True, text=True, check=True,
         ).stdout.split()  # fmt: skip
-        mine = [tag for tag in listed if tag in self.tags or tag.startswith("before-9.")]
+        mine = [tag for tag in listed if tag in {*self.tags, "before-9.1.0"}]
         if mine:
             names = [f"robot-gateway:{tag}" for tag in mine]
             subprocess.run(["docker", "image", "rm", "--force", *names], capture_output=True, check=True)

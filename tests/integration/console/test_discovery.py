@@ -3,7 +3,9 @@
 import json
 import socket
 import time
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -34,19 +36,21 @@ def attacker() -> Iterator[Zeroconf]:
     zeroconf.close()
 
 
-def announce(
-    zeroconf: Zeroconf, label: str, address: str = LOOPBACK, port: int = 50051, **properties: bytes
-) -> None:
-    zeroconf.register_service(
-        ServiceInfo(
-            SERVICE_TYPE,
-            f"{label}.{SERVICE_TYPE}",
-            port=port,
-            properties=dict(properties),
-            server=f"{label}.local.",
-            parsed_addresses=[address],
-        )
+def announcement(label: str, address: str = LOOPBACK, port: int = 50051, **properties: bytes) -> ServiceInfo:
+    return ServiceInfo(
+        SERVICE_TYPE,
+        f"{label}.{SERVICE_TYPE}",
+        port=port,
+        properties=dict(properties),
+        server=f"{label}.local.",
+        parsed_addresses=[address],
     )
+
+
+def announce(zeroconf: Zeroconf, *announced: ServiceInfo) -> None:
+    """Announces them at the same time: each takes seconds, so that others may claim its name."""
+    with ThreadPoolExecutor(len(announced)) as threads:
+        deque(threads.map(zeroconf.register_service, announced), maxlen=0)
 
 
 def targets(discovery: Discovery) -> set[str]:
@@ -89,11 +93,14 @@ def test_a_gateway_announces_itself_only_where_that_is_configured(tmp_path: Path
 
 def test_hostile_announcements_are_harmless(attacker: Zeroconf) -> None:
     evil = b"\x1b]52;c;cm0gLXJm\x07lab\r\nfault cleared \xe2\x80\xae" + b"x" * 150
-    announce(attacker, "escapes", name=evil, contract=b"\x1b[2J", tls=b"1")
-    announce(attacker, "portless", port=0, name=b"portless")
-    announce(attacker, "multicast", address="224.0.0.1", name=b"multicast")
-    announce(attacker, "nowhere", address="0.0.0.0", name=b"nowhere")  # noqa: S104  # an answer to refuse
-    announce(attacker, "nothing")
+    announce(
+        attacker,
+        announcement("escapes", name=evil, contract=b"\x1b[2J", tls=b"1"),
+        announcement("portless", port=0, name=b"portless"),
+        announcement("multicast", address="224.0.0.1", name=b"multicast"),
+        announcement("nowhere", address="0.0.0.0", name=b"nowhere"),  # noqa: S104  # an answer to refuse
+        announcement("nothing"),
+    )
     with Discovery([LOOPBACK]) as discovery:
         wait_until(lambda: len(discovery.robots) >= 1, "one is found", ANNOUNCED_WITHIN_S)
         ended = robotctl("robots", "discover")
@@ -109,7 +116,7 @@ def test_hostile_announcements_are_harmless(attacker: Zeroconf) -> None:
 
 def test_an_announcement_from_the_network_cant_name_this_computer(attacker: Zeroconf) -> None:
     """With addresses of other interfaces, loopback addresses are left out."""
-    announce(attacker, "self", name=b"self")
+    announce(attacker, announcement("self", name=b"self"))
     with Discovery([LOOPBACK]) as discovery:
         discovery._local = False
         wait_until(lambda: "self" in {name.partition(".")[0] for name in discovery._found}, "it is heard", 10)

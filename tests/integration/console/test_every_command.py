@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from console.cli.app import command_line
+from console.client import Backoff, ClientOptions
 from tests.support.free import free_tcp_port
 from tests.support.gateway_double import GatewayDouble, serving
 from tests.support.robotctl import only_line, robotctl
@@ -20,6 +21,8 @@ GROUPS = {"preview": ("on", "off"), "record": RECORDS, "robots": ("add", "remove
 # They ask no robot, or show a window, which has no answer to print.
 WITHOUT_A_ROBOT = {"robots", "login", "logout", "fleet", "practice"}
 WINDOW = {"monitor"}
+ONE_ATTEMPT = ClientOptions(backoff=Backoff(give_up_after_s=0))
+"""The attempts after the first one take 0.7 s: tests/integration/console/test_client.py has them."""
 # Without further words these would not end by themselves.
 WORDS = {
     "reset-stop": ("1",),
@@ -51,7 +54,10 @@ def test_they_are_found() -> None:
 
 
 @pytest.mark.parametrize("words", list(lines()), ids=" ".join)
-def test_without_a_robot_it_ends_3_with_one_line(words: tuple[str, ...]) -> None:
+def test_without_a_robot_it_ends_3_with_one_line(
+    words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("console.client.aio.ClientOptions", lambda: ONE_ATTEMPT)
     target = f"127.0.0.1:{free_tcp_port()}"
     ended = robotctl(*words, "--target", target)
     assert ended.returncode == 3, ended.stderr

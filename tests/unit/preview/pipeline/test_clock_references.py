@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -70,13 +71,23 @@ def listener() -> Listener:
 @pytest.fixture
 def slow(listener: Listener) -> Iterator[ClockReferences]:
     """Between frames that come ten times a second."""
-    made = made_for(listener, 10)
-    yield made
-    made.stop()
+    with made_for(listener, 10) as made:
+        yield made
 
 
-def made_for(listener: Listener, fps: float) -> ClockReferences:
-    return ClockReferences(listener, lambda: listener.frames, fps)
+@contextmanager
+def made_for(listener: Listener, fps: float) -> Iterator[ClockReferences]:
+    """References until the block ends; their thread has ended then, too."""
+    made = ClockReferences(listener, lambda: listener.frames, fps)
+    try:
+        yield made
+    finally:
+        made.stop()
+        wait_until(lambda: not has_thread(), "the thread has ended")
+
+
+def has_thread() -> bool:
+    return any(thread.name == "clock-references" for thread in threading.enumerate())
 
 
 def pass_on(references: ClockReferences, listener: Listener, ticks: int) -> None:
@@ -95,9 +106,12 @@ def test_a_frame_is_followed_by_what_it_needs_and_no_more(slow: ClockReferences,
 
 def test_they_follow_the_newest_frame_and_keep_its_count(slow: ClockReferences, listener: Listener) -> None:
     pass_on(slow, listener, 0)
-    pass_on(slow, listener, 90 * 27_000)
-    wait_until(lambda: len(listener.packets) == 3, "three references")
-    assert listener.ticks == [27_000 * (90 + ms) for ms in (25, 50, 75)]
+    slow.follow(frame(90 * 27_000))
+    # Those of the first frame, where this thread has waited for a processor for so long.
+    before = len(listener.packets)
+    listener.frames += 1
+    wait_until(lambda: len(listener.packets) == before + 3, "three references")
+    assert listener.ticks[before:] == [27_000 * (90 + ms) for ms in (25, 50, 75)]
     # No payload, so the counter stands where the last packet of the frame left it.
     assert {packet[3] for packet in listener.packets} == {0x20 | COUNTER}
     assert {len(packet) for packet in listener.packets} == {188}
@@ -115,50 +129,47 @@ def test_none_comes_before_its_frame(slow: ClockReferences, listener: Listener) 
 
 
 def test_where_frames_come_often_there_is_no_thread(listener: Listener) -> None:
-    threads = threading.active_count()
-    fast = made_for(listener, 30)
-    pass_on(fast, listener, 0)
-    assert threading.active_count() == threads
-    fast.set_rate(15)
-    for number in range(2):
-        pass_on(fast, listener, number * 67 * 27_000)
-    wait_until(lambda: len(listener.packets) == 1, "a reference")
-    fast.set_rate(60)
-    wait_until(lambda: threading.active_count() == threads, "the thread has ended")
-    fast.stop()
+    with made_for(listener, 30) as fast:
+        pass_on(fast, listener, 0)
+        assert not has_thread()
+        fast.set_rate(15)
+        for number in range(2):
+            pass_on(fast, listener, number * 67 * 27_000)
+        wait_until(lambda: len(listener.packets) == 1, "a reference")
+        fast.set_rate(60)
+        wait_until(lambda: not has_thread(), "the thread has ended")
 
 
 def test_a_new_rhythm_begins_with_the_first_two_frames_in_it(listener: Listener) -> None:
-    references = made_for(listener, 30)
-    references.set_rate(10)
-    period = 27_000 * 33
-    for number in range(3):
-        # What was on its way at the old rate: a reference 75 ms later would be ahead of the next one.
-        pass_on(references, listener, number * period)
-    assert not threading.Event().wait(0.1)
-    assert listener.packets == []
-    pass_on(references, listener, 2 * period + 2_700_000)
-    wait_until(lambda: len(listener.packets) == 3, "three references")
-    references.stop()
+    with made_for(listener, 30) as references:
+        references.set_rate(10)
+        period = 27_000 * 33
+        for number in range(3):
+            # What was on its way at the old rate: a reference 75 ms later would be ahead of the next one.
+            pass_on(references, listener, number * period)
+        assert not threading.Event().wait(0.1)
+        assert listener.packets == []
+        pass_on(references, listener, 2 * period + 2_700_000)
+        wait_until(lambda: len(listener.packets) == 3, "three references")
 
 
 def test_a_frame_from_before_a_detour_is_forgotten(listener: Listener) -> None:
-    references = made_for(listener, 10)
-    pass_on(references, listener, 0)
-    references.set_rate(60)
-    pass_on(references, listener, 27_000 * 500)
-    references.set_rate(10)
-    assert not threading.Event().wait(0.1)
-    assert len(listener.packets) <= 1
-    references.stop()
+    with made_for(listener, 10) as references:
+        pass_on(references, listener, 0)
+        references.set_rate(60)
+        # Until then the frame counts: more of them where this thread has waited for a processor.
+        before = len(listener.packets)
+        pass_on(references, listener, 27_000 * 500)
+        references.set_rate(10)
+        assert not threading.Event().wait(0.1)
+        assert len(listener.packets) == before
 
 
 def test_after_stop_nothing_comes_and_the_thread_ends(listener: Listener) -> None:
-    threads = threading.active_count()
-    references = made_for(listener, 10)
+    references = ClockReferences(listener, lambda: listener.frames, 10)
     pass_on(references, listener, 0)
     references.stop()
-    wait_until(lambda: threading.active_count() == threads, "the thread has ended")
+    wait_until(lambda: not has_thread(), "the thread has ended")
     came = len(listener.packets)
     pass_on(references, listener, 0)
     assert len(listener.packets) == came
