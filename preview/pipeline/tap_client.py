@@ -89,6 +89,8 @@ class TapClient:
             )
         except TimeoutError:
             return None
+        except ConnectionError as error:
+            raise TapError("the camera tap has closed the connection") from error
         except OSError as error:
             raise TapError(f"the camera tap can't be read: {error.strerror}") from error
         descriptors = _descriptors(attached)
@@ -99,7 +101,11 @@ class TapClient:
                 os.close(each)
             raise TapError(f"the camera tap sent {error}") from error
         if frame:
-            self._permit()
+            try:
+                self._permit()
+            except TapError:
+                os.close(frame.memory)
+                raise
         return frame
 
     def shut_down(self) -> None:
