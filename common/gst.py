@@ -21,11 +21,13 @@ try:
     import gi
 
     gi.require_version("Gst", "1.0")
+    gi.require_version("GstAllocators", "1.0")
     gi.require_version("GstVideo", "1.0")
     from gi.repository import Gio as _Gio
     from gi.repository import GLib as _GLib
     from gi.repository import GObject as _GObject
     from gi.repository import Gst as _Gst
+    from gi.repository import GstAllocators as _GstAllocators
     from gi.repository import GstVideo as _GstVideo
 except (ImportError, ValueError) as error:
     raise UserError(
@@ -35,6 +37,7 @@ except (ImportError, ValueError) as error:
 
 # gi builds these at run time from typelibs; no stub describes them well enough.
 Gst: Final[Any] = _Gst
+GstAllocators: Final[Any] = _GstAllocators
 GstVideo: Final[Any] = _GstVideo
 GLib: Final[Any] = _GLib
 GObject: Final[Any] = _GObject

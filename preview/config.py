@@ -17,6 +17,7 @@ from pydantic import (
 )
 from pydantic_settings import SettingsConfigDict
 
+from common.camera_tap import MAX_TOPIC_CHARACTERS, is_topic
 from common.config import Section, Settings
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER, Encoder
 from preview.values import Codec, Profile, Target
@@ -76,7 +77,26 @@ class GstSource(AnySource):
     description: str = Field(min_length=1)
 
 
-Source = Annotated[TestSource | V4l2Source | FileSource | GstSource, Field(discriminator="kind")]
+class RosSource(AnySource):
+    """Image topic of the robot's ROS 2 graph, by way of the camera tap (`robot-tap`)."""
+
+    kind: Literal["ros"] = "ros"
+    topic: str = Field(max_length=MAX_TOPIC_CHARACTERS)
+    """Full name of a topic of sensor_msgs/msg/Image or CompressedImage."""
+    fps: int | None = Field(default=None, gt=0, le=MAX_FPS)
+    """What the camera publishes, for the encoder, which shares its bits out by it. None: at least the rate of
+    each profile."""
+
+    @field_validator("topic")
+    @classmethod
+    def _full_name(cls, topic: str) -> str:
+        if not is_topic(topic):
+            raise ValueError(f"'{topic}' is no full name of a topic, such as '/front/image_raw'")
+        return topic
+
+
+AnyKind = TestSource | V4l2Source | FileSource | GstSource | RosSource
+Source = Annotated[AnyKind, Field(discriminator="kind")]
 CameraName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]{0,31}$")]
 
 
@@ -200,6 +220,13 @@ class VideoTapSettings(Section):
     """Lower limit of the adaptive bit rate while a recorder is connected; at most the profile's bit rate."""
 
 
+class CameraTapSettings(Section):
+    """Camera tap: the program that hands over the frames of ROS topics."""
+
+    socket: Path = Path("/run/robot-tap/tap.sock")
+    """Where it serves; used for sources of kind `ros` alone."""
+
+
 class TimeoutSettings(Section):
     """Deadlines in seconds."""
 
@@ -243,6 +270,7 @@ class PreviewSettings(Settings):
     encoders: EncoderSettings = EncoderSettings()
     adaptive: AdaptiveSettings = AdaptiveSettings()
     video_tap: VideoTapSettings = VideoTapSettings()
+    camera_tap: CameraTapSettings = CameraTapSettings()
     timeouts: TimeoutSettings = TimeoutSettings()
     runtime_dir: Path = Field(default_factory=_default_runtime_dir)
     """Directory for the graph of the last failed pipeline, the crash report and the crash marker; made this

@@ -40,6 +40,7 @@ _MODULES = {
     ),
     "bench.video.sixty_fps": ("video.age_60_ms", "video.age_60_delivered_percent"),
     "bench.video.receiver_cpu": ("video.receiver_cpu",),
+    "bench.video.ros_camera": ("video.ros_camera_cpu",),
     "bench.video.age_lossy": tuple(
         f"video.age_{link}{figure}"
         for link in ("lossy", "very_lossy", "far")

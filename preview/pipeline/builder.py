@@ -20,7 +20,7 @@ from typing import Any, Final
 from common.errors import UserError
 from common.gst import GLib, Gst
 from preview.encoders import properties
-from preview.pipeline import capture_clock
+from preview.pipeline import capture_clock, tap_source
 from preview.pipeline.plan import Plan
 
 _TABLES_EVERY: Final = 4500
@@ -32,6 +32,8 @@ SOURCE_END: Final = "source_end"
 """Last element of every source."""
 _SOURCE_CAPS: Final = "source_caps"
 _TRANSPARENT: Final = frozenset({"queue", "queue2", "identity"})
+
+tap_source.register()
 
 
 @dataclass(frozen=True, slots=True)

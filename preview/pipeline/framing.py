@@ -17,7 +17,8 @@ would also reach every new viewer, with continuity counters that the stream does
 brings tables anyway.
 
 Without a listener the frames go to the null device: the elements and what they count stay as they are.
-No Python runs for a frame, except at frame rates that need clock references: the elements count.
+No Python runs for a frame but the first, except at frame rates that need clock references: the
+elements count.
 """
 
 import asyncio
@@ -29,6 +30,7 @@ from typing import Any
 
 from common.gst import Gst
 from preview.pipeline.builder import Parts
+from preview.pipeline.capture_clock import captured_ns
 from preview.pipeline.clock_references import HEAD_PACKETS, ClockReferences
 from preview.pipeline.threads import call_on_loop
 
@@ -54,6 +56,9 @@ class Framing:
         self._pipe_in = parts.pipe_in
         self._pipe_in.set_property("fd", self._write_fd)
         self._begun = False
+        self._first_captured_ns: int | None = None
+        """Capture time of the first frame, from which the muxer counts the times of its buffers."""
+        parts.parser_pad.get_peer().add_probe(Gst.PadProbeType.BUFFER, self._on_first_unit)
         self._references = ClockReferences(self._send_reference, lambda: self.frames, fps)
         self._muxer_pad = parts.muxer_pad
         self._lock = threading.Lock()
@@ -96,9 +101,9 @@ class Framing:
         """Milliseconds since the capture of the newest encoded frame; 0 before the first."""
         newest = self._pipe_in.get_property("last-sample")
         clock = self._pipe_in.get_clock()
-        if newest is None or clock is None:
+        if newest is None or clock is None or self._first_captured_ns is None:
             return 0.0
-        captured_at = self._pipe_in.get_base_time() + newest.get_buffer_list().get(0).pts
+        captured_at = self._first_captured_ns + newest.get_buffer_list().get(0).pts
         age_ms: float = (clock.get_time() - captured_at) / Gst.MSECOND
         return max(0.0, age_ms)
 
@@ -112,6 +117,10 @@ class Framing:
         with self._lock:
             if self._frame_probe is None:
                 self._frame_probe = self._muxer_pad.add_probe(Gst.PadProbeType.BUFFER_LIST, self._on_frame)
+
+    def _on_first_unit(self, pad: Any, info: Any) -> Any:
+        self._first_captured_ns = captured_ns(info.get_buffer(), pad)
+        return Gst.PadProbeReturn.REMOVE
 
     def _on_frame(self, _pad: Any, info: Any) -> Any:
         if not self._begun:

@@ -10,12 +10,26 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from common.errors import UserError
-from preview.config import FileSource, GstSource, PreviewSettings, TestSource, V4l2Source
+from common.start_command import start_command
+from preview.config import (
+    AnyKind,
+    FileSource,
+    GstSource,
+    PreviewSettings,
+    RosSource,
+    TestSource,
+    V4l2Source,
+)
+from preview.pipeline import tap_client
 
+TAP_SOURCE = "cameratapsrc"
+"""Element of preview/pipeline/tap_source.py."""
 CLASS_DIR = Path("/sys/class/video4linux")
 
 _REMEDY_CAMERA = "Check that the camera is connected and that this user may read it (group video)"
 _REMEDY_FILE = "Name a video file that this user may read, under {key}.path"
+_REMEDY_TAP = "Start it: {command}. With containers: docker compose --profile tap up -d"
+_REMEDY_TOPIC = "'robot-tap doctor' lists the image topics and says what is wrong with them"
 _REMEDY_GST = "Try it with gst-launch-1.0, and correct {key}.description"
 
 
@@ -55,19 +69,17 @@ def plan_camera(settings: PreviewSettings, camera: str) -> SourcePlan:
         UserError: the camera can't be used: it is missing, unreadable or of another type.
     """
     source = settings.named_sources[camera]
-    fastest_fps = max(target.fps for target in settings.profiles.targets.values())
     if not settings.cameras:
-        return _plan(camera, "source", source, fastest_fps)
+        return _plan(settings, camera, "source", source)
     try:
-        planned = _plan(camera, f"cameras.{camera}", source, fastest_fps)
+        planned = _plan(settings, camera, f"cameras.{camera}", source)
     except UserError as error:
         raise UserError(f"camera {camera}: {error.what}", error.remedy) from error
     return replace(planned, label=f"camera {camera} ({planned.label.removeprefix('camera ')})")
 
 
-def _plan(
-    camera: str, key: str, source: TestSource | V4l2Source | FileSource | GstSource, fastest_fps: int
-) -> SourcePlan:
+def _plan(settings: PreviewSettings, camera: str, key: str, source: AnyKind) -> SourcePlan:
+    fastest_fps = max(target.fps for target in settings.profiles.targets.values())
     match source:
         case TestSource(pattern=pattern):
             description = f"videotestsrc is-live=true horizontal-speed=4 pattern={pattern}"
@@ -76,6 +88,8 @@ def _plan(
             return _camera(camera, source, fastest_fps)
         case FileSource(path=path):
             return _file(camera, path, _REMEDY_FILE.format(key=key))
+        case RosSource(topic=topic, fps=fps):
+            return _topic(camera, topic, fps or fastest_fps, settings.camera_tap.socket)
         case GstSource(description=description):
             return SourcePlan(camera, f"{key}.description", description, _REMEDY_GST.format(key=key))
 
@@ -117,6 +131,22 @@ def _card_name(entry: Path) -> str:
         return (entry / "name").read_text(encoding="utf-8", errors="replace").strip()
     except OSError:
         return ""  # Unplugged in the meantime.
+
+
+def _topic(camera: str, topic: str, fps: int, socket: Path) -> SourcePlan:
+    if problem := tap_client.connection_problem(socket):
+        command = start_command("robot-tap")
+        raise UserError(
+            f"topic {topic} can't be shown: no camera tap serves {socket} ({problem})",
+            _REMEDY_TAP.format(command=command),
+        )
+    return SourcePlan(
+        camera,
+        f"topic {topic}",
+        f"{TAP_SOURCE} name=tap",
+        _REMEDY_TOPIC,
+        properties={"tap": {"socket": str(socket), "topic": topic, "fps": str(fps)}},
+    )
 
 
 def _file(camera: str, path: Path, remedy: str) -> SourcePlan:

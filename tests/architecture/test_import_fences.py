@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "hub", "console", "simrobot")
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "hub", "console", "simrobot", "tap")
 OURS = ("common", "fleet", *PROGRAMS, "practice")
 
 
@@ -72,7 +72,7 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("fleet/", PROGRAMS),
         *(
             (f"{one}/", ("fleet",))
-            for one in ("common", "gateway", "preview", "drive", "recorder", "simrobot")
+            for one in ("common", "gateway", "preview", "drive", "recorder", "simrobot", "tap")
         ),
         ("fleet/errors.py", ("asyncio", "fleet", *WIRE)),
         ("fleet/identity.py", ("asyncio", "fleet.session", "fleet.connection", *WIRE)),
@@ -175,6 +175,14 @@ WIRE = ("grpc", "google.protobuf", "omniseer.gateway", "omniseer.preview")
         ("preview/tap.py", (*HEAVY, *WIRE, "common.gst", "omniseer", "preview.rpc", "preview.config")),
         ("common/export_connection.py", (*HEAVY, *WIRE, "common", "asyncio", "time", "socket")),
         ("gateway/links/recorder/export_connection.py", (*WIRE, "omniseer")),
+        ("common/camera_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time", "socket")),
+        ("preview/pipeline/tap_client.py", (*HEAVY, *WIRE, "common.gst", "asyncio")),
+        ("tap/", ("gi", "common.gst", "grpc", "google.protobuf", "omniseer")),
+        *(
+            (f"tap/{name}.py", (*HEAVY, "asyncio", "time", "socket", "tap.connection", "tap.camera"))
+            for name in ("refusal", "cdr", "compressed", "image", "capture_time")
+        ),
+        ("tap/config.py", (*HEAVY, "asyncio", "tap")),
         ("common/video_tap.py", (*HEAVY, *WIRE, "common", "asyncio", "time")),
         *(
             (f"drive/{name}.py", (*HEAVY, *WIRE, "omniseer.drive", "drive.config", "drive.base", "time"))
@@ -238,6 +246,7 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
                 "drive/doctor",
                 "recorder/intake/",
                 "simrobot/",
+                "tap/camera.py",
             ),
         ),
         ("gi", ("common/gst.py",)),
@@ -245,7 +254,10 @@ def test_dependencies_point_inward(importer: str, forbidden: tuple[str, ...]) ->
         ("sdl2", ("console/gamepad/sdl.py",)),
         ("mcap", ("recorder/mcap/",)),
         ("sqlite3", ("bridge/outbox/",)),
-        ("prometheus_client", ("common/collector.py", "gateway/metrics/", "hub/", "bridge/")),
+        (
+            "prometheus_client",
+            ("common/collector.py", "gateway/metrics/", "hub/", "bridge/", "tap/metrics.py"),
+        ),
         ("zstandard", ("recorder/mcap/",)),
         ("psutil", ("gateway/platform",)),
         ("nats", ("fleet/session.py",)),

@@ -14,6 +14,7 @@ from hub.cli import app as hub_app
 from preview.cli import app as preview_app
 from recorder.cli import app as recorder_app
 from simrobot.cli import app as simrobot_app
+from tap.cli import app as tap_app
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = {
@@ -22,6 +23,7 @@ PROGRAMS = {
     "robot-drive": drive_app,
     "robot-recorder": recorder_app,
     "robot-bridge": bridge_app,
+    "robot-tap": tap_app,
     "simrobot": simrobot_app,
 }
 FILES = (
@@ -52,6 +54,7 @@ def commands() -> list[Any]:
         for name, service in document["services"].items():
             words = [*service.get("entrypoint", ()), *service.get("command", ())]
             words = words[words.index("--") + 1 :] if words[:1] == ["tini"] else words
+            words = words[3:] if words[:3] == ["python", "-m", "common.guard"] else words
             if words:
                 found.append(pytest.param(words, id=f"{file} {name}"))
     return found

@@ -13,6 +13,7 @@ from drive.config import DriveSettings
 from gateway.config import GatewaySettings
 from preview.config import PreviewSettings
 from recorder.config import RecorderSettings
+from tap.config import TapSettings
 
 PAGE = (Path(__file__).parents[2] / "docs/configuration.md").read_text(encoding="utf-8")
 PROFILE = re.compile(r"^profiles\.(low-bw|balanced|high-quality)\.")
@@ -44,6 +45,7 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
         (DriveSettings, "## Drive program"),
         (RecorderSettings, "## Recorder"),
         (BridgeSettings, "## Bridge"),
+        (TapSettings, "## Camera tap"),
     ],
 )
 def test_the_page_lists_exactly_the_keys(settings: type[BaseModel], heading: str) -> None:

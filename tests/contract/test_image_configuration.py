@@ -11,6 +11,7 @@ from drive.cli import app as drive_app
 from gateway.cli import app as gateway_app
 from preview.cli import app as preview_app
 from recorder.cli import app as recorder_app
+from tap.cli import app as tap_app
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,6 +36,7 @@ def test_the_variables_name_the_file(tmp_path: Path) -> None:
         (drive_app, "ROBOT_DRIVE_CONFIG"),
         (recorder_app, "ROBOT_RECORDER_CONFIG"),
         (bridge_app, "ROBOT_BRIDGE_CONFIG"),
+        (tap_app, "ROBOT_TAP_CONFIG"),
     ):
         shown = CliRunner().invoke(app, ["check", "--print"], env={variable: str(file)})
         assert shown.exit_code == 0, shown.output

@@ -11,7 +11,7 @@ import yaml
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy/robot"
-PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge")
+PROGRAMS = ("gateway", "preview", "drive", "recorder", "bridge", "tap")
 MOST_EXPOSED = 2.5
 """Of 10, by systemd-analyze security: what may be exposed to whoever takes over a program."""
 OWN_SECTION = {
@@ -20,6 +20,7 @@ OWN_SECTION = {
     "drive": ["SystemCallFilter=sched_setscheduler"],
     "recorder": ["UMask=0027", "SystemCallFilter=setpriority ioprio_set sched_setscheduler"],
     "bridge": [],
+    "tap": ["SystemCallFilter=sched_setscheduler"],
 }
 """Beyond the hardening of all: priorities, and recordings that a group may read."""
 
@@ -124,7 +125,7 @@ def default_of(value: object) -> str:
     return re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", str(value))
 
 
-@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder"])
+@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder", "tap"])
 def test_its_bounds_are_those_of_the_container(program: str) -> None:
     unit, container = settings(program), compose(program)
     assert unit["MemoryMax"] == [default_of(container["mem_limit"]).upper()]
@@ -138,7 +139,7 @@ def test_its_bounds_are_those_of_the_container(program: str) -> None:
         assert unit["OOMScoreAdjust"] == [str(container["oom_score_adj"])]
 
 
-@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder"])
+@pytest.mark.parametrize("program", ["gateway", "preview", "drive", "recorder", "tap"])
 def test_paths_and_sockets_are_those_of_the_container(program: str) -> None:
     file = "preview" if program == "preview" else "gateway"
     dockerfile = (ROOT / f"docker/{file}.Dockerfile").read_text(encoding="utf-8")
@@ -181,10 +182,11 @@ def test_what_is_installed_first_is_accepted_by_the_program(program: str, tmp_pa
     assert (checked.returncode, checked.stderr) == (0, "")
 
 
-def test_the_gateway_may_connect_to_the_sockets_of_all_others() -> None:
+def test_the_gateway_may_connect_to_the_sockets_of_all_that_serve_it() -> None:
     accounts = (DEPLOY / "sysusers.conf").read_text(encoding="utf-8")
     members = set(re.findall(r"^m robot-gateway (\S+)$", accounts, re.MULTILINE))
-    assert members == {f"robot-{program}" for program in PROGRAMS if program != "gateway"}
+    assert members == {f"robot-{program}" for program in PROGRAMS if program not in {"gateway", "tap"}}
+    assert re.search(r"^m robot-preview robot-tap$", accounts, re.MULTILINE)
 
 
 def test_the_list_of_packages_has_what_the_installer_looks_for() -> None:

@@ -40,7 +40,7 @@ def test_every_service_is_hardened_and_bounded_in_every_overlay(overlay: str) ->
         assert "no-new-privileges:true" in service["security_opt"], name
         assert not service.get("privileged"), name
         assert "cap_add" not in service, name
-    for name in ("gateway", "preview", "drive", "recorder", "bridge"):
+    for name in ("gateway", "preview", "drive", "recorder", "tap", "bridge"):
         assert services[name]["restart"] == "unless-stopped"
         assert services[name]["logging"]["options"] == {"max-size": "10m", "max-file": "3"}
         assert int(services[name]["mem_limit"]) <= 512 << 20
@@ -51,6 +51,18 @@ def test_real_time_priority_and_locked_memory_take_no_privilege() -> None:
     drive = config("realtime", profile="drive")["services"]["drive"]
     assert drive["ulimits"] == {"rtprio": 20, "memlock": -1}
     assert drive["oom_score_adj"] < 0
+
+
+def test_the_camera_tap_is_off_unless_its_profile_is_asked_for() -> None:
+    assert not {"tap", "tap-config"} & config()["services"].keys()
+    services = config(profile="tap")["services"]
+    tap, preview = services["tap"], services["preview"]
+    assert tap["image"] == services["gateway"]["image"]
+    assert tap["user"].partition(":")[2] == "10000", "the group of the preview"
+    assert (tap["network_mode"], tap["ipc"]) == ("host", "host")
+    assert tap["environment"]["TAP__SOCKET"] == preview["environment"]["PREVIEW__CAMERA_TAP__SOCKET"]
+    link = next(each for each in preview["volumes"] if each["source"] == "tap-link")
+    assert link["read_only"]
 
 
 def test_driving_is_off_unless_its_profile_is_asked_for() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from common.config import as_yaml, load
 from common.errors import UserError
-from preview.config import PreviewSettings, TestSource, V4l2Source
+from preview.config import PreviewSettings, RosSource, TestSource, V4l2Source
 from preview.encoders.catalogue import CATALOGUE, DEFAULT_ORDER
 from preview.values import Codec, Profile
 
@@ -128,3 +128,11 @@ def test_cameras_have_names_and_an_order(tmp_path: Path, monkeypatch: pytest.Mon
 def test_cameras_that_contradict_themselves_are_refused(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(UserError, match=words):
         from_text(tmp_path, text)
+
+
+def test_a_topic_is_a_source_by_its_full_name(tmp_path: Path) -> None:
+    settings = from_text(tmp_path, "cameras: {arm: {kind: ros, topic: /arm/image_raw}}")
+    assert settings.cameras["arm"] == RosSource(topic="/arm/image_raw")
+    for wrong in ("image_raw", "/", "/arm/", "/arm image", "~/image"):
+        with pytest.raises(UserError, match="no full name of a topic"):
+            from_text(tmp_path, f"source: {{kind: ros, topic: '{wrong}'}}")

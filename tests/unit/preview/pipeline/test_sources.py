@@ -1,11 +1,21 @@
 """Sources as plans: what is checked before GStreamer is asked."""
 
+import socket
 from pathlib import Path
 
 import pytest
 
 from common.errors import UserError
-from preview.config import FileSource, GstSource, PreviewSettings, Source, TestSource, V4l2Source
+from preview.config import (
+    CameraTapSettings,
+    FileSource,
+    GstSource,
+    PreviewSettings,
+    RosSource,
+    Source,
+    TestSource,
+    V4l2Source,
+)
 from preview.pipeline import sources
 from preview.pipeline.sources import SourcePlan
 
@@ -61,3 +71,24 @@ def test_a_film_that_can_not_be_played_is_named(tmp_path: Path, content: bytes |
         planned(FileSource(path=film))
     with pytest.raises(UserError, match="Is a directory"):
         planned(FileSource(path=tmp_path))
+
+
+def test_a_topic_goes_by_way_of_the_camera_tap_which_must_be_there(tmp_path: Path) -> None:
+    path = tmp_path / "tap.sock"
+    settings = PreviewSettings(
+        cameras={"arm": RosSource(topic="/arm/image_raw", fps=15), "top": RosSource(topic="/top")},
+        camera_tap=CameraTapSettings(socket=path),
+    )
+    with pytest.raises(
+        UserError, match=r"camera arm: topic /arm/image_raw .* not running\). Start it: robot-tap"
+    ):
+        sources.plan_camera(settings, "arm")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        plan = sources.plan_camera(settings, "arm")
+        assert plan.label == "camera arm (topic /arm/image_raw)"
+        assert plan.properties["tap"] == {"socket": str(path), "topic": "/arm/image_raw", "fps": "15"}
+        assert sources.plan_camera(settings, "top").properties["tap"]["fps"] == "60"
+    with pytest.raises(UserError, match="not running"):
+        sources.plan_camera(settings, "arm")

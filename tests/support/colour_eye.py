@@ -1,0 +1,79 @@
+"""A viewer that knows the colour of what it sees, and connects again when it must."""
+
+import threading
+import time
+from typing import Self
+
+from console.receiver.address import StreamAddress
+from console.receiver.errors import StreamError
+from console.receiver.frame import Frame
+from tests.support.receiver import NoFrameError, Receiver
+from tests.support.waiting import wait_until
+
+# Chroma of a plain colour, Cb and Cr (ITU-R BT.601).
+CHROMA = {"red": (90, 240), "green": (54, 34), "blue": (240, 110)}
+_RETRY_S = 0.1
+
+
+def colour(frame: Frame) -> str:
+    """The plain colour of a frame; "mixed" for anything else."""
+    pixels = frame.read()
+    luma, size = frame.stride * frame.height, frame.stride // 2 * (frame.height // 2)
+    middle = frame.stride // 2 * (frame.height // 4) + frame.width // 4
+    cb, cr = pixels[luma + middle], pixels[luma + size + middle]
+    near = [name for name, (b, r) in CHROMA.items() if abs(b - cb) < 25 and abs(r - cr) < 25]
+    return near[0] if near else "mixed"
+
+
+class Eye:
+    """Watches a stream on this machine until its block ends.
+
+    Attributes:
+        seen: when each frame came, and of which colour it was.
+        corrupt: frames that were not whole.
+        reconnects: how often it had to connect again.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.seen: list[tuple[float, str]] = []
+        self.corrupt = self.reconnects = 0
+        self._address = StreamAddress("127.0.0.1", port, latency_ms=20)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="eye")
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._over.set()
+        self._thread.join(10)
+
+    def sees(self, name: str, within_s: float = 20) -> float:
+        """Waits for frames of a colour from now on; returns when the first one came."""
+        begin = len(self.seen)
+        wait_until(lambda: name in [each for _, each in self.seen[begin:]], f"{name} is seen", within_s)
+        return next(at for at, each in self.seen[begin:] if each == name)
+
+    def more_frames(self, count: int) -> None:
+        """Waits for so many more."""
+        expected = len(self.seen) + count
+        wait_until(lambda: len(self.seen) >= expected, f"{count} more frames", 20)
+
+    def _watch(self) -> None:
+        while not self._over.is_set():
+            try:
+                with Receiver(self._address, queue_size=30) as receiver:
+                    self._take(receiver)
+            except StreamError:
+                self.reconnects += 1
+                self._over.wait(_RETRY_S)
+
+    def _take(self, receiver: Receiver) -> None:
+        while not self._over.is_set():
+            try:
+                frame = receiver.next_frame(timeout_s=0.2)
+            except NoFrameError:
+                continue
+            self.corrupt += frame.corrupt
+            self.seen.append((time.monotonic(), colour(frame)))

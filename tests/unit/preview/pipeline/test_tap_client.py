@@ -1,0 +1,136 @@
+"""The preview's end of the camera tap: frames, problems, and a tap that is broken or hostile."""
+
+import fcntl
+import os
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from common.camera_tap import READY, Header, Kind, encode_text, encode_watch
+from preview.pipeline.tap_client import TapClient, TapError, connection_problem
+
+FRAME = Header(Kind.FRAME, 4, 2, 24, 123, "RGB")
+PATIENCE_S = 5.0
+
+
+@contextmanager
+def listening(path: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        yield listener
+
+
+@pytest.fixture
+def ends(tmp_path: Path) -> Iterator[tuple[TapClient, socket.socket]]:
+    """The client, and the tap's end of its connection."""
+    with listening(tmp_path / "tap") as listener:
+        client = TapClient(tmp_path / "tap", "/image")
+        tap, _ = listener.accept()
+        with tap:
+            tap.settimeout(PATIENCE_S)
+            assert tap.recv(1000) == encode_watch("/image")
+            assert tap.recv(1000) == READY
+            yield client, tap
+        client.close()
+
+
+def memory(size: int = 24, seals: int = fcntl.F_SEAL_SHRINK) -> int:
+    descriptor = os.memfd_create("frame", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.write(descriptor, bytes(range(size)))
+    fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, seals)
+    return descriptor
+
+
+def regular_file() -> int:
+    return os.open(__file__, os.O_RDONLY)
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def send(tap: socket.socket, packet: bytes, *attached: int) -> None:
+    socket.send_fds(tap, [packet], attached)
+    for each in attached:
+        os.close(each)
+
+
+def test_a_frame_is_received_and_the_next_one_permitted(ends: tuple[TapClient, socket.socket]) -> None:
+    client, tap = ends
+    send(tap, FRAME.encode(), memory())
+    frame = client.receive(PATIENCE_S)
+    assert frame
+    assert frame.header == FRAME
+    assert os.pread(frame.memory, 24, 0) == bytes(range(24))
+    assert not os.get_inheritable(frame.memory)
+    os.close(frame.memory)
+    assert tap.recv(100) == READY
+
+
+def test_a_problem_is_kept_until_it_is_over(ends: tuple[TapClient, socket.socket]) -> None:
+    client, tap = ends
+    tap.send(encode_text(Kind.PROBLEM, "nothing publishes /image"))
+    assert client.receive(PATIENCE_S) is None
+    assert client.problem == "nothing publishes /image"
+    tap.send(encode_text(Kind.PROBLEM, ""))
+    assert client.receive(PATIENCE_S) is None
+    assert client.problem == ""
+
+
+def test_silence_is_no_error(ends: tuple[TapClient, socket.socket]) -> None:
+    client, _ = ends
+    assert client.receive(0.01) is None
+
+
+def test_the_end_of_the_tap_is_one(ends: tuple[TapClient, socket.socket]) -> None:
+    client, tap = ends
+    tap.close()
+    with pytest.raises(TapError, match="closed the connection"):
+        client.receive(PATIENCE_S)
+
+
+@pytest.mark.parametrize(
+    ("packet", "attach", "words"),
+    [
+        (b"nonsense", None, "a packet of 8 bytes"),
+        (b"nonsense", memory, "a packet of 8 bytes"),
+        (FRAME.encode(), None, "0 descriptors"),
+        (FRAME.encode(), regular_file, "not in a memfd"),
+        (FRAME.encode(), lambda: memory(seals=0), "may shrink"),
+        (FRAME.encode(), lambda: memory(size=23), "24 bytes in memory of 23"),
+        (encode_text(Kind.PROBLEM, "x"), memory, "descriptor without a frame"),
+    ],
+)
+def test_a_hostile_tap_costs_its_connection_and_no_descriptor(
+    ends: tuple[TapClient, socket.socket], packet: bytes, attach: Callable[[], int] | None, words: str
+) -> None:
+    client, tap = ends
+    before = descriptors()
+    send(tap, packet, *([attach()] if attach else []))
+    with pytest.raises(TapError, match=words):
+        client.receive(PATIENCE_S)
+    assert descriptors() == before
+
+
+def test_more_descriptors_than_one_are_not_kept(ends: tuple[TapClient, socket.socket]) -> None:
+    client, tap = ends
+    before = descriptors()
+    send(tap, FRAME.encode(), memory(), memory(), memory())
+    frame = client.receive(PATIENCE_S)
+    assert frame
+    os.close(frame.memory)
+    assert descriptors() == before
+
+
+def test_where_no_tap_serves_it_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "tap"
+    assert connection_problem(path) == "it is not running"
+    with listening(path):
+        assert connection_problem(path) == ""
+    assert connection_problem(path) == "it is not running", "a socket that was left behind"
+    with pytest.raises(TapError, match="not running"):
+        TapClient(path, "/image")
