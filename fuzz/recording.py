@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any, Final
 
 import zstandard
@@ -138,7 +139,7 @@ def _check_item(item: object, payload: bytes) -> None:
 
 
 async def _exported(servicer: RecorderServicer, request: pb.ExportRecordingRequest) -> bytes:
-    context: Any = None
+    context: Any = SimpleNamespace(invocation_metadata=tuple)  # without a connection for the chunks
     parts = servicer.ExportRecording(request, context)
     return b"".join([each.chunk.data async for each in parts])
 
