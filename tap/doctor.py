@@ -5,7 +5,7 @@ large its pictures are, and whether its stamps are capture times.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 DISCOVERY_S: Final = 3.0
 _MESSAGE_WITHIN_S: Final = 2.0
+_DISCOVERIES: Final = 5
 _MAX_TOPICS: Final = 32
 _NO_SHOW: Final = "A camera of the preview with this topic fails"
 
@@ -73,9 +74,12 @@ def _graph() -> Iterator[Finding]:
     from tap.camera import Camera, Graph  # noqa: PLC0415
 
     with ros_node("robot_tap_doctor") as node:
-        time.sleep(DISCOVERY_S)  # Polled as well, an empty graph would take all of it.
-        found = sorted(
-            name for name, types in node.get_topic_names_and_types() if any(each in READERS for each in types)
+        found = _discovered(
+            lambda: sorted(
+                name
+                for name, types in node.get_topic_names_and_types()
+                if any(each in READERS for each in types)
+            )
         )
         if not found:
             yield note(
@@ -92,6 +96,17 @@ def _graph() -> Iterator[Finding]:
                 yield _look(camera, topic)
             finally:
                 camera.close()
+
+
+def _discovered(topics: Callable[[], list[str]]) -> list[str]:
+    """Returns the topics once no further one has come for DISCOVERY_S, waiting _DISCOVERIES times at most."""
+    found: list[str] = []
+    for _ in range(_DISCOVERIES):
+        time.sleep(DISCOVERY_S)  # Polled as well, an empty graph would take all of it.
+        before, found = found, topics()
+        if found == before:
+            break
+    return found
 
 
 def _look(camera: "Camera", topic: str) -> Finding:
