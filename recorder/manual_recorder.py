@@ -90,11 +90,11 @@ class ManualRecorder:
         try:
             folder = await asyncio.to_thread(self._catalogue.create, manifest)
             output = Output(self._shape(folder, manifest), self._writer.head, closed)
-            self._outputs.recording = output
             await asyncio.wrap_future(self._writer.add(output))
         except OSError as error:
             await self.fail(error)
             return
+        self._outputs.recording = output
         self._life.move(Event.OPENED)
         await self.keep(manifest.model_copy(update={"state": RecordingState.RECORDING}))
         _log.info("recording %s (%s)", manifest.id, manifest.preset)

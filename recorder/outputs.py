@@ -22,7 +22,7 @@ class Sources(Protocol):
 
 
 class Outputs:
-    """The outputs of the writer, and their rate. The sources take what is written, and nothing else.
+    """The outputs that the writer has open, and their rate. The sources take their topics, and nothing else.
 
     Args:
         sources: of the messages.

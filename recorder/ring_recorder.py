@@ -128,8 +128,8 @@ class RingRecorder:
         for segment in await asyncio.to_thread(self._ring.recover):
             await self._link(segment)
         output = Output(self.shape(), self._writer.head, closed)
-        self._outputs.ring = output
         await asyncio.wrap_future(self._writer.add(output))
+        self._outputs.ring = output
 
     async def close(self) -> None:
         """Makes the last segment final."""

@@ -1,5 +1,6 @@
 """A recording from start to stop, on a real disk, with messages of the test's own."""
 
+import threading
 import time
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from common.errors import InvalidRequestError, NotFoundError, PreconditionError
 from recorder.lifecycle import State
 from recorder.requests import SnapshotOptions, StartOptions
 from recorder.store.manifest import Kind, RecordingState, StopReason
+from recorder.writing.output import Output
 from tests.support.recorder_in_process import Source, channel, numbers, running_recorder
 
 
@@ -90,6 +92,25 @@ async def test_a_clock_that_steps_begins_a_segment(tmp_path: Path) -> None:
         assert done
         assert [segment.messages for segment in done.segments] == [10, 10, 10]
         assert running.readings.live(done).duration_ms < 60_000
+
+
+async def test_the_ring_is_written_and_its_topics_are_taken_only_once_it_is_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What came between would reach the writer before its output, and be in no segment."""
+    released, opens = threading.Event(), Output.open
+
+    def slow(output: Output) -> None:
+        released.wait(10)
+        opens(output)
+
+    monkeypatch.setattr(Output, "open", slow)
+    async with running_recorder(tmp_path, ring={"preset": "all"}) as running:
+        assert not running.readings.writes
+        assert not running.sources.presets
+        released.set()
+        await running.until(lambda: running.readings.writes)
+        assert running.sources.presets == {"all"}
 
 
 async def test_overlapping_snapshots_share_what_is_on_the_disk(tmp_path: Path) -> None:
