@@ -10,10 +10,10 @@ from typer.main import get_command
 
 from bridge.config import BridgeSettings
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption, check_settings
 from common.command_line import read_plainly
 from common.errors import ExitCode, UserError
 from common.findings import end_with_findings
+from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -21,20 +21,12 @@ app = typer.Typer(
     help="Connects the robot with its fleet, and sets up the fleet's hub.",
 )
 
-_Config = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        envvar="ROBOT_BRIDGE_CONFIG",
-        help="YAML file; default: built-in values and BRIDGE__... variables.",
-    ),
-]
+_Config = Annotated[Path | None, config_option("bridge")]
 _PASSED_ON: Final[dict[str, Any]] = {
     "allow_extra_args": True,
     "ignore_unknown_options": True,
     "help_option_names": [],
 }
-_AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 
 
 @app.command()
@@ -61,7 +53,7 @@ def check(config_file: _Config = None, in_effect: PrintOption = False, schema: S
 
 
 @app.command()
-def doctor(config_file: _Config = None, as_json: _AsJson = False) -> None:
+def doctor(config_file: _Config = None, as_json: JsonOption = False) -> None:
     """Finds out what keeps this robot from its fleet; exits 1 if something is wrong."""
     from bridge.doctor.examination import examine  # noqa: PLC0415
 

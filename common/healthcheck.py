@@ -46,19 +46,32 @@ class SocketSettings(Protocol):
 def check_program(
     load_settings: Callable[[Path | None], SocketSettings], variable: str, service: str = ""
 ) -> NoReturn:
-    """Checks the program of a configuration, and exits.
+    """Checks the gRPC server of a configured program, and exits.
 
     Args:
         load_settings: reads the file; raises a `UserError`.
         variable: of the environment; names the file. Unset or empty: there is none.
         service: as of `state_of`.
     """
-    named = os.environ.get(variable)
+    socket = _configured_socket(load_settings, variable)
+    _exit(str(socket), state_of(f"unix:{socket}", service))
+
+
+def check_state(
+    load_settings: Callable[[Path | None], SocketSettings], variable: str, state: Callable[[Path], str]
+) -> None:
+    """Checks a configured program that serves another protocol, and exits unless it reports its state.
+
+    Args:
+        load_settings: reads the file; raises a `UserError`.
+        variable: of the environment; names the file. Unset or empty: there is none.
+        state: asks the program at this socket, and returns its state in a word; raises a `UserError`.
+    """
+    socket = _configured_socket(load_settings, variable)
     try:
-        settings = load_settings(Path(named) if named else None)
+        print(f"{socket}: {state(socket)}")
     except UserError as error:
         raise SystemExit(str(error)) from error
-    _exit(str(settings.socket), state_of(f"unix:{settings.socket}", service))
 
 
 def main() -> None:
@@ -68,6 +81,14 @@ def main() -> None:
         raise SystemExit("error: no target. Name one, 127.0.0.1:50051 for example, or set HEALTH_TARGET")
     service = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("HEALTH_SERVICE", "")
     _exit(target, state_of(target, service))
+
+
+def _configured_socket(load_settings: Callable[[Path | None], SocketSettings], variable: str) -> Path:
+    named = os.environ.get(variable)
+    try:
+        return load_settings(Path(named) if named else None).socket
+    except UserError as error:
+        raise SystemExit(str(error)) from error
 
 
 def _exit(where: str, state: str) -> NoReturn:

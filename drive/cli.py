@@ -7,21 +7,14 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption, check_settings
 from common.findings import end_with_findings
+from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 from drive.config import DriveSettings
 from drive.log_thread import log_in_thread
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Moves the robot for an operator.")
 
-_Config = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        envvar="ROBOT_DRIVE_CONFIG",
-        help="YAML file; default: built-in values and DRIVE__... variables.",
-    ),
-]
+_Config = Annotated[Path | None, config_option("drive")]
 
 # ROS 2 is imported late: without it, checking the configuration still works.
 
@@ -59,7 +52,7 @@ def doctor(
             "--pulse", help="Move the robot forward, by up to 20 cm, to see whether and how it stops."
         ),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Finds out what keeps this robot from being driven, and what stops it; exits 1 if something is wrong."""
     from drive.doctor.examination import examine  # noqa: PLC0415

@@ -4,11 +4,11 @@
 latched stop) is no reason to be unhealthy: a restart would mend none of it.
 """
 
-import os
+from functools import partial
 from pathlib import Path
 
 from common.config import load
-from common.errors import UserError
+from common.healthcheck import check_state
 from drive.client import observed_state
 from drive.config import DriveSettings
 from omniseer.drive.v1 import drive_pb2 as pb
@@ -16,13 +16,11 @@ from omniseer.drive.v1 import drive_pb2 as pb
 
 def main() -> None:
     """Runs the check and exits."""
-    named = os.environ.get("ROBOT_DRIVE_CONFIG")
-    try:
-        settings = load(DriveSettings, Path(named) if named else None)
-        state = observed_state(settings.socket)
-    except UserError as error:
-        raise SystemExit(str(error)) from error
-    print(f"{settings.socket}: {pb.Phase.Name(state.phase).removeprefix('PHASE_').lower()}")
+    check_state(partial(load, DriveSettings), "ROBOT_DRIVE_CONFIG", _phase)
+
+
+def _phase(socket: Path) -> str:
+    return pb.Phase.Name(observed_state(socket).phase).removeprefix("PHASE_").lower()
 
 
 if __name__ == "__main__":

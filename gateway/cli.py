@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from common import logs
-from common.check_options import PrintOption, SchemaOption
 from common.config import SettingsConflictError, as_yaml, json_schema
 from common.errors import UserError
 from common.program import bound_arenas, run, run_command_line
+from common.program_options import PrintOption, SchemaOption
 from gateway.config import CONFIG_VARIABLE, GatewaySettings, load_settings
 from gateway.credentials_cli import app as credentials_app
 

@@ -10,19 +10,12 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption, check_settings
+from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 from preview.config import PreviewSettings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Serves the robot's live video.")
 
-_Config = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        envvar="ROBOT_PREVIEW_CONFIG",
-        help="YAML file; default: built-in values and PREVIEW__... variables.",
-    ),
-]
+_Config = Annotated[Path | None, config_option("preview")]
 
 # GStreamer is imported late: without it, checking the configuration still works.
 
@@ -47,7 +40,7 @@ def check(config_file: _Config = None, in_effect: PrintOption = False, schema: S
 @app.command()
 def encoders(
     config_file: _Config = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Tries every encoder and lists the results."""
     settings = _load(config_file)

@@ -8,22 +8,14 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption, check_settings
 from common.errors import ExitCode
 from common.findings import end_with_findings
+from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 from recorder.config import RecorderSettings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help="Records the robot's topics and video.")
 
-_Config = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        envvar="ROBOT_RECORDER_CONFIG",
-        help="YAML file; default: built-in values and RECORDER__... variables.",
-    ),
-]
-_AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+_Config = Annotated[Path | None, config_option("recorder")]
 
 # ROS 2 is imported late: without it, checking the configuration and recovering a disk still work.
 
@@ -47,7 +39,7 @@ def check(config_file: _Config = None, in_effect: PrintOption = False, schema: S
 @app.command()
 def recover(
     directory: Annotated[Path, typer.Argument(help="A folder of recordings, one recording, or one file.")],
-    as_json: _AsJson = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Makes recordings of a disk whole that were cut off. Needs no configuration and no running recorder."""
     logs.configure("warning")
@@ -66,7 +58,7 @@ def recover(
 
 
 @app.command()
-def doctor(config_file: _Config = None, as_json: _AsJson = False) -> None:
+def doctor(config_file: _Config = None, as_json: JsonOption = False) -> None:
     """Finds out what keeps this robot from recording; exits 1 if something is wrong."""
     from recorder.doctor.examination import examine  # noqa: PLC0415
 

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from common import config, logs, program
-from common.check_options import PrintOption, SchemaOption, check_settings
 from common.findings import end_with_findings
+from common.program_options import JsonOption, PrintOption, SchemaOption, check_settings, config_option
 from tap.config import TapSettings
 
 app = typer.Typer(
@@ -17,14 +17,7 @@ app = typer.Typer(
     help="Hands the frames of ROS image topics to the preview.",
 )
 
-_Config = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        envvar="ROBOT_TAP_CONFIG",
-        help="YAML file; default: built-in values and TAP__... variables.",
-    ),
-]
+_Config = Annotated[Path | None, config_option("tap")]
 
 # ROS 2 is imported late: without it, checking the configuration still works.
 
@@ -49,7 +42,7 @@ def check(config_file: _Config = None, in_effect: PrintOption = False, schema: S
 @app.command()
 def doctor(
     config_file: _Config = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Finds out which image topics there are and what is wrong with them; exits 1 if something is."""
     from tap.doctor import examine  # noqa: PLC0415

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from common.config import load
+from common.config_finding import checked_settings
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from common.receive_time import present_instant
+from common.ros_transport_findings import transport_finding
 from tap.capture_time import CaptureTimes
 from tap.client import observed_state
 from tap.config import TapSettings
@@ -35,12 +36,9 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
     Args:
         config_file: of the program.
     """
-    try:
-        settings = load(TapSettings, config_file)
-    except UserError as error:
-        yield wrong("config", error.what, "robot-tap does not start", error.remedy)
+    settings = yield from checked_settings(TapSettings, config_file, "robot-tap")
+    if settings is None:
         return
-    yield good("config", f"{config_file or 'the environment'}: ok")
     try:
         yield from program_findings(observed_state(settings.socket))
     except UserError as error:
@@ -70,9 +68,10 @@ def program_findings(state: dict[str, object]) -> Iterator[Finding]:
 
 def _graph() -> Iterator[Finding]:
     # Late: without ROS 2 the rest is still examined.
-    from common.ros_node import ros_node  # noqa: PLC0415
+    from common.ros_node import middleware_name, ros_node  # noqa: PLC0415
     from tap.camera import Camera, Graph  # noqa: PLC0415
 
+    yield from transport_finding(middleware_name())
     with ros_node("robot_tap_doctor") as node:
         found = _discovered(
             lambda: sorted(

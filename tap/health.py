@@ -4,24 +4,22 @@
 reason to be unhealthy: a restart would not mend it.
 """
 
-import os
+from functools import partial
 from pathlib import Path
 
 from common.config import load
-from common.errors import UserError
+from common.healthcheck import check_state
 from tap.client import observed_state
 from tap.config import TapSettings
 
 
 def main() -> None:
     """Runs the check and exits."""
-    named = os.environ.get("ROBOT_TAP_CONFIG")
-    try:
-        settings = load(TapSettings, Path(named) if named else None)
-        state = observed_state(settings.socket)
-    except UserError as error:
-        raise SystemExit(str(error)) from error
-    print(f"{settings.socket}: {len(state.get('wanted', ()))} cameras wanted")
+    check_state(partial(load, TapSettings), "ROBOT_TAP_CONFIG", _cameras)
+
+
+def _cameras(socket: Path) -> str:
+    return f"{len(observed_state(socket).get('wanted', ()))} cameras wanted"
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from bridge.config import BridgeSettings
 from bridge.doctor.judgement import folder_findings, program_findings, settings_findings
 from bridge.robot.gateway import credentials, remedy
 from bridge.rpc.client import newest_state
-from common.config import load
+from common.config_finding import checked_settings
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from common.start_command import start_command
@@ -24,12 +24,9 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
     Args:
         config_file: of the program.
     """
-    try:
-        settings = load(BridgeSettings, config_file)
-    except UserError as error:
-        yield wrong("config", error.what, "robot-bridge does not start", error.remedy)
+    settings = yield from checked_settings(BridgeSettings, config_file, "robot-bridge")
+    if settings is None:
         return
-    yield good("config", f"{config_file or 'the environment'}: ok")
     yield from _files(settings)
     yield from settings_findings(settings)
     existing = next(each for each in (settings.root, *settings.root.parents) if each.exists())

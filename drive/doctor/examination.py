@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from common.config import load
+from common.config_finding import checked_settings
 from common.errors import UserError
-from common.findings import Finding, good, note, wrong
+from common.findings import Finding, note, wrong
+from common.ros_transport_findings import transport_finding
 from drive.client import observed_state
 from drive.config import DriveSettings
 from drive.doctor.judgement import graph_findings, program_findings, pulse_findings
@@ -20,12 +21,9 @@ def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:
         config_file: of the program.
         with_pulse: whether the robot may be moved, forward by a few centimetres.
     """
-    try:
-        settings = load(DriveSettings, config_file)
-    except UserError as error:
-        yield wrong("config", error.what, "robot-drive does not start", error.remedy)
+    settings = yield from checked_settings(DriveSettings, config_file, "robot-drive")
+    if settings is None:
         return
-    yield good("config", f"{config_file or 'the environment'}: ok")
     state = None
     try:
         state = observed_state(settings.socket)
@@ -40,9 +38,10 @@ def examine(config_file: Path | None, *, with_pulse: bool) -> Iterator[Finding]:
 
 def _graph(settings: DriveSettings, state: pb.ActualState | None, *, with_pulse: bool) -> Iterator[Finding]:
     # Late: without ROS 2 the rest is still examined.
-    from common.ros_node import ros_node  # noqa: PLC0415
+    from common.ros_node import middleware_name, ros_node  # noqa: PLC0415
     from drive.doctor.graph import look, pulse  # noqa: PLC0415
 
+    yield from transport_finding(middleware_name())
     with ros_node("robot_drive_doctor") as node:
         yield from graph_findings(look(node, settings))
         if not with_pulse:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import grpc
 
-from common.config import load
+from common.config_finding import checked_settings
 from common.errors import UserError
 from common.findings import Finding, good, note, wrong
 from common.ros_transport_findings import transport_finding
@@ -23,12 +23,9 @@ def examine(config_file: Path | None) -> Iterator[Finding]:
     Args:
         config_file: of the program.
     """
-    try:
-        settings = load(RecorderSettings, config_file)
-    except UserError as error:
-        yield wrong("config", error.what, "robot-recorder does not start", error.remedy)
+    settings = yield from checked_settings(RecorderSettings, config_file, "robot-recorder")
+    if settings is None:
         return
-    yield good("config", f"{config_file or 'the environment'}: ok")
     yield from _folder(settings)
     try:
         yield from program_findings(newest_state(settings.socket))

@@ -1,7 +1,7 @@
-"""The command `check`: its options, and what it does in a program whose settings are all that it checks."""
+"""What the command lines of the programs on the robot share: options, and the command `check`."""
 
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import typer
 
@@ -13,6 +13,17 @@ PrintOption: TypeAlias = Annotated[
 SchemaOption: TypeAlias = Annotated[
     bool, typer.Option("--schema", help="Print the JSON schema of the file, for editors.")
 ]
+JsonOption: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+
+
+def config_option(program: str) -> Any:
+    """Returns the option `--config` of a program, whose variables begin with its name in capitals."""
+    name = program.upper()
+    return typer.Option(
+        "--config",
+        envvar=f"ROBOT_{name}_CONFIG",
+        help=f"YAML file; default: built-in values and {name}__... variables.",
+    )
 
 
 def check_settings(
