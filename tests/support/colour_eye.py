@@ -1,8 +1,8 @@
 """A viewer that knows the colour of what it sees, and connects again when it must."""
 
 import threading
-import time
-from typing import Self
+from itertools import pairwise
+from typing import NamedTuple, Self
 
 from console.receiver.address import StreamAddress
 from console.receiver.errors import StreamError
@@ -25,17 +25,31 @@ def colour(frame: Frame) -> str:
     return near[0] if near else "mixed"
 
 
+class Seen(NamedTuple):
+    """A frame that came.
+
+    Attributes:
+        at_s: when, on `time.monotonic()`.
+        colour: of `colour`.
+        pts_s: of the stream.
+    """
+
+    at_s: float
+    colour: str
+    pts_s: float
+
+
 class Eye:
     """Watches a stream on this machine until its block ends.
 
     Attributes:
-        seen: when each frame came, and of which colour it was.
+        seen: each frame that came.
         corrupt: frames that were not whole.
         reconnects: how often it had to connect again.
     """
 
     def __init__(self, port: int) -> None:
-        self.seen: list[tuple[float, str]] = []
+        self.seen: list[Seen] = []
         self.corrupt = self.reconnects = 0
         self._address = StreamAddress("127.0.0.1", port, latency_ms=20)
         self._over = threading.Event()
@@ -52,8 +66,16 @@ class Eye:
     def sees(self, name: str, within_s: float = 20) -> float:
         """Waits for frames of a colour from now on; returns when the first one came."""
         begin = len(self.seen)
-        wait_until(lambda: name in [each for _, each in self.seen[begin:]], f"{name} is seen", within_s)
-        return next(at for at, each in self.seen[begin:] if each == name)
+        wait_until(lambda: name in self.colours(begin), f"{name} is seen", within_s)
+        return next(each.at_s for each in self.seen[begin:] if each.colour == name)
+
+    def colours(self, since: int = 0) -> set[str]:
+        """The colours of the frames from the given one on."""
+        return {each.colour for each in self.seen[since:]}
+
+    def longest_gap_s(self, since: int = 0) -> float:
+        """The longest time between two frames, from the given one on."""
+        return max(later.at_s - sooner.at_s for sooner, later in pairwise(self.seen[since:]))
 
     def more_frames(self, count: int) -> None:
         """Waits for so many more."""
@@ -76,4 +98,4 @@ class Eye:
             except NoFrameError:
                 continue
             self.corrupt += frame.corrupt
-            self.seen.append((time.monotonic(), colour(frame)))
+            self.seen.append(Seen(frame.arrival_s, colour(frame), (frame.pts_ns or 0) / 1e9))

@@ -1,22 +1,19 @@
 """Several cameras over one SRT connection: switched, missing, failing, hanging."""
 
-import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import grpc
 import pytest
 
-from console.receiver.address import StreamAddress
-from console.receiver.frame import Frame
 from omniseer.preview.v1 import preview_service_pb2 as pb
+from tests.support.colour_eye import Eye
 from tests.support.film import clip
 from tests.support.promise import keeps
-from tests.support.receiver import NoFrameError, Receiver
 from tests.support.running_preview import RunningPreview
 from tests.support.stalling_camera import StallingCamera
 from tests.support.waiting import wait_until
@@ -28,8 +25,6 @@ GAP_S = 0.4
 PAUSE_S = 2.0
 """What shows that nothing was interrupted, on a machine that does other things as well."""
 RED, GREEN, BLUE = ({"kind": "test", "pattern": pattern} for pattern in ("red", "green", "blue"))
-# Chroma of a plain colour, Cb and Cr (ITU-R BT.601).
-CHROMA = {"red": (90, 240), "green": (54, 34), "blue": (240, 110)}
 
 
 def cameras(**sources: Mapping[str, Any]) -> dict[str, Any]:
@@ -40,71 +35,16 @@ def gst(description: str, **more: str) -> dict[str, str]:
     return {"kind": "gst", "description": description, **more}
 
 
-def colour(frame: Frame) -> str:
-    """The plain colour of a frame; "mixed" for anything else."""
-    pixels = frame.read()
-    luma, size = frame.stride * frame.height, frame.stride // 2 * (frame.height // 2)
-    middle = frame.stride // 2 * (frame.height // 4) + frame.width // 4
-    cb, cr = pixels[luma + middle], pixels[luma + size + middle]
-    near = [name for name, (b, r) in CHROMA.items() if abs(b - cb) < 25 and abs(r - cr) < 25]
-    return near[0] if near else "mixed"
-
-
-class Eye:
-    """A viewer with one connection: notes when frames came and of which colour they are."""
-
-    def __init__(self, port: int) -> None:
-        self.seen: list[tuple[float, str, float]] = []
-        """Arrival, colour, and PTS in seconds."""
-        self.corrupt = 0
-        self.error = ""
-        self._over = threading.Event()
-        self._receiver = Receiver(StreamAddress("127.0.0.1", port, latency_ms=20), queue_size=30)
-        self._thread = threading.Thread(target=self._watch, name="eye")
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self._over.set()
-        self._thread.join(10)
-        self._receiver.__exit__()
-
-    def sees(self, name: str, within_s: float = 20) -> float:
-        """Waits for frames of a colour from now on; returns when the first one came."""
-        begin = len(self.seen)
-        wait_until(lambda: name in [each for _, each, _ in self.seen[begin:]], f"{name} is seen", within_s)
-        return next(at for at, each, _ in self.seen[begin:] if each == name)
-
-    def more_frames(self, count: int) -> None:
-        expected = len(self.seen) + count
-        wait_until(lambda: len(self.seen) >= expected, f"{count} more frames", 20)
-
-    def longest_gap_s(self, since: int = 0) -> float:
-        times = [at for at, _, _ in self.seen[since:]]
-        return max(later - sooner for sooner, later in pairwise(times))
-
-    def _watch(self) -> None:
-        with self._receiver:
-            while not self._over.is_set():
-                try:
-                    frame = self._receiver.next_frame(timeout_s=0.2)
-                except NoFrameError:
-                    continue
-                self.corrupt += frame.corrupt
-                self.seen.append((frame.arrival_s, colour(frame), (frame.pts_ns or 0) / 1e9))
-
-
 @contextmanager
 def watched(tmp_path: Path, settings: dict[str, Any]) -> Iterator[tuple[RunningPreview, Eye]]:
-    """A service that is running, and a viewer."""
+    """A service that is running, and a viewer whose connection must last."""
     with RunningPreview(tmp_path, settings) as preview:
         preview.enable()
         preview.running()
         with Eye(preview.port) as eye:
             eye.more_frames(10)
             yield preview, eye
+            assert eye.reconnects == 0
 
 
 def choose(preview: RunningPreview, camera: str, **more: Any) -> pb.ActualState:
@@ -161,7 +101,7 @@ def test_the_picture_changes_over_one_connection_without_a_gap(tmp_path: Path) -
 
         keeps(GAP_S, "s without a frame", longest_gap_s)
         assert eye.corrupt == 0
-        pts = [at for _, _, at in eye.seen]
+        pts = [each.pts_s for each in eye.seen]
         assert all(later > sooner for sooner, later in pairwise(pts))
         actual = preview.running()
         assert actual.counters == pb.Counters(starts=1)
@@ -219,7 +159,7 @@ def test_a_camera_that_fails_to_start_costs_the_live_one_nothing(tmp_path: Path)
             assert actual.state == pb.LIFECYCLE_STATE_RUNNING
         choose(preview, "red")
         eye.more_frames(30)
-        assert {each for _, each, _ in eye.seen[begin:]} == {"red"}
+        assert eye.colours(begin) == {"red"}
         assert eye.longest_gap_s(begin) < PAUSE_S
         assert preview.running().counters == pb.Counters(starts=1)
 
@@ -299,5 +239,5 @@ def test_many_choices_at_once_end_with_the_last_one(tmp_path: Path) -> None:
         is_live(preview, "green")
         eye.sees("green")
         eye.more_frames(30)
-        assert {each for _, each, _ in eye.seen[-20:]} == {"green"}
+        assert eye.colours(-20) == {"green"}
         assert preview.running().counters == pb.Counters(starts=1)
