@@ -9,8 +9,8 @@
 | a name in the graph that is not UTF-8 | what is subscribed goes on |
 | the types of sensor_msgs are missing | a problem that names the package |
 
-No executor spins. The thread that owns a camera waits in the middleware for its next message, so that a frame
-waits for nobody; a queue of one message holds the newest.
+No executor spins. The thread that owns a camera waits in the middleware for its next message, so that no
+frame waits for another; a queue of one message holds the newest.
 """
 
 import threading

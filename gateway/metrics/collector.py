@@ -150,9 +150,9 @@ class GatewayCollector(InstantCollector):
         muted = "Connections muted because they sent too much without an admitted call."
         yield _counter("connections_muted", muted, guard.muted)
         blocked = "Addresses from which no connection is accepted at present."
-        yield _gauge("addresses_blocked", blocked, guard.blocked)
+        yield _gauge("addresses_blocked", blocked, len(guard.policy.blocked))
         accepted = "Share of the attempts of other strangers to connect that is accepted at present."
-        yield _gauge("strangers_accepted_ratio", accepted, 1 / guard.one_in)
+        yield _gauge("strangers_accepted_ratio", accepted, 1 / guard.policy.one_in)
 
 
 def _gauge(name: str, what: str, value: float) -> Metric:

@@ -44,7 +44,7 @@ class SharedFrame:
 
     Args:
         header: what it is.
-        memory: descriptor; whoever gets the frame closes it.
+        memory: descriptor, owned by the receiver of the frame.
     """
 
     header: Header

@@ -30,7 +30,7 @@ MAX_BLOCKED: Final = 256
 """Addresses; where there are more, those go whose block ends first. The kernel compares each connection with
 all of them."""
 MAX_TRUSTED: Final = 128
-"""Trusted addresses that the kernel is told; where there are more, those that were heard of last."""
+"""Trusted addresses that are spared at once; where there are more, those that were heard of last."""
 MAX_REMEMBERED: Final = 1024
 """Addresses; where there are more, those go that were heard of first."""
 _NEVER: Final = frozenset({"127.0.0.1", "::", "fe80::"})

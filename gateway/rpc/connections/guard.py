@@ -56,8 +56,7 @@ class ConnectionGuard:
         closed: connections that were closed here since the start.
         throttled: connections that were throttled here since the start.
         muted: connections that were muted here since the start.
-        blocked: addresses from which no connection is accepted at present.
-        one_in: of how many attempts of other strangers to connect one is let through at present.
+        policy: what the kernel enforces at present.
     """
 
     def __init__(self, admission: Admission) -> None:
@@ -66,9 +65,8 @@ class ConnectionGuard:
         self.closed = 0
         self.throttled = 0
         self.muted = 0
-        self.blocked = 0
-        self.one_in = 1
-        self._applied = ConnectPolicy()
+        self.policy = ConnectPolicy()
+        self._wanted = self.policy
         self._watched: dict[str, _Watched] = {}
         """By address."""
         self._logged_s = -math.inf
@@ -90,8 +88,8 @@ class ConnectionGuard:
                     logging.WARNING,
                     f"of connections without an admitted call, {self.closed} were closed since the start, "
                     f"{self.throttled} were throttled and {self.muted} muted because they sent too much; "
-                    f"{self.open} are open, {self.blocked} addresses blocked, and 1 in {self.one_in} of the "
-                    "attempts of other strangers to connect is accepted",
+                    f"{self.open} are open, {len(self.policy.blocked)} addresses blocked, and 1 in "
+                    f"{self.policy.one_in} of the attempts of other strangers to connect is accepted",
                 )
 
     def look(self, sockets: AcceptedSockets) -> None:
@@ -144,12 +142,11 @@ class ConnectionGuard:
     def _filter(self, sockets: AcceptedSockets) -> None:
         """Has the kernel keep away those who may not connect now."""
         wanted = self._admission.connect_policy()
-        if wanted == self._applied:
+        if wanted == self._wanted:
             return
+        self._wanted = wanted
         # Where the kernel does not permit it, connections are closed as they come.
-        applied = wanted if sockets.apply(wanted) else ConnectPolicy()
-        self.blocked, self.one_in = len(applied.blocked), applied.one_in
-        self._applied = wanted
+        self.policy = wanted if sockets.apply(wanted) else ConnectPolicy()
 
     def _cut_off(self, sockets: AcceptedSockets, address: str) -> None:
         """Mutes a connection of a trusted address, or closes it where the kernel does not permit that."""

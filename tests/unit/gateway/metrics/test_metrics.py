@@ -18,6 +18,7 @@ from gateway.links.bridge.requests import Outcome
 from gateway.metrics.collector import BridgeMetrics, GatewayCollector, RecorderMetrics
 from gateway.metrics.loop_delay import LoopDelay
 from gateway.rpc.calls.recipient import Recipient
+from gateway.rpc.connections.packet_filter import ConnectPolicy
 from gateway.rpc.interceptors.stats import MethodStats, Stats
 from gateway.rpc.responses.status_stream import StatusStream
 from gateway.status.board import Board
@@ -87,8 +88,7 @@ class World:
     closed = 34
     throttled = 35
     muted = 36
-    blocked = 42
-    one_in = 8
+    policy = ConnectPolicy(frozenset({"10.0.0.1", "10.0.0.2"}), one_in=8)
     expired = 37
     sent_bytes = 38
     waiting = 39
@@ -175,7 +175,7 @@ def test_streams_and_what_slow_readers_did_not_get() -> None:
     assert shown["robot_gateway_connections_closed_total", ""] == 34
     assert shown["robot_gateway_connections_throttled_total", ""] == 35
     assert shown["robot_gateway_connections_muted_total", ""] == 36
-    assert shown["robot_gateway_addresses_blocked", ""] == 42
+    assert shown["robot_gateway_addresses_blocked", ""] == 2
     assert shown["robot_gateway_strangers_accepted_ratio", ""] == 1 / 8
 
 
