@@ -152,9 +152,10 @@ async def serving(
     enable_server_reflection((*names, HEALTH_SERVICE, REFLECTION_SERVICE), server)
     try:
         try:
-            port = bind_tcp(server, settings.host, settings.port, credentials)
+            # The port last: of a server that is stopped, gRPC may keep it for 20 s.
             if settings.socket:
                 bind_unix(server, settings.socket)
+            port = bind_tcp(server, settings.host, settings.port, credentials)
         finally:
             # After a failure, too: gRPC gives the ports of a server back only if it was started.
             await server.start()
