@@ -80,7 +80,13 @@ def scene(module_ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> I
         preview = stack.enter_context(RunningPreview(directory, settings))
         teleop = {"line_of_sight": False, "legacy_clients": False}
         robot = stack.enter_context(
-            driven_robot(directory, preview={"socket": str(preview.socket)}, teleop=teleop)
+            driven_robot(
+                directory,
+                preview={"socket": str(preview.socket)},
+                teleop=teleop,
+                # A worker that a busy machine holds up is lost; that leaves no stop here.
+                drive={"on_loss": "hand_back"},
+            )
         )
         yield Scene(camera, robot)
 
