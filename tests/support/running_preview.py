@@ -69,15 +69,23 @@ class RunningPreview:
             yaml.safe_dump(_merged(own, settings or {}), sort_keys=False), encoding="utf-8"
         )
         self.process = self._spawn()
-        self.channel = grpc.insecure_channel(f"unix:{self.socket}")
+        self._connect()
+
+    def _connect(self) -> None:
+        self.channel = grpc.insecure_channel(
+            f"unix:{self.socket}", options=[("grpc.use_local_subchannel_pool", 1)]
+        )
         self.stub = pb_grpc.PreviewServiceStub(self.channel)
 
-    def __enter__(self) -> Self:
+    def _wait_until_up(self) -> None:
         # Not the file alone: whether it can be bound at all is tried with a socket that is gone again.
         wait_until(
             lambda: _listens(self.socket) or self.process.poll() is not None, "the service is up", PATIENCE_S
         )
         assert self.process.poll() is None, self.log.read_text(encoding="utf-8")
+
+    def __enter__(self) -> Self:
+        self._wait_until_up()
         return self
 
     def __exit__(
@@ -109,9 +117,13 @@ class RunningPreview:
         return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmRSS:"))) / 1024
 
     def start_again(self) -> None:
-        """Restarts the process after its end, as a container engine does."""
+        """Restarts the process after its end, as a container engine does, and connects anew."""
         assert self.process.poll() is not None
         self.process = self._spawn()
+        self._wait_until_up()
+        # gRPC's own backoff, 1 s and more, is no part of the gateway's link (gateway.links.grpc_client).
+        self.channel.close()
+        self._connect()
 
     def enable(
         self, profile: pb.Profile.ValueType = pb.PROFILE_BALANCED, passphrase: str = ""
