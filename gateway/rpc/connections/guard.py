@@ -144,9 +144,9 @@ class ConnectionGuard:
         wanted = self._admission.connect_policy()
         if wanted == self._wanted:
             return
-        self._wanted = wanted
         # Where the kernel does not permit it, connections are closed as they come.
         self.policy = wanted if sockets.apply(wanted) else ConnectPolicy()
+        self._wanted = wanted
 
     def _cut_off(self, sockets: AcceptedSockets, address: str) -> None:
         """Mutes a connection of a trusted address, or closes it where the kernel does not permit that."""
