@@ -74,7 +74,7 @@ def status_code(error: BaseException | None, call: Call) -> grpc.StatusCode:
     """Returns the code that a call ends with, given what ended it (see `Interceptor.on_end`)."""
     if error is None:
         return grpc.StatusCode.OK
-    if isinstance(error, asyncio.CancelledError | GeneratorExit):
+    if isinstance(error, asyncio.CancelledError):
         return grpc.StatusCode.CANCELLED
     if isinstance(error, grpc.aio.AbortError):
         return call.rpc.code()

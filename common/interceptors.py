@@ -20,6 +20,7 @@ import asyncio
 import logging
 import time
 from collections.abc import AsyncIterable, AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import aclosing
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeAlias, TypeVar
 
 import grpc
@@ -38,11 +39,11 @@ else:
 _log = logging.getLogger(__name__)
 
 _CANCELLATION_GRACE_S: Final = 0.1
-"""When a caller leaves, gRPC ends the iterator of its requests as after the last one, and cancels the task
-afterwards, mostly within a millisecond; nothing else distinguishes the two."""
+"""When a caller leaves, gRPC ends the iterator of its requests as after the last one, or fails to write a
+response, and cancels the task afterwards, mostly within a millisecond."""
 
 Behavior: TypeAlias = Callable[[Any, Any], Any]
-"""A method of a servicer: one request, or an iterator of them, and the call; one response, or an iterator."""
+"""A method of a servicer: one request, or an iterator of them, and the call; one response, or a generator."""
 
 
 class Method:
@@ -102,7 +103,7 @@ class Interceptor(Generic[CallT_contra]):
     def on_end(self, call: CallT_contra, error: BaseException | None) -> None:
         """Called when the call has ended: `error` is None, or what the handler or another hook raised.
 
-        A caller that leaves ends its call with `asyncio.CancelledError`, or a stream with `GeneratorExit`.
+        A caller that leaves ends its call with `asyncio.CancelledError`.
         What this hook raises is logged, and the others are called all the same: each gives back what it took.
         """
 
@@ -206,13 +207,22 @@ class Chain(grpc.aio.ServerInterceptor):
             passage.end(call, entered, None)
             return response
 
-        async def respond_often(request: Any, rpc: RpcContext) -> AsyncIterator[Any]:
+        # Writes the responses itself. From a generator gRPC would write them, and when the caller leaves it
+        # cancels that write alone: the generator, and with it the end of the call, is left to the collector.
+        async def respond_often(request: Any, rpc: RpcContext) -> None:
             call = new_call(method, rpc)
             entered: list[Interceptor[Any]] = []
             try:
                 await passage.enter(call, entered)
-                async for response in behavior(received(call, request), call):
-                    yield passage.sent(call, response)
+                async with aclosing(behavior(received(call, request), call)) as responses:
+                    async for response in responses:
+                        outgoing = passage.sent(call, response)
+                        try:
+                            await rpc.write(outgoing)
+                        except grpc.aio.InternalError:
+                            # The caller has left. A handler must not be cancelled again while it ends.
+                            await asyncio.sleep(_CANCELLATION_GRACE_S)
+                            raise asyncio.CancelledError from None
             except BaseException as error:
                 await passage.fail(call, entered, error)
                 raise

@@ -23,6 +23,11 @@ class RpcDouble:
         self._peer = peer
         self._token = token
         self.aborted_with: grpc.StatusCode | None = None
+        self.written: list[Any] = []
+        """The responses of a stream."""
+
+    async def write(self, response: Any) -> None:
+        self.written.append(response)
 
     def peer(self) -> str:
         return self._peer
@@ -76,5 +81,6 @@ async def serve(
     handler: Any = handlers.service(details)
     rpc = RpcDouble(peer, token)
     if handler.response_streaming:
-        return [each async for each in handler.unary_stream(request, rpc)]
+        await handler.unary_stream(request, rpc)
+        return rpc.written
     return await handler.unary_unary(request, rpc)

@@ -72,7 +72,7 @@ class Audit(Interceptor[CallContext]):
         Left out are refusals for a rate or a lockout, and calls that ended before they were admitted or
         refused: a caller that leaves while it is authenticated has done nothing.
         """
-        if isinstance(error, asyncio.CancelledError | GeneratorExit) and call.refusal:
+        if isinstance(error, asyncio.CancelledError) and call.refusal:
             error = call.refusal  # the caller has left while it was delayed
         if error is None:
             self._record(call, ControlResult.ACCEPTED, _answer(call))
@@ -82,7 +82,7 @@ class Audit(Interceptor[CallContext]):
             self._record(call, ControlResult.REFUSED, str(error))
         elif call.request is None:
             return
-        elif isinstance(error, asyncio.CancelledError | GeneratorExit):
+        elif isinstance(error, asyncio.CancelledError):
             self._record(call, ControlResult.ACCEPTED, "the caller left before the answer")
         else:
             self._record(call, ControlResult.FAILED, "internal error; see the robot's log")

@@ -64,9 +64,6 @@ class TeleopService:
         if opening is None or opening.WhichOneof("message") != "open":
             raise InvalidRequestError("the first request of a lane has to open it")
         lane = _open(teleop, opening.open, _driver(call))
-        # However the call ends: gRPC may cancel it while a state is on its way, and then finishes this
-        # generator only later.
-        call.rpc.add_done_callback(lambda _: lane.close(_why(call)))  # type: ignore[arg-type]  # the stub's
         reader = asyncio.create_task(_read(requests, lane), name="drive lane")
         try:
             limits, run_id = teleop.limits, self._state.snapshot().gateway.run_id
