@@ -98,13 +98,19 @@ def _graph() -> Iterator[Finding]:
 
 
 def _discovered(topics: Callable[[], list[str]]) -> list[str]:
-    """Returns the topics once no further one has come for DISCOVERY_S, waiting _DISCOVERIES times at most."""
+    """Returns the topics once two looks DISCOVERY_S apart agree, after _DISCOVERIES looks at most.
+
+    An empty graph is looked at twice, too: a participant whose first announcements were missed announces
+    itself again after 3 s (Fast DDS, leaseAnnouncement), which is as long as the first look waits.
+    """
+    before: list[str] | None = None
     found: list[str] = []
     for _ in range(_DISCOVERIES):
         time.sleep(DISCOVERY_S)  # Polled as well, an empty graph would take all of it.
-        before, found = found, topics()
+        found = topics()
         if found == before:
             break
+        before = found
     return found
 
 
