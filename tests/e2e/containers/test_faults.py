@@ -129,7 +129,8 @@ def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
         robot.enable_preview()
         assert demo.preview_port in udp_ports(demo, "preview")
         demo.run("stop", "gateway")
-        wait_until(lambda: demo.preview_port not in udp_ports(demo, "preview"), "the port is free", 10)
+        # That it takes 2 s and no more is for the unit test, in virtual time; here the engine may be busy.
+        wait_until(lambda: demo.preview_port not in udp_ports(demo, "preview"), "the port is free", 60)
 
 
 @pytest.mark.parametrize("order", [("gateway", "preview"), ("preview", "gateway")])

@@ -44,7 +44,10 @@ def test_an_encoder_that_fails_its_trial_is_never_used(tmp_path: Path, fault: st
     doubles = {"mpph265enc": fault, "vah265enc": "ok"}
     # Time enough for a busy machine, except for what only its end shows.
     patience_s = 8 if fault.startswith("hang") else 40
-    settings = {"encoders": {"order": ENCODERS, "probe_timeout_s": patience_s}}
+    settings = {
+        "encoders": {"order": ENCODERS, "probe_timeout_s": patience_s},
+        "timeouts": {"encoder_silence_s": 20},
+    }
     with RunningPreview(tmp_path, settings, doubles) as preview:
         preview.enable()
         state = preview.running(within_s=2 * patience_s)
