@@ -174,9 +174,9 @@ class Runner:
             raise HungError("the SRT listener hung when it was freed") from error
         self.plan = replace(self.plan, passphrase=None)
         if passphrase is not None and not self._ended.done():
-            plan = replace(self.plan, passphrase=passphrase)
-            await self._open_listener(plan)
-            self.plan = plan
+            await self._open_listener(replace(self.plan, passphrase=passphrase))
+            # The camera may have changed meanwhile.
+            self.plan = replace(self.plan, passphrase=passphrase)
 
     def record(self, take: Callable[[AccessUnit], None] | None) -> None:
         """Hands each access unit to a recording from now on; None: to none."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -14,6 +15,7 @@ from common.gst import Gst
 from preview.config import AdaptiveSettings
 from preview.pipeline.adaptive import BitrateController, Decision, Sample
 from preview.pipeline.events import AccessUnit, PipelineEvents
+from preview.pipeline.listener import Listener
 from preview.pipeline.plan import Plan
 from preview.pipeline.runner import Runner
 from tests.support.eventually import eventually
@@ -95,6 +97,26 @@ async def test_a_pipeline_that_may_do_without_its_listener_goes_on(tmp_path: Pat
     assert events.counts["listener_failed"] == 1
     await runner.write_graph(tmp_path / "graph.dot")
     assert "GstSRTSink" in (tmp_path / "graph.dot").read_text(encoding="utf-8")
+    assert await (await runner.stop())
+
+
+async def test_a_camera_that_becomes_live_while_the_listener_opens_stays_the_one_that_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As when an operator enables another camera than the one that a recording has running."""
+    events, open_listener = Events(), Listener.start
+    runner = Runner(replace(plan_of(LIVE), passphrase=None), events)
+    await runner.start()
+    await events.wait_for("first_frame")
+
+    async def start(self: Listener, send_to: Callable[[int], None]) -> bool:
+        await events.wait_for("camera_shown")
+        return await open_listener(self, send_to)
+
+    monkeypatch.setattr(Listener, "start", start)
+    runner.show(another("rear"))
+    await runner.listen("")
+    assert (runner.live_camera, runner.plan.source.camera, runner.plan.passphrase) == ("rear", "rear", "")
     assert await (await runner.stop())
 
 
