@@ -252,6 +252,8 @@ def change_modes(fleet: Fleet, times: int) -> None:
     """Has the robot report other modes, of which each is an event."""
     with fleet.client() as robot:
         wait_until(lambda: knows(robot), "the gateway answers", BACK_WITHIN_S)
+        # Of what is published before the gateway has discovered the topic it gets the newest alone.
+        wait_until(lambda: robot.status().mission.available, "the gateway hears the mode", BACK_WITHIN_S)
     before = issued(fleet)
     fleet.deployment.run("exec", "robot", "python", "-c", MODES, str(times))
     wait_until(lambda: issued_since(fleet, before) >= times, "the gateway reports them", BACK_WITHIN_S)
