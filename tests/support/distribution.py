@@ -4,12 +4,25 @@ pytest-xdist's workers get whole files, the longest first. Those files of tests/
 system are two units, those that share the containers of `_shared_demo` (its conftest.py) and the others,
 because the start of a deployment takes all processors. What starts a whole robot with video or in containers,
 and measures time, gets the mark `alone` for the same reason.
+
+A worker is a foreground or a background one. Encoders, cameras and containers that get no processor for a
+second count as failed, so their files (`is_paced`) are for the foreground, two at a time. The other files
+mostly wait; background workers run them with what the foreground leaves of the processors.
 """
 
+import os
+from functools import cache
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
 from xdist.scheduler import LoadScopeScheduling
+
+_FOREGROUND_WORKERS: Final = 2
+_BACKGROUND_NICE: Final = 10
+"""A tenth of the weight of 0 (sched(7))."""
+_BACKGROUND: Final = "robot_gateway_background"
+_PACED_MARKS: Final = ("pytest.mark.gst", "pytest.mark.docker")
 
 _CONTAINERS: Final = "tests/e2e/containers/"
 _STAND_INS: Final = tuple(
@@ -84,6 +97,40 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
     return _ByFile(config, log)
 
 
+class _Workers:
+    """Decides which workers are in the foreground; lives in the process that starts them."""
+
+    def __init__(self) -> None:
+        self._foreground: set[Any] = set()
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
+        """Called before a worker starts: the first ones, and what replaces them, are in the foreground."""
+        background = len(self._foreground) >= _FOREGROUND_WORKERS
+        node.workerinput[_BACKGROUND] = background
+        if not background:
+            self._foreground.add(node)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        """Called when a worker has ended."""
+        self._foreground.discard(node)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Has this worker, and all that it will start, yield to the foreground if it is a background one."""
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(_Workers())
+    elif config.workerinput[_BACKGROUND]:
+        os.nice(_BACKGROUND_NICE)
+        # Where the kernel groups processes by session, nice values count within a session only, and that of
+        # the session counts between them (sched(7), "The autogroup feature").
+        autogroup = Path("/proc/self/autogroup")
+        if autogroup.exists():
+            os.setsid()
+            autogroup.write_text(str(_BACKGROUND_NICE), encoding="ascii")
+
+
 class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
     def remove_node(self, node: Any) -> str | None:
         """Returns the test in which a worker has crashed.
@@ -107,6 +154,33 @@ class _ByFile(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
         for node in self.nodes:
             self._reschedule(node)
 
+    def _reschedule(self, node: Any) -> None:
+        """Gives a worker more to do, or ends it where what is left is not for it."""
+        if node not in self.registered_collections:
+            return  # It replaces another one, and has its turn when it has collected the tests.
+        if not node.shutting_down and self._next_unit(node) is None:
+            node.shutdown()
+        super()._reschedule(node)
+
+    def _assign_work_unit(self, node: Any) -> None:
+        unit = self._next_unit(node)
+        if unit is None:
+            node.shutdown()
+            return
+        self.workqueue.move_to_end(unit, last=False)
+        super()._assign_work_unit(node)
+
+    def _next_unit(self, node: Any) -> str | None:
+        """Returns the unit that the worker is to run next.
+
+        In the foreground those that are paced come first, so that others are left for the background.
+        """
+        background = node.workerinput[_BACKGROUND]
+        units: dict[bool, str] = {}
+        for unit in self.workqueue:
+            units.setdefault(unit == _CONTAINERS or is_paced(self.config.rootpath / unit), unit)
+        return units.get(False) if background else units.get(True, units.get(False))
+
     def _split_scope(self, nodeid: str) -> str:
         return unit_of(_file_of(nodeid))
 
@@ -116,6 +190,13 @@ def unit_of(file: str) -> str:
     if file in _SHARING:
         return _SHARING[0]
     return _CONTAINERS if file.startswith(_CONTAINERS) and file not in _STAND_INS else file
+
+
+@cache
+def is_paced(file: Path) -> bool:
+    """Returns whether the file's tests run what fails where it gets no processor in time."""
+    text = file.read_text(encoding="utf-8")
+    return any(mark in text for mark in _PACED_MARKS)
 
 
 def _file_of(nodeid: str) -> str:

@@ -1,10 +1,13 @@
 """The list of long files is kept up: a file that has moved would begin last. Deployments start one by one."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from tests.support.distribution import LONGEST, unit_of
+
+pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[3]
 
@@ -28,3 +31,41 @@ def test_what_deploys_the_system_is_two_units_and_all_else_a_unit_by_itself() ->
     }
     assert deploying <= apart
     assert ROOT / "tests/e2e/containers/test_upgrade_robot.py" not in apart
+
+
+PACED = "import pytest, os\npytestmark = pytest.mark.gst\ndef test_{0}(): print('NICE', '{0}', os.nice(0))\n"
+PLAIN = "import os\ndef test_{0}(): print('NICE', '{0}', os.nice(0))\n"
+
+
+def test_the_background_yields_and_gets_nothing_that_is_paced(pytester: pytest.Pytester) -> None:
+    paced, plain = [f"paced_{each}" for each in range(6)], [f"plain_{each}" for each in range(12)]
+    files = {f"test_{name}": PACED.format(name) for name in paced}
+    files |= {f"test_{name}": PLAIN.format(name) for name in plain}
+    ran = run(pytester, files, workers=4)
+    ran.assert_outcomes(passed=18)
+    nice = {line.split()[1]: int(line.split()[2]) for line in ran.outlines if line.startswith("NICE")}
+    own = os.nice(0)
+    assert {nice[name] for name in paced} == {own}
+    assert own + 10 in {nice[name] for name in plain}
+
+
+@pytest.mark.parametrize("template", [PACED, PLAIN])
+def test_files_of_one_kind_are_run_all_the_same(pytester: pytest.Pytester, template: str) -> None:
+    ran = run(pytester, {f"test_{each}": template.format(each) for each in range(5)}, workers=4)
+    ran.assert_outcomes(passed=5)
+
+
+def test_a_worker_that_replaces_one_of_the_foreground_is_in_the_foreground(pytester: pytest.Pytester) -> None:
+    crashing = "import os, pytest\npytestmark = pytest.mark.gst\ndef test_{0}(): os._exit(1)\n"
+    files = {f"test_crash_{each}": crashing.format(each) for each in range(3)}
+    files |= {f"test_paced_{each}": PACED.format(each) for each in range(3)}
+    files |= {f"test_plain_{each}": PLAIN.format(each) for each in range(3)}
+    ran = run(pytester, files, workers=3)
+    ran.assert_outcomes(passed=6, failed=3)
+
+
+def run(pytester: pytest.Pytester, files: dict[str, str], workers: int) -> pytest.RunResult:
+    pytester.makeini("[pytest]\nmarkers = gst")
+    pytester.makeconftest('pytest_plugins = ["tests.support.distribution"]')
+    pytester.makepyfile(**files)
+    return pytester.runpytest_subprocess(f"-n{workers}", "--dist=loadscope", "-rP", timeout=60)
