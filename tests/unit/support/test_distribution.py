@@ -46,7 +46,8 @@ def test_the_background_yields_and_gets_nothing_that_is_paced(pytester: pytest.P
     nice = {line.split()[1]: int(line.split()[2]) for line in ran.outlines if line.startswith("NICE")}
     own = os.nice(0)
     assert {nice[name] for name in paced} == {own}
-    assert own + 10 in {nice[name] for name in plain}
+    # 19 is the largest value there is: this run may be a background one itself.
+    assert min(own + 10, 19) in {nice[name] for name in plain}
 
 
 @pytest.mark.parametrize("template", [PACED, PLAIN])
