@@ -129,7 +129,7 @@ def test_without_a_gateway_the_preview_stops_by_itself(tmp_path: Path) -> None:
         robot.enable_preview()
         assert demo.preview_port in udp_ports(demo, "preview")
         demo.run("stop", "gateway")
-        # That it takes 2 s and no more is for the unit test, in virtual time; here the engine may be busy.
+        # The unit test asserts in virtual time how long it takes; here the engine may be busy.
         wait_until(lambda: demo.preview_port not in udp_ports(demo, "preview"), "the port is free", 60)
 
 
