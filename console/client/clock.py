@@ -16,6 +16,8 @@ _KEPT: Final = 16
 _DRIFT: Final = 200e-6
 """Largest difference in rate of two quartz clocks: 100 ppm each, twice what data sheets allow."""
 _NS_PER_S: Final = 1_000_000_000
+_RESOLUTION_S: Final = 1e-6
+"""Of what is computed here with times of up to some years."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,11 @@ class _Reading:
     def error_at(self, now_s: float) -> float:
         return self.error_s + _DRIFT * max(0.0, now_s - self.at_s)
 
+    def agrees_with(self, later: "_Reading") -> bool:
+        """Whether there is an offset within the bounds of both."""
+        bound_s = self.error_at(later.at_s) + later.error_s + _RESOLUTION_S
+        return abs(self.offset_s - later.offset_s) <= bound_s
+
 
 class Clock:
     """Estimates the offset from Ping calls. Local times are those of `time.monotonic()`, in seconds."""
@@ -56,11 +63,15 @@ class Clock:
             self._boot_id = robot.boot_id
         half_s = (received_s - sent_s) / 2
         middle_s = sent_s + half_s
-        self._readings.append(_Reading(middle_s, robot.monotonic_ns / _NS_PER_S - middle_s, half_s))
+        new = _Reading(middle_s, robot.monotonic_ns / _NS_PER_S - middle_s, half_s)
+        # A computer's monotonic clock stands still while it is suspended (clock_gettime(2)): what was read
+        # before then contradicts what is read after.
+        kept = [each for each in self._readings if each.agrees_with(new)]
+        self._readings = deque([*kept, new], maxlen=_KEPT)
 
     def offset(self, now_s: float) -> Offset | None:
         """Returns the best estimate at `now_s`; None before the first answer."""
-        # A copy: another thread may add a reading, or drop them all, meanwhile.
+        # A copy: another thread may drop them all meanwhile.
         readings = tuple(self._readings)
         if not readings:
             return None

@@ -78,6 +78,10 @@ class PictureMeter:
         if frame.capture_ns is None or offset is None:
             return
         age_ms = (now_s + offset.seconds) * _MS_PER_S - frame.capture_ns / 1e6
+        if age_ms < -offset.error_s * _MS_PER_S:
+            # From the future: the offset is of before one of the clocks stood still.
+            self.forget()
+            return
         own_ms = None if frame.received_s is None else (now_s - frame.received_s) * _MS_PER_S
         picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:

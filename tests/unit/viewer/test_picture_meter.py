@@ -63,6 +63,16 @@ def test_a_picture_that_is_gone_has_no_age(played: Played) -> None:
     assert played.meter.capture_ns() is None
 
 
+def test_a_picture_from_the_future_has_no_age_but_one_within_the_clocks_error_has(played: Played) -> None:
+    """After a suspend the offset is wrong until the next answer of the robot: 0 ms would be a lie."""
+    played.show(-1.4)
+    assert played.meter.reading().age_ms == 0
+    played.show(-60_000)
+    assert played.meter.reading().age_ms is None
+    assert played.meter.capture_ns() is None
+    assert played.meter.report() is None
+
+
 def test_the_worst_age_since_the_last_report_is_reported(played: Played) -> None:
     played.delivery = Delivery(
         kind=DeliveryChoice.DIRECT, rtt_ms=20.4, loss_percent=1.5, waited=7, given_up=2

@@ -49,6 +49,18 @@ def test_a_robot_that_was_started_anew_has_another_clock() -> None:
     assert abs(offset.seconds - (3.0 - 60.5)) < 1e-6
 
 
+def test_a_computer_that_was_suspended_has_another_offset_at_once() -> None:
+    """Its clock stood still for a minute; the first answer afterwards is slow, and counts all the same."""
+    clock = Clock()
+    for second in range(10):
+        clock.note(10.0 + second, at(1010.0 + second), 10.0001 + second)
+    clock.note(20.0, at(1080.2), 20.4)
+    offset = clock.offset(20.4)
+    assert offset is not None
+    assert abs(offset.seconds - 1060.0) < 0.001
+    assert 0.2 <= offset.error_s < 0.201
+
+
 def test_an_instant_of_the_robot_on_our_clock() -> None:
     clock = Clock()
     clock.note(10.0, at(1010.0), 10.0)
