@@ -18,8 +18,8 @@ from console.fleet.wire import answer_of, items_of, recording_of, state_of
 from fleet.reading import LARGEST_STATE
 from fleet.receipt_keys import ReceiptSigner
 from gateway.config import SourceSettings
-from gateway.ros.field_path import steps_of, value_at
 from gateway.ros.field_types import FieldMissingError, check_field
+from gateway.ros.readers.field_path import steps_of, value_at
 from hub.exporter.collector import FleetCollector
 from hub.receiver.service import Party, ReceiverService
 from hub.receiver.store import StoredObject, StoredPart, StoreError, StoreProblem

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from common.ros_node import message_class
 from gateway.config import SourceSettings
-from gateway.ros.field_path import steps_of
+from gateway.ros.readers.field_path import steps_of
 
 _INTEGERS: Final = frozenset(
     {"boolean", "octet", "char", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}

@@ -10,9 +10,9 @@ from rclpy.serialization import deserialize_message
 
 from common.receive_time import Instant, present_instant, received_at
 from gateway.config import SourceSettings
-from gateway.ros.field_path import steps_of
 from gateway.ros.list_truncation import truncate_list
 from gateway.ros.readers import is_header_and_list, reader_for
+from gateway.ros.readers.field_path import steps_of
 from gateway.status.board import Board
 from gateway.status.values import Received
 

@@ -4,6 +4,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 import pytest
@@ -317,21 +318,37 @@ def test_a_foreign_library_has_one_home(library: str, homes: tuple[str, ...]) ->
     assert not strangers
 
 
-def test_the_gateways_packages_do_not_import_each_other_in_circles() -> None:
-    modules = {str(path.relative_to(ROOT)) for path in (ROOT / "gateway").rglob("*.py")}
-    packages = {str(Path(file).parent) for file in modules}
-    imported: dict[str, set[str]] = {package: set() for package in packages}
-    for found in imports():
-        path = found.module.replace(".", "/")
-        home = path if path in packages else str(Path(path).parent)
-        if found.importer in modules and home in packages and f"{path}.py" in modules:
-            imported[str(Path(found.importer).parent)].add(home)
-    for package, others in imported.items():
-        others.discard(package)
-    while leaves := {package for package, others in imported.items() if not others & imported.keys()}:
+@pytest.mark.parametrize("program", OURS)
+def test_a_programs_folders_do_not_import_each_other_in_circles(program: str) -> None:
+    imported: dict[str, set[str]] = {}
+    statements = groupby(imports_below(program), key=lambda found: (found.importer, found.line))
+    for (importer, _), found in statements:
+        home = home_of(importer)
+        others = imported.setdefault(home, set())
+        others |= {home_of(file) for file in imported_files({each.module for each in found})} - {home}
+    while leaves := {home for home, others in imported.items() if not others & imported.keys()}:
         for leaf in leaves:
             del imported[leaf]
     assert not imported, "each of these is part of a circle, or imports one"
+
+
+def imported_files(modules: set[str]) -> Iterator[str]:
+    """Our files that an import statement names; not the package in `from package import module`."""
+    files = {}
+    for module in modules:
+        path = module.replace(".", "/")
+        for file in (f"{path}.py", f"{path}/__init__.py"):
+            if (ROOT / file).is_file():
+                files[module] = file
+    for module, file in files.items():
+        if not any(is_within(other, module) for other in files.keys() - {module}):
+            yield file
+
+
+def home_of(file: str) -> str:
+    """The file's folder; a file beside a program's folders, as that of its settings, is a home of its own."""
+    folder = str(Path(file).parent)
+    return file if folder in OURS else folder
 
 
 def test_the_fence_sees_what_it_should() -> None:

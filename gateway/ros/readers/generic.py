@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from gateway.config import SourceSettings
-from gateway.ros.field_path import value_at
+from gateway.ros.readers.field_path import value_at
 from gateway.ros.readers.plain import one_line
 from gateway.ros.readers.registry import reads_any_type
 from gateway.status.sources import NUMBER, TEXT

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from gateway.config import SourceSettings
-from gateway.ros.field_path import Step, steps_of, value_at
 from gateway.ros.readers import reader_for
+from gateway.ros.readers.field_path import Step, steps_of, value_at
 from gateway.status.values import Number, Text
 
 
