@@ -24,8 +24,12 @@ gateway restarted, no request since
 several operators request at the same time
     The newest request counts; the answers to the others say that they were replaced.
 
-reconciler.py decides (pure), link.py keeps the connection, grpc_client.py has what services on gRPC share.
-Each service has a folder with the same files: state.py (desired and reported state), wire.py (its schema and
-client), model.py (its rules and its view), control.py (answers to operators). The preview's has feedback.py
-besides: what viewers request and report.
+watch.py connects to a service, takes its reports and notices silence. On it stands link.py, which applies the
+desired state as reconciler.py decides (pure). grpc_client.py has what services on gRPC share.
+
+A folder for each service: wire.py has its schema and client. Where the gateway owns the desired state,
+state.py and model.py have that state, its rules and its view: the preview, with control.py for operators'
+requests and feedback.py for viewers', and the drive program, with commands.py for what can't wait for the
+link. The recorder and the bridge own theirs: link.py has the view, calls.py passes requests on, refusals.py
+has their errors.
 """

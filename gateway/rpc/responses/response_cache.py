@@ -1,8 +1,8 @@
 """Serialised responses of the polled methods, shared by all callers that ask within a moment.
 
-An operator's screen polls ten times a second, ten screens a hundred times: computing and serialising the
-same status for each would be most of the gateway's work. A response is reused for REUSE_S at most, so no
-age in it is wrong by more. A preview that changes makes a new one at once: a caller that has just switched
+Tools of the locked contract poll, ten times a second each: computing and serialising the same status for
+every one would be most of the gateway's work. A response is reused for REUSE_S at most, so no age in it is
+wrong by more. A preview that changes makes a new one at once: a caller that has just switched
 it sees that.
 """
 
