@@ -101,7 +101,7 @@ async def _serve(unlimited: bool, credentials: Path | None) -> None:
     )
     gateway = build(settings, _BenchRobot())
     for number in range(8):
-        gateway.state.note(_event(f"odometry received, for the {number}th time"))
+        gateway.events.note(_event(f"odometry received, for the {number}th time"))
     async with running(gateway, extra=[_reference(gateway)]) as port:
         print(port, flush=True)
         await asyncio.to_thread(sys.stdin.read)
@@ -147,7 +147,7 @@ def _reference(gateway: Gateway) -> grpc.GenericRpcHandler:
     """Returns the reference methods: they do nothing but answer."""
 
     async def raise_event(_request: bytes, _context: RpcContext) -> bytes:
-        gateway.state.note(_event("an event"))
+        gateway.events.note(_event("an event"))
         return b""
 
     return grpc.method_handlers_generic_handler(

@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
@@ -12,32 +11,18 @@ import grpc
 
 from common import heartbeat
 from common.advertisement import Advertisement
-from common.findings import Verdict
 from common.metrics_endpoint import serving_metrics
 from gateway.assembly import Gateway, ThisRobot, build
 from gateway.config import GatewaySettings, SecuritySettings
 from gateway.links.preview.control import PreviewLink
-from gateway.links.preview.exposure import video_exposure
 from gateway.platform.advertising import advertise
 from gateway.rpc.server import SERVICE, serving
-from gateway.status.board import Board
-from gateway.status.preview import Listener
 from gateway.status.snapshot import Snapshot
 
 _log = logging.getLogger(__name__)
 
-PREVIEW_HEALTH: Final = "preview"
-"""The preview service's name in the health service. The gateway serves without it."""
-DRIVE_HEALTH: Final = "drive"
-"""The drive program's name there, where the robot is set up for driving."""
-RECORDER_HEALTH: Final = "recorder"
-"""The recorder's name there, where the robot is set up for recording."""
-BRIDGE_HEALTH: Final = "bridge"
-"""The bridge's name there, where the robot is set up for a fleet."""
 OBSERVE_EVERY_S: Final = 0.2
 """How often faults and events are looked for; a change of the preview causes a look at once."""
-ROS_HUNG_AFTER_S: Final = 30.0
-"""Without a pass of the ROS sampler: no load explains it, and only another process reads ROS again."""
 
 
 async def serve(settings: GatewaySettings, stop: asyncio.Event) -> None:
@@ -137,50 +122,19 @@ async def _advertise(settings: GatewaySettings, port: int) -> None:
 
 
 async def _observe(gateway: Gateway) -> None:
-    """Updates faults, events and the health service, whether or not an operator is connected."""
-    link, health = gateway.preview_link, gateway.health
-    listener: Listener | None = None
+    """Updates faults and events, whether or not an operator is connected, and hands on what was seen."""
+    link, interceptors = gateway.preview_link, gateway.interceptors
     while True:
-        access = gateway.access.view()
-        seen = gateway.state.observe(access)
-        health.set_serving(SERVICE, serving=not (seen.ros_stalled or access.closed))
-        health.set_serving(PREVIEW_HEALTH, serving=seen.preview.service_reachable)
-        if seen.teleop:
-            health.set_serving(DRIVE_HEALTH, serving=seen.teleop.drive.reachable)
-        if gateway.recording and seen.recorder:
-            health.set_serving(RECORDER_HEALTH, serving=seen.recorder.reachable)
-            gateway.recording.incidents.take(seen.faults)
-        if gateway.cloud and seen.cloud:
-            health.set_serving(BRIDGE_HEALTH, serving=seen.cloud.reachable)
-            if gateway.cloud.copies:
-                gateway.cloud.copies.take(seen.cloud, seen.recorder)
-        heartbeat.own().withheld = hung_part(gateway.state.board, time.monotonic())
-        gateway.interceptors.presence.report_joined()
-        gateway.interceptors.audit.record_due()
-        if seen.preview.listener and seen.preview.listener != listener:
-            listener = seen.preview.listener
-            _log_exposure(gateway.settings, listener)
+        seen = gateway.state.observe()
+        for subscriber in gateway.subscribers:
+            subscriber.take(seen)
+        interceptors.presence.report_joined()
+        interceptors.audit.record_due()
         await link.changes.wait_until(partial(_has_changed, link, seen), OBSERVE_EVERY_S)
-
-
-def hung_part(board: Board, now_s: float) -> str:
-    """Returns which part of this process hangs so that only a restart mends it, for the log; else ""."""
-    passed_s = board.ros_passed_s
-    if passed_s is None or now_s - passed_s <= ROS_HUNG_AFTER_S:
-        return ""
-    return f"ROS has not been read for {now_s - passed_s:.0f} s"
 
 
 def _has_changed(link: PreviewLink, seen: Snapshot) -> bool:
     return link.view is not seen.preview
-
-
-def _log_exposure(settings: GatewaySettings, listener: Listener) -> None:
-    found = video_exposure(settings, listener)
-    if found.verdict is Verdict.GOOD:
-        _log.info("%s", found.what)
-    else:
-        _log.warning("%s (%s). %s", found.what, found.why, found.remedy)
 
 
 def _warn_of_exposure(security: SecuritySettings) -> None:

@@ -18,6 +18,7 @@ from common.health import Health
 from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
+from gateway.events import Events
 from gateway.links.bridge.calls import BridgeCalls
 from gateway.links.bridge.copies import Copies
 from gateway.links.bridge.link import BridgeLink
@@ -29,6 +30,7 @@ from gateway.links.drive.model import DriveModel
 from gateway.links.drive.wire import DriveConnector
 from gateway.links.link import ServiceLink
 from gateway.links.preview.control import PreviewControl, PreviewLink
+from gateway.links.preview.exposure import ExposureLog
 from gateway.links.preview.feedback import Feedback, PreviewServiceConnector
 from gateway.links.preview.model import PreviewModel
 from gateway.links.preview.wire import PreviewConnector
@@ -66,6 +68,8 @@ from gateway.rpc.services.teleop import TeleopService
 from gateway.shown_settings import shown_settings
 from gateway.state import State
 from gateway.status.board import Board
+from gateway.status.snapshot import Snapshot
+from gateway.supervision import Supervision
 from gateway.teleop.episodes import Episodes
 from gateway.teleop.teleop import Teleop
 
@@ -89,13 +93,24 @@ class Outside(Protocol):
         """Returns what opens connections to the preview service."""
 
 
+class SnapshotSubscriber(Protocol):
+    """What follows each look at the robot, five times a second and at each change of the preview."""
+
+    def take(self, now: Snapshot) -> None:
+        """Takes the snapshot of this instant. Never waits."""
+
+
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What watches the recorder and passes calls on."""
+    """What watches the recorder, passes calls on, and reports incidents."""
 
     link: RecorderLink
     calls: RecorderCalls
     incidents: Incidents
+
+    def take(self, now: Snapshot) -> None:
+        """Takes the faults of this instant."""
+        self.incidents.take(now.faults)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +126,26 @@ class Cloud:
     copies: Copies | None
     hub_requests: HubRequests
 
+    def take(self, now: Snapshot) -> None:
+        """Takes the copies of this instant."""
+        if self.copies and now.cloud:
+            self.copies.take(now.cloud, now.recorder)
+
 
 @dataclass(frozen=True, slots=True)
 class Gateway:
-    """All parts that run; app.py starts and stops them."""
+    """All parts that run; app.py starts and stops them.
+
+    Attributes:
+        subscribers: take each snapshot, in this order.
+    """
 
     settings: GatewaySettings
     outside: Outside
     max_connections: int
+    events: Events
     state: State
+    subscribers: tuple[SnapshotSubscriber, ...]
     preview_link: PreviewLink
     teleop: Teleop | None
     recording: Recording | None
@@ -148,21 +174,29 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     link = ServiceLink(name, feedback, Reconciler(first_revision, model))
     control = PreviewControl(link, settings.preview.settle_ms / 1000)
     stats = Stats([name for service in SERVICES for name in service.methods_by_name])
-    state = State(settings, link, stats)
+    events = Events()
     max_connections = possible_connections(settings.limits.connections + _BESIDE_PLACES)
     admission = Admission(settings.limits, max_connections=max_connections)
     refusals = RefusalDelay()
     connection_guard = ConnectionGuard(admission)
-    access = AccessControl(settings.security, state, control, admission, refusals)
+    access = AccessControl(settings.security, events, control, admission, refusals)
     recipients = Recipients(settings.preview.advertised_host)
-    teleop = state.teleop = _teleop(settings, link, access.audit, first_revision)
+    teleop = _teleop(settings, link, access.audit, first_revision)
     recording = _recording(settings)
-    state.recorder = recording.link if recording else None
     cloud = _cloud(settings, recording, access.audit)
-    state.cloud = cloud.link if cloud else None
+    state = State(
+        settings,
+        events=events,
+        preview=link,
+        access=access,
+        calls=stats,
+        teleop=teleop,
+        recorder=recording.link if recording else None,
+        cloud=cloud.link if cloud else None,
+    )
     exports = ExportStream()
     status_stream = StatusStream(state, time.monotonic)
-    event_stream = EventStream(state.events, state.event_added)
+    event_stream = EventStream(events.log, events.added)
     services = Services(
         status=StatusService(ResponseCache(state, time.monotonic), status_stream, recipients),
         preview=PreviewService(control, feedback, state, recipients),
@@ -180,14 +214,18 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         audit=access.audit,
         auth=access.auth,
         validation=Validation(settings.limits.request_bytes),
-        presence=Presence(state),
+        presence=Presence(events),
     )
     loop_delay = LoopDelay()
+    health = Health(SERVICE)
+    subscribers = (Supervision(health, state.board), ExposureLog(settings), recording, cloud)
     return Gateway(
         settings=settings,
         outside=outside,
         max_connections=max_connections,
+        events=events,
         state=state,
+        subscribers=tuple(each for each in subscribers if each),
         preview_link=link,
         teleop=teleop,
         recording=recording,
@@ -196,7 +234,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
         status_stream=status_stream,
         services=services,
         interceptors=interceptors,
-        health=Health(SERVICE),
+        health=health,
         connection_guard=connection_guard,
         loop_delay=loop_delay,
         metrics=GatewayCollector(

@@ -1,22 +1,16 @@
 """Everything the gateway knows: written by its parts, read as one snapshot."""
 
-import logging
-import secrets
 import time
-from typing import Final, Protocol
+from typing import Protocol
 
 from common.boot import boot_id
-from common.broadcast import Broadcast
 from common.version import project_revision, project_version
 from gateway.config import GatewaySettings
-from gateway.links.preview.control import PreviewLink
+from gateway.events import Events
 from gateway.observer import Observer
-from gateway.rpc.interceptors.stats import Stats
-from gateway.status.access import UNGUARDED, AccessView
+from gateway.status.access import AccessView
 from gateway.status.board import Board
 from gateway.status.cloud import CloudView
-from gateway.status.event import Event
-from gateway.status.event_log import EventLog
 from gateway.status.faults.rules import FaultRules
 from gateway.status.faults.tracker import FaultTracker
 from gateway.status.pictures import NO_PICTURES, PictureReport, PictureReports, Pictures
@@ -25,9 +19,35 @@ from gateway.status.recording import RecorderView
 from gateway.status.snapshot import Identity, Runtime, Snapshot, take
 from gateway.status.teleop import TeleopView
 
-_log = logging.getLogger(__name__)
 
-_RUN_ID_BYTES: Final = 8
+class PreviewSource(Protocol):
+    """What has the view of the preview."""
+
+    @property
+    def view(self) -> PreviewView:
+        """The preview at this instant; a new object whenever it changed."""
+
+
+class AccessSource(Protocol):
+    """What has the view of access control."""
+
+    def view(self) -> AccessView:
+        """Returns credentials and audit log at this instant, from memory."""
+
+
+class CallCounts(Protocol):
+    """What counts the operators' calls."""
+
+    @property
+    def served(self) -> int:
+        """Calls that were answered since the start."""
+
+    @property
+    def refused(self) -> int:
+        """Calls that were refused since the start."""
+
+    def client_count(self) -> int:
+        """Returns how many clients call at present."""
 
 
 class TeleopSource(Protocol):
@@ -58,25 +78,40 @@ class State:
 
     Args:
         settings: what is expected of the robot.
-        preview_link: has the view of the preview.
-        stats: counts the calls.
+        events: where the events go that follow from what is observed.
+        preview: has the view of the preview.
+        access: has the view of credentials and audit log.
+        calls: counts the operators' calls.
+        teleop: has the view of driving; None where the robot is not set up for it.
+        recorder: has the view of recording; None as above.
+        cloud: has the view of the connection to the fleet; None as above.
 
     Attributes:
-        event_added: notified after each event.
-        access: of the newest look at it.
-        teleop: has the view of driving; None where the robot is not set up for it.
-        recorder: the same of recording.
-        cloud: the same of the connection to the fleet.
+        board: the values of the robot.
     """
 
-    def __init__(self, settings: GatewaySettings, preview_link: PreviewLink, stats: Stats) -> None:
+    def __init__(
+        self,
+        settings: GatewaySettings,
+        *,
+        events: Events,
+        preview: PreviewSource,
+        access: AccessSource,
+        calls: CallCounts,
+        teleop: TeleopSource | None,
+        recorder: RecorderSource | None,
+        cloud: CloudSource | None,
+    ) -> None:
         faults = settings.faults
         self._identity = Identity(
             settings.name, project_version(), settings.security.insecure and not settings.security.guarded
         )
         self._rules = settings.status_rules()
-        self._preview_link = preview_link
-        self._stats = stats
+        self._events = events
+        self._preview = preview
+        self._access = access
+        self._calls = calls
+        self._teleop, self._recorder, self._cloud = teleop, recorder, cloud
         self._revision, self._boot_id = project_revision(), boot_id()
         self._started_s = time.monotonic()
         self._tracker = FaultTracker(faults.clear_after_ms / 1000, faults.keep_cleared_ms / 1000)
@@ -89,18 +124,13 @@ class State:
                 faults.hub_offline_s,
             ),
         )
-        self.board, self.events = Board(), EventLog(secrets.token_hex(_RUN_ID_BYTES))
-        self.event_added = Broadcast()
         self._pictures = PictureReports()
-        self.access: AccessView = UNGUARDED
-        self.teleop: TeleopSource | None = None
-        self.recorder: RecorderSource | None = None
-        self.cloud: CloudSource | None = None
+        self.board = Board()
 
     @property
     def preview(self) -> PreviewView:
         """The preview at this instant; a new object whenever it changed."""
-        return self._preview_link.view
+        return self._preview.view
 
     def snapshot(self) -> Snapshot:
         """Returns everything at this instant, from memory."""
@@ -110,34 +140,23 @@ class State:
             gateway=self._runtime(now_s),
             rules=self._rules,
             board=self.board,
-            preview=self._preview_link.view,
+            preview=self._preview.view,
             pictures=self._counting_pictures(now_s),
-            events=self.events.newest(),
+            events=self._events.log.newest(),
             faults=self._tracker.faults,
             now_s=now_s,
-            access=self.access,
-            teleop=self.teleop.view() if self.teleop else None,
-            recorder=self.recorder.view if self.recorder else None,
-            cloud=self.cloud.view if self.cloud else None,
+            access=self._access.view(),
+            teleop=self._teleop.view() if self._teleop else None,
+            recorder=self._recorder.view if self._recorder else None,
+            cloud=self._cloud.view if self._cloud else None,
         )
 
-    def observe(self, access: AccessView) -> Snapshot:
-        """Updates faults and events from a snapshot of this instant, and returns that.
-
-        Args:
-            access: the state of credentials and audit log at this instant.
-        """
-        self.access = access
+    def observe(self) -> Snapshot:
+        """Updates faults and events from a snapshot of this instant, and returns that."""
         now = self.snapshot()
         for event in self._observer.observe(now):
-            self.note(event)
+            self._events.note(event)
         return now
-
-    def note(self, event: Event) -> None:
-        """Adds an event of this instant."""
-        _log.info("event: %s", event.sentence or event.message)
-        self.events.add(event, time.monotonic())
-        self.event_added.notify_all()
 
     def take_picture(self, caller: str, viewer_id: str, report: PictureReport) -> Pictures:
         """Takes a viewer's report of this instant; returns what all say that count now."""
@@ -147,7 +166,7 @@ class State:
 
     def _counting_pictures(self, now_s: float) -> Pictures:
         """Without a viewer on the stream no report counts: it is of no picture of this robot."""
-        measured = self._preview_link.view.measured
+        measured = self._preview.view.measured
         return self._pictures.counting(now_s) if measured and measured.value.viewer_count else NO_PICTURES
 
     def _runtime(self, now_s: float) -> Runtime:
@@ -155,8 +174,8 @@ class State:
             revision=self._revision,
             boot_id=self._boot_id,
             uptime_ms=int((now_s - self._started_s) * 1000),
-            client_count=self._stats.client_count(),
-            requests_served=self._stats.served,
-            requests_refused=self._stats.refused,
-            run_id=self.events.run_id,
+            client_count=self._calls.client_count(),
+            requests_served=self._calls.served,
+            requests_refused=self._calls.refused,
+            run_id=self._events.log.run_id,
         )

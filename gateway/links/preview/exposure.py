@@ -1,9 +1,38 @@
 """Who can watch the stream, by where its listener is reached and whether it is encrypted."""
 
+import logging
+
 from common.bind import bracketed
-from common.findings import Finding, good, note
+from common.findings import Finding, Verdict, good, note
 from gateway.config import GatewaySettings, is_loopback
 from gateway.status.preview import Listener
+from gateway.status.snapshot import Snapshot
+
+_log = logging.getLogger(__name__)
+
+
+class ExposureLog:
+    """Logs who can watch, whenever the listener is another one.
+
+    Args:
+        settings: say whether the stream is encrypted.
+    """
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self._settings = settings
+        self._listener: Listener | None = None
+
+    def take(self, now: Snapshot) -> None:
+        """Takes the snapshot of this instant."""
+        listener = now.preview.listener
+        if listener is None or listener == self._listener:
+            return
+        self._listener = listener
+        found = video_exposure(self._settings, listener)
+        if found.verdict is Verdict.GOOD:
+            _log.info("%s", found.what)
+        else:
+            _log.warning("%s (%s). %s", found.what, found.why, found.remedy)
 
 
 def video_exposure(settings: GatewaySettings, listener: Listener) -> Finding:
