@@ -51,17 +51,18 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 from common.backoff import Backoff
 from common.broadcast import Broadcast
 from common.errors import InvalidRequestError, NotRunningError, UserError
-from preview.cameras import Cameras
+from common.timer import Timer
+from preview.camera_follower import CameraFollower
 from preview.config import PreviewSettings
 from preview.encoders.catalogue import CATALOGUE
 from preview.encoders.crash_marker import CrashMarkerFile
 from preview.encoders.selection import Selection
+from preview.last_error import LastError
 from preview.lifecycle import (
     FIRST_RETRY_S,
     LONGEST_RETRY_S,
@@ -72,19 +73,16 @@ from preview.lifecycle import (
     State,
     state_for_viewers,
 )
-from preview.pipeline import sources
-from preview.pipeline.events import AccessUnit, Blame, Fault, HungError, PipelineEvents
+from preview.pipeline.events import Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
-from preview.pipeline.sources import SourcePlan
+from preview.ports import Pipeline, Recording
+from preview.teardowns import Teardowns
 from preview.values import (
     CAPTURE_OFFSET_NS,
     ActualState,
     DesiredState,
     EncoderChoice,
-    Measurement,
-    Profile,
     RecordedStream,
-    StreamState,
 )
 
 _log = logging.getLogger(__name__)
@@ -95,78 +93,6 @@ STEADY_AFTER_S: Final = 15.0
 """A pipeline that ran this long has recovered: the backoff starts again."""
 ENCODER_STOP_S: Final = 0.3
 """How long the next pipeline waits for the encoder of a failed one."""
-
-
-class Pipeline(Protocol):
-    """One pipeline; `preview.pipeline.runner.Runner` is the real one."""
-
-    @property
-    def plan(self) -> Plan:
-        """What it is made of."""
-
-    @property
-    def stream(self) -> StreamState:
-        """Parameters of the stream being served."""
-
-    @property
-    def measurement(self) -> Measurement | None:
-        """Newest statistics; None before the first window."""
-
-    async def start(self) -> None:
-        """Starts it. Failures are reported as events, also after this has returned."""
-
-    async def switch(self, profile: Profile) -> None:
-        """Switches to another profile; viewers stay connected."""
-
-    @property
-    def live_camera(self) -> str | None:
-        """Camera whose frames are served; None while it has failed and another one is being started."""
-
-    @property
-    def starting_camera(self) -> str | None:
-        """Camera that is being started beside the live one; None if none is."""
-
-    def show(self, source: SourcePlan | None) -> None:
-        """Starts another camera beside the live one, instead of any that is being started; None: none.
-
-        With its first frame it becomes the live one; viewers stay connected. Reported as an event.
-        """
-
-    async def listen(self, passphrase: str | None) -> None:
-        """Replaces the listener by one with another passphrase, None: by none; the encoder goes on.
-
-        Raises:
-            HungError: the old one hangs.
-        """
-
-    def record(self, take: Callable[[AccessUnit], None] | None) -> None:
-        """Hands each access unit to a recording from now on; None: to none."""
-
-    def request_key_frame(self, newest_pts: int | None) -> bool:
-        """Requests a key frame for a viewer that lost a picture; see `KeyframeGate.request_after_loss`."""
-
-    def take_picture_age(self, age_ms: int) -> None:
-        """Takes the age of the oldest picture that a viewer shows, for the adaptive bit rate."""
-
-    async def stop(self) -> "asyncio.Task[bool]":
-        """Stops listener and source, and returns the teardown of the encoder; False when that hangs.
-
-        Raises:
-            HungError: the listener or the source hangs.
-        """
-
-    async def write_graph(self, path: Path) -> None:
-        """Writes its graph, for finding the cause of a fault."""
-
-
-class Recording(Protocol):
-    """What the video tap wants of the pipelines; both are called on the loop."""
-
-    def take(self, unit: AccessUnit) -> None:
-        """Takes an access unit."""
-
-    def interrupted(self) -> None:
-        """The pipeline ends; what follows is another one's."""
 
 
 class Supervisor:
@@ -194,26 +120,24 @@ class Supervisor:
         """Notified of each change of the actual state."""
         self._instance_id = uuid.uuid4().hex
         self._lifecycle = Lifecycle()
+        self._wake = asyncio.Event()
         self._desired = DesiredState()
-        self._cameras = Cameras({name: each.fallback for name, each in settings.named_sources.items()})
-        self._camera_retry: asyncio.TimerHandle | None = None
-        self._last_error = ""
+        self._last_error = LastError()
+        self._cameras = CameraFollower(settings, self._last_error)
         self._pipeline: Pipeline | None = None
-        self._teardowns: dict[asyncio.Task[bool], str] = {}
-        """Encoders that have not stopped yet, by their teardown."""
+        self._teardowns = Teardowns(marker, encoders)
         self._running_since = 0.0
         self._encoder_failed = False
         self._retry_now = False
-        self._retry_timer: asyncio.TimerHandle | None = None
+        self._retry_timer = Timer(self._retry)
         self._watchers = 0
-        self._unwatched_timer: asyncio.TimerHandle | None = None
+        self._unwatched_timer = Timer(self._disable_unwatched)
         self._recording: Recording | None = None
         self._listener_backoff = Backoff(FIRST_RETRY_S, LONGEST_RETRY_S)
-        self._listener_retry: asyncio.TimerHandle | None = None
+        self._listener_retry = Timer(self._wake.set)
         """Runs while a listener that failed during a recording waits for its retry."""
         self._trials: asyncio.Task[bool] | None = None
         self._closed = False
-        self._wake = asyncio.Event()
 
     # --- for the gateway ---
 
@@ -235,7 +159,7 @@ class Supervisor:
         if desired.revision != self._desired.revision or desired.revision == 0:
             profile = desired.profile if desired.enabled else self._desired.profile
             if desired.enabled and not self._desired.enabled and self._lifecycle.state is State.RUNNING:
-                self._last_error = ""  # A new session, beside a recording.
+                self._last_error.clear()  # A new session, beside a recording.
             self._forget_listener_retry()
             self._listener_backoff.reset()
             self._desired = replace(desired, profile=profile)
@@ -256,7 +180,7 @@ class Supervisor:
             applied_revision=self._desired.revision,
             state=state,
             profile=self._desired.profile,
-            last_error=self._last_error,
+            last_error=self._last_error.text,
             counters=self._lifecycle.counters,
             address=self._settings.srt.reached_at,
             port=self._settings.srt.port,
@@ -274,10 +198,9 @@ class Supervisor:
     @property
     def _live_and_starting(self) -> tuple[str | None, str | None]:
         """The live camera and the one that is being started; None for none."""
-        pipeline, state = self._pipeline, self._lifecycle.state
-        if pipeline and state is State.RUNNING:
-            return pipeline.live_camera, pipeline.starting_camera
-        return None, pipeline.plan.source.camera if pipeline and state is State.STARTING else None
+        if self._pipeline and self._lifecycle.state is State.STARTING:
+            return None, self._pipeline.plan.source.camera
+        return self._cameras.live_and_starting
 
     @property
     def _reasons(self) -> tuple[Reason, ...]:
@@ -338,7 +261,6 @@ class Supervisor:
     def cameras_found(self, problems: Mapping[str, str]) -> None:
         """Takes why cameras can't be used, by name; empty for those that are there."""
         self._cameras.found(problems)
-        self._follow_cameras()
         self.changes.notify_all()
 
     # --- for the video tap ---
@@ -358,7 +280,7 @@ class Supervisor:
         return RecordedStream(
             state=self._lifecycle.state,
             profile=self._desired.profile,
-            error=self._last_error,
+            error=self._last_error.text,
             stream=pipeline.stream if pipeline else None,
             encoder=pipeline.plan.choice if pipeline else None,
             camera=pipeline.plan.source.camera if pipeline else "",
@@ -398,7 +320,7 @@ class Supervisor:
             case State.STOPPING:
                 await self._finish_stopping()
             case State.DISABLED if self._teardowns:
-                await self._join_teardowns()
+                await self._teardowns.join()
             case State.FAULTED:
                 return await self._recover()
             case State.STARTING if pipeline is None:
@@ -436,13 +358,13 @@ class Supervisor:
         except UserError as error:
             self.failed(Fault(Blame.OTHER, str(error)))
             return
-        camera = self._cameras.next_attempt(None, self._now()) or self._cameras.wanted
+        camera = self._cameras.first
         try:
             plan = make_plan(self._settings, self._desired, encoder, choice, camera)
             self._report_software_fallback(choice)
             pipeline = self._pipeline = self._new_pipeline(plan, self)
         except UserError as error:
-            self._cameras.failed(camera, str(error), self._now())
+            self._cameras.failed(camera, str(error))
             self.failed(Fault(Blame.SOURCE, str(error)))
             return
         self._retry_now = False
@@ -455,10 +377,10 @@ class Supervisor:
     def _report_software_fallback(self, choice: EncoderChoice) -> None:
         """Software encoding on a robot with hardware encoders is an error, even though frames flow."""
         if CATALOGUE[choice.wanted].hardware and not choice.hardware:
-            self._last_error = (
-                f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}"
+            self._last_error.report(
+                f"no hardware encoder works, so the CPU encodes with {choice.name}: {choice.fallback_reason}",
+                logging.WARNING,
             )
-            _log.warning("%s", self._last_error)
 
     async def _recover(self) -> bool:
         """Tears the failed pipeline down and arranges what follows; False when only waiting is left."""
@@ -478,10 +400,10 @@ class Supervisor:
             self._retry_now = False
             self._move(Event.RETRY)
         else:
-            if self._retry_timer is None:
+            if not self._retry_timer:
                 delay_s = self._lifecycle.retry_delay_s
                 _log.info("next attempt in %g s", delay_s)
-                self._retry_timer = asyncio.get_running_loop().call_later(delay_s, self._retry)
+                self._retry_timer.start(delay_s)
             return False
         return True
 
@@ -489,11 +411,11 @@ class Supervisor:
         if self._pipeline:
             await self._tear_down(self._pipeline, wait_s=None)
         if not self._reasons:
-            await self._join_teardowns()
+            await self._teardowns.join()
         self._move(Event.STOPPED)
         if self._reasons:
             # Another passphrase, or enabled again in the meantime.
-            self._last_error = ""
+            self._last_error.clear()
             self._move(Event.ENABLE)
 
     async def _tear_down(self, pipeline: Pipeline, wait_s: float | None) -> None:
@@ -501,27 +423,8 @@ class Supervisor:
         if self._recording:
             self._recording.interrupted()
         teardown = await pipeline.stop()
-        self._teardowns[teardown] = pipeline.plan.encoder.name
-        await asyncio.wait({teardown}, timeout=wait_s)
+        await self._teardowns.wait_for(teardown, pipeline.plan.encoder.name, wait_s)
         self._pipeline = None
-        self._teardowns = {task: name for task, name in self._teardowns.items() if not _has_finished(task)}
-        if not self._teardowns:
-            self._marker.clear()
-
-    async def _join_teardowns(self) -> None:
-        """Waits for encoders that were left behind.
-
-        Raises:
-            HungError: one of them hangs; the crash marker names it.
-        """
-        if self._teardowns:
-            await asyncio.wait(self._teardowns)
-        hung = [name for task, name in self._teardowns.items() if not _has_finished(task)]
-        self._teardowns.clear()
-        if hung:
-            self._marker.set(hung[0], "it hung when it was stopped", self._encoders.proven)
-            raise HungError(f"encoder {hung[0]} hung when it was stopped")
-        self._marker.clear()
 
     # --- events: move the lifecycle, on the loop, at once ---
 
@@ -530,8 +433,7 @@ class Supervisor:
         self._running_since = asyncio.get_running_loop().time()
         self._move(Event.FIRST_FRAME)
         if self._pipeline:
-            self._cameras.delivers(self._pipeline.plan.source.camera, self._now())
-        self._follow_cameras()
+            self._cameras.delivers(self._pipeline.plan.source.camera)
 
     def measured(self, viewers_refused: int) -> None:
         """Handles new statistics of the pipeline."""
@@ -547,93 +449,49 @@ class Supervisor:
     def camera_shown(self, camera: str) -> None:
         """Handles another camera that is live now."""
         _log.info("camera %s is live", camera)
-        self._cameras.delivers(camera, self._now())
-        self._follow_cameras()
+        self._cameras.delivers(camera)
         self.changes.notify_all()
 
     def camera_failed(self, camera: str, fault: Fault) -> bool:
         """Handles the fault of a camera; whether the pipeline goes on, with the live one or another."""
-        _log.error("%s", fault.text)
-        self._last_error = fault.text
-        self._cameras.failed(camera, fault.text, self._now())
-        self._follow_cameras()
+        self._last_error.report(fault.text)
+        self._cameras.failed(camera, fault.text)
         self.changes.notify_all()
         return any(self._live_and_starting)
-
-    def _follow_cameras(self, *, new_request: bool = False) -> None:
-        """Starts a better camera than the live one, beside it, or arranges when to."""
-        if self._camera_retry:
-            self._camera_retry.cancel()
-            self._camera_retry = None
-        pipeline = self._pipeline
-        if pipeline is None or self._lifecycle.state is not State.RUNNING:
-            return
-        live, starting = pipeline.live_camera, pipeline.starting_camera
-        if starting in self._cameras.chain and not new_request:
-            return  # What follows is decided when it delivers, or fails.
-        while (camera := self._cameras.next_attempt(live, self._now())) is not None:
-            if camera == starting:
-                return
-            try:
-                source = sources.plan_camera(self._settings, camera)
-            except UserError as error:
-                _log.error("%s", error)
-                self._last_error = str(error)
-                self._cameras.failed(camera, str(error), self._now())
-                continue
-            _log.info("camera %s -> %s", live or "(failed)", camera)
-            pipeline.show(source)
-            return
-        if live is None:
-            return
-        if starting is not None:
-            pipeline.show(None)
-        wait_s = self._cameras.wait_s(live, self._now())
-        if wait_s is not None:
-            loop = asyncio.get_running_loop()
-            self._camera_retry = loop.call_later(wait_s, self._follow_cameras)
-
-    def _now(self) -> float:
-        return asyncio.get_running_loop().time()
 
     def listener_failed(self, fault: Fault) -> bool:
         """Handles the fault of a listener; a recording goes on without it."""
         if self._recording is None:
             return False
-        _log.error("%s; the recording goes on", fault.text)
-        self._last_error = fault.text
-        delay_s = self._listener_backoff.next_s()
-        loop = asyncio.get_running_loop()
-        self._listener_retry = loop.call_later(delay_s, self._forget_listener_retry)
+        self._last_error.report(fault.text)
+        _log.info("the recording goes on without a listener")
+        self._listener_retry.start(self._listener_backoff.next_s())
         self._wake.set()
         self.changes.notify_all()
         return True
 
     def _forget_listener_retry(self) -> None:
         """Has the listener tried again now, if it waits for that."""
-        if self._listener_retry:
-            self._listener_retry.cancel()
-            self._listener_retry = None
+        if self._listener_retry.cancel():
             self._wake.set()
 
     def failed(self, fault: Fault) -> None:
         """Handles the fault of a pipeline, or of the attempt to build one."""
-        _log.error("%s", fault.text)
         if self._lifecycle.state is State.STOPPING:
+            _log.error("%s", fault.text)
             return
-        self._last_error = fault.text
+        self._last_error.report(fault.text)
         if fault.blame is Blame.SOURCE:
             if self._pipeline and self._lifecycle.state is State.STARTING:
                 # While running, the pipeline has reported it before.
-                self._cameras.failed(self._pipeline.plan.source.camera, fault.text, self._now())
-            self._retry_now = self._retry_now or self._cameras.next_attempt(None, self._now()) is not None
+                self._cameras.failed(self._pipeline.plan.source.camera, fault.text)
+            self._retry_now = self._retry_now or self._cameras.has_one_to_try
         self._move(Event.FAILURE)
         if fault.blame is Blame.ENCODER and self._pipeline:
             self._encoders.pass_over(self._pipeline.plan.encoder.name, fault.text)
             self._encoder_failed = True
 
     def _retry(self) -> None:
-        self._retry_timer = None
         self._move(Event.RETRY)
 
     def _follow_desired(self, *, new_request: bool) -> None:
@@ -644,7 +502,7 @@ class Supervisor:
                 self._move(Event.DISABLE)
         elif state is State.DISABLED or (state is State.FAULTED and torn_down and new_request):
             if state is State.DISABLED:
-                self._last_error = ""
+                self._last_error.clear()
             self._move(Event.ENABLE)
         elif state is State.FAULTED:
             self._retry_now = self._retry_now or new_request
@@ -656,25 +514,21 @@ class Supervisor:
             # A new session: viewers that know the old passphrase must be disconnected.
             self._move(Event.DISABLE)
         elif new_request:
-            self._follow_cameras(new_request=True)
+            self._cameras.follow(new_request=True)
         self._wake.set()
         self.changes.notify_all()
 
     def _restart_unwatched_timer(self) -> None:
         """Restarts the timer that disables the preview when no gateway watches it."""
         limit_s = self._settings.timeouts.without_gateway_s
-        if self._unwatched_timer:
-            self._unwatched_timer.cancel()
-            self._unwatched_timer = None
+        self._unwatched_timer.cancel()
         if self._watchers == 0 and self._desired.enabled and limit_s > 0:
-            loop = asyncio.get_running_loop()
-            self._unwatched_timer = loop.call_later(limit_s, self._disable_unwatched)
+            self._unwatched_timer.start(limit_s)
 
     def _disable_unwatched(self) -> None:
-        self._unwatched_timer = None
         limit_s = self._settings.timeouts.without_gateway_s
-        self._last_error = f"the preview stopped by itself: no gateway has watched it for {limit_s:g} s"
-        _log.warning("%s", self._last_error)
+        text = f"the preview stopped by itself: no gateway has watched it for {limit_s:g} s"
+        self._last_error.report(text, logging.WARNING)
         # Revision 0, so that the same revision counts as a new request.
         self._desired = DesiredState(profile=self._desired.profile)
         self._follow_desired(new_request=True)
@@ -682,17 +536,15 @@ class Supervisor:
     def _move(self, event: Event) -> None:
         before = self._lifecycle.state
         after = self._lifecycle.handle(event)
-        if self._retry_timer and after is not State.FAULTED:
+        if after is not State.FAULTED:
             self._retry_timer.cancel()
-            self._retry_timer = None
+        if after is not State.RUNNING:
+            self._cameras.detach()
+        elif before is not State.RUNNING and self._pipeline:
+            self._cameras.attach(self._pipeline)
         if self._trials and event is Event.DISABLE:
             self._trials.cancel()
         if after is not before:
             _log.info("%s -> %s (%s)", before.value, after.value, event.value)
         self._wake.set()
         self.changes.notify_all()
-
-
-def _has_finished(teardown: "asyncio.Task[bool]") -> bool:
-    """Whether an encoder is stopped; not while it is stopping, nor when it hangs."""
-    return teardown.done() and teardown.result()

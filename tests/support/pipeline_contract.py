@@ -21,7 +21,7 @@ from preview.encoders.catalogue import CATALOGUE
 from preview.pipeline.events import AccessUnit, Blame, Fault, PipelineEvents
 from preview.pipeline.plan import Plan, make_plan
 from preview.pipeline.sources import SourcePlan
-from preview.supervisor import Pipeline
+from preview.ports import Pipeline
 from preview.values import DesiredState, EncoderChoice, Profile, Target
 from tests.support.free import free_udp_port
 

@@ -1,0 +1,132 @@
+"""Brings the running pipeline to the camera that is to be live, as cameras.py decides."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+
+from common.errors import UserError
+from common.timer import Timer
+from preview.cameras import Camera, Cameras
+from preview.config import PreviewSettings
+from preview.last_error import LastError
+from preview.pipeline import sources
+from preview.ports import Pipeline
+
+_log = logging.getLogger(__name__)
+
+
+class CameraFollower:
+    """Starts a better camera than the live one beside it, and tries failed ones again when their time comes.
+
+    Without a running pipeline it only remembers what cameras did. Used on the event loop.
+
+    Args:
+        settings: name the cameras and their fallbacks.
+        last_error: where a camera that can't be used is reported.
+    """
+
+    def __init__(self, settings: PreviewSettings, last_error: LastError) -> None:
+        self._settings = settings
+        self._last_error = last_error
+        self._cameras = Cameras({name: each.fallback for name, each in settings.named_sources.items()})
+        self._pipeline: Pipeline | None = None
+        self._retry_timer = Timer(self.follow)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All cameras, in the order of the configuration."""
+        return self._cameras.names
+
+    @property
+    def wanted(self) -> str:
+        """The camera that is to be live."""
+        return self._cameras.wanted
+
+    @property
+    def first(self) -> str:
+        """The camera that a new pipeline is to start with."""
+        return self._cameras.next_attempt(None, _now()) or self._cameras.wanted
+
+    @property
+    def has_one_to_try(self) -> bool:
+        """Whether a new pipeline may be tried at once: some camera does not wait for its retry."""
+        return self._cameras.next_attempt(None, _now()) is not None
+
+    @property
+    def live_and_starting(self) -> tuple[str | None, str | None]:
+        """The camera that is live in the running pipeline, and the one that is being started in it."""
+        pipeline = self._pipeline
+        return (pipeline.live_camera, pipeline.starting_camera) if pipeline else (None, None)
+
+    def listed(self, live: str | None, starting: str | None) -> tuple[Camera, ...]:
+        """Returns all cameras; see `Cameras.listed`."""
+        return self._cameras.listed(live, starting)
+
+    def attach(self, pipeline: Pipeline) -> None:
+        """Follows in this pipeline, which runs, from now on."""
+        self._pipeline = pipeline
+
+    def detach(self) -> None:
+        """The pipeline runs no longer."""
+        self._pipeline = None
+        self._retry_timer.cancel()
+
+    def want(self, name: str) -> None:
+        """Takes a request of an operator; see `Cameras.want`."""
+        self._cameras.want(name)
+
+    def found(self, problems: Mapping[str, str]) -> None:
+        """Takes why cameras can't be used, by name; empty for those that are there."""
+        self._cameras.found(problems)
+        self.follow()
+
+    def delivers(self, camera: str) -> None:
+        """Takes the first frame of a camera."""
+        self._cameras.delivers(camera, _now())
+        self.follow()
+
+    def failed(self, camera: str, failure: str) -> None:
+        """Takes the failure of a camera, while it was live or started."""
+        self._cameras.failed(camera, failure, _now())
+        self.follow()
+
+    def follow(self, *, new_request: bool = False) -> None:
+        """Starts a better camera than the live one, or arranges when to.
+
+        Args:
+            new_request: an operator has just chosen: a camera that is being started may be given up.
+        """
+        self._retry_timer.cancel()
+        pipeline = self._pipeline
+        if pipeline is None:
+            return
+        live, starting = pipeline.live_camera, pipeline.starting_camera
+        if starting in self._cameras.chain and not new_request:
+            return  # What follows is decided when it delivers, or fails.
+        if self._start_better(pipeline, live, starting) or live is None:
+            return
+        if starting is not None:
+            pipeline.show(None)
+        wait_s = self._cameras.wait_s(live, _now())
+        if wait_s is not None:
+            self._retry_timer.start(wait_s)
+
+    def _start_better(self, pipeline: Pipeline, live: str | None, starting: str | None) -> bool:
+        """Starts the best camera that can be used; False if none is better than the live one."""
+        while (camera := self._cameras.next_attempt(live, _now())) is not None:
+            if camera == starting:
+                return True
+            try:
+                source = sources.plan_camera(self._settings, camera)
+            except UserError as error:
+                self._last_error.report(str(error))
+                self._cameras.failed(camera, str(error), _now())
+                continue
+            _log.info("camera %s -> %s", live or "(failed)", camera)
+            pipeline.show(source)
+            return True
+        return False
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
