@@ -39,8 +39,10 @@ from gateway.links.recorder.calls import RecorderCalls
 from gateway.links.recorder.incidents import Incidents
 from gateway.links.recorder.link import RecorderLink
 from gateway.links.recorder.wire import RecorderConnector
-from gateway.metrics.collector import BridgeMetrics, GatewayCollector, RecorderMetrics
+from gateway.metrics.bridge import BridgeMetrics
+from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
+from gateway.metrics.recorder import RecorderMetrics
 from gateway.platform.sampler import PlatformSampler
 from gateway.rpc.calls.methods import SERVICES
 from gateway.rpc.calls.recipient import Recipients

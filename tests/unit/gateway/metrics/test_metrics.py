@@ -15,8 +15,10 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from common.histogram import Histogram
 from gateway.links.bridge.requests import Outcome
-from gateway.metrics.collector import BridgeMetrics, GatewayCollector, RecorderMetrics
+from gateway.metrics.bridge import BridgeMetrics
+from gateway.metrics.collector import GatewayCollector
 from gateway.metrics.loop_delay import LoopDelay
+from gateway.metrics.recorder import RecorderMetrics
 from gateway.rpc.calls.recipient import Recipient
 from gateway.rpc.connections.packet_filter import ConnectPolicy
 from gateway.rpc.interceptors.stats import MethodStats, Stats
