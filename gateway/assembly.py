@@ -19,6 +19,7 @@ from common.rpc import possible_connections
 from gateway.access_control import AccessControl
 from gateway.config import GatewaySettings
 from gateway.events import Events
+from gateway.health_reporter import HealthReporter
 from gateway.links.bridge.calls import BridgeCalls
 from gateway.links.bridge.copies import Copies
 from gateway.links.bridge.link import BridgeLink
@@ -71,7 +72,6 @@ from gateway.shown_settings import shown_settings
 from gateway.state import State
 from gateway.status.board import Board
 from gateway.status.snapshot import Snapshot
-from gateway.supervision import Supervision
 from gateway.teleop.episodes import Episodes
 from gateway.teleop.teleop import Teleop
 
@@ -220,7 +220,7 @@ def build(settings: GatewaySettings, outside: Outside) -> Gateway:
     )
     loop_delay = LoopDelay()
     health = Health(SERVICE)
-    subscribers = (Supervision(health, state.board), ExposureLog(settings), recording, cloud)
+    subscribers = (HealthReporter(health, state.board), ExposureLog(settings), recording, cloud)
     return Gateway(
         settings=settings,
         outside=outside,

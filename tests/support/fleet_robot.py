@@ -9,7 +9,7 @@ from typing import Any
 from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from gateway.supervision import BRIDGE_HEALTH
+from gateway.health_reporter import BRIDGE_HEALTH
 from omniseer.gateway.v1 import event_pb2
 from omniseer.gateway.v1.recording_pb2_grpc import RecordingServiceStub
 from omniseer.gateway.v1.robot_gateway_pb2 import SubscribeEventsRequest

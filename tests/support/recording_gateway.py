@@ -11,7 +11,7 @@ import grpc
 from grpc_health.v1 import health_pb2
 from grpc_health.v1.health_pb2_grpc import HealthStub
 
-from gateway.supervision import RECORDER_HEALTH
+from gateway.health_reporter import RECORDER_HEALTH
 from omniseer.gateway.v1 import recording_pb2 as pb
 from omniseer.gateway.v1.recording_pb2_grpc import RecordingServiceStub
 from tests.support.eventually import eventually

@@ -13,10 +13,10 @@ from grpc_health.v1.health_pb2_grpc import HealthStub
 from gateway.app import running
 from gateway.assembly import ThisRobot, build
 from gateway.config import GatewaySettings
+from gateway.health_reporter import ROS_HUNG_AFTER_S, hung_part
 from gateway.links.preview.feedback import PreviewServiceConnector
 from gateway.rpc.server import SERVICE
 from gateway.status.board import Board
-from gateway.supervision import ROS_HUNG_AFTER_S, hung_part
 from omniseer.gateway.v1.robot_gateway_pb2 import GetSystemStatusRequest
 from omniseer.gateway.v1.robot_gateway_pb2_grpc import RobotGatewayStub
 from tests.support.eventually import eventually

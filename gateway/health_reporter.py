@@ -20,7 +20,7 @@ ROS_HUNG_AFTER_S: Final = 30.0
 """Without a pass of the ROS sampler: no load explains it, and only another process reads ROS again."""
 
 
-class Supervision:
+class HealthReporter:
     """Keeps the health service and the heartbeats in step with the newest snapshot.
 
     Args:
