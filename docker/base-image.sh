@@ -1,20 +1,31 @@
 #!/usr/bin/env bash
 # Makes debian:bookworm-slim, or another suite's image, from the distribution's own packages where no image registry can
 # be reached. Every Dockerfile that says FROM debian:SUITE-slim then builds. Does nothing when the image is there.
-#   docker/base-image.sh [--force] [SUITE]     --force makes it anew; SUITE: bookworm (default), trixie
+#   docker/base-image.sh [--force] [--arch arm64] [SUITE]
+# --force makes it anew. SUITE: bookworm (default), trixie. --arch makes that of another processor, as SUITE-slim-arm64, because
+# a tag has one platform; programs of it must run here (docker/emulation).
 # Uses the package mirrors this machine uses, or the one named in DEBIAN_MIRROR.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 force=no
 suite=bookworm
-for argument; do
-  case "$argument" in
+own=$(dpkg --print-architecture)
+arch=$own
+usage() { echo "usage: docker/base-image.sh [--force] [--arch amd64 | arm64] [bookworm | trixie]" >&2; exit 2; }
+while [ $# -gt 0 ]; do
+  case "$1" in
     --force) force=yes ;;
-    bookworm | trixie) suite=$argument ;;
-    *) echo "usage: docker/base-image.sh [--force] [bookworm | trixie]" >&2; exit 2 ;;
+    --arch)
+      shift
+      case "${1:-}" in amd64 | arm64) arch=$1 ;; *) usage ;; esac
+      ;;
+    bookworm | trixie) suite=$1 ;;
+    *) usage ;;
   esac
+  shift
 done
 image=debian:$suite-slim
+[ "$arch" = "$own" ] || image=$image-$arch
 
 fail() { echo "base-image: $1" >&2; exit 1; }
 say() { echo "base-image: $1" >&2; }
@@ -35,6 +46,7 @@ sources() {
 }
 
 [ $force = yes ] || ! docker image inspect "$image" > /dev/null 2>&1 || exit 0
+[ "$arch" != arm64 ] || docker/emulation --check
 command -v debootstrap > /dev/null || fail "debootstrap is missing. Type: sudo apt install debootstrap"
 mirror=$(sources | awk -v suite="$suite" '$2 == suite { print $1; exit }')
 [ -n "$mirror" ] || fail "this machine has no package source for Debian $suite. Name one: DEBIAN_MIRROR=http://... $0"
@@ -44,13 +56,17 @@ root=$(mktemp -d .cache/base-image.XXXXXX)
 trap 'as_root rm -rf "$root"' EXIT
 started=$SECONDS
 say "making $image from packages"
-as_root debootstrap --variant=minbase "$suite" "$root/system" "$mirror" > ".cache/base-image-$suite.log" 2>&1 ||
-  { tail -n 10 ".cache/base-image-$suite.log" >&2; fail "debootstrap failed; the lines above say why"; }
+as_root debootstrap --variant=minbase --arch "$arch" "$suite" "$root/system" "$mirror" > ".cache/base-image-$suite-$arch.log" 2>&1 ||
+  { tail -n 10 ".cache/base-image-$suite-$arch.log" >&2; fail "debootstrap failed; the lines above say why"; }
 sources | sed 's/^/deb /' | as_root tee "$root/system/etc/apt/sources.list" > /dev/null
 # The official slim image leaves these out as well: a container needs no manual pages.
 as_root rm -rf "$root/system/var/cache/apt/archives" "$root/system"/usr/share/{doc,man,info,locale}/* \
   "$root/system"/var/lib/apt/lists/*
 printf 'path-exclude /usr/share/%s/*\n' doc man info locale |
   as_root tee "$root/system/etc/dpkg/dpkg.cfg.d/slim" > /dev/null
-as_root tar -C "$root/system" -c . | docker import --change 'CMD ["bash"]' - "$image" > /dev/null
+# Built, not imported: Docker 20.10 takes every import for one of this machine's processor.
+mkdir "$root/context"
+as_root tar -C "$root/system" -c . > "$root/context/system.tar"
+printf '%s\n' 'FROM scratch' 'ADD system.tar /' 'CMD ["bash"]' > "$root/context/Dockerfile"
+DOCKER_BUILDKIT=1 docker build --quiet --platform "linux/$arch" -t "$image" "$root/context" > /dev/null
 say "$image is there, $((SECONDS - started)) s"

@@ -107,3 +107,21 @@ def test_saving_what_was_not_built_leaves_no_file(tmp_path: Path) -> None:
     assert ended.returncode == 1
     assert "scripts/images build" in ended.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ["--platform", "linux/arm64", "--ros", "wheels"],
+            "the wheels exist for x86-64 only: --ros packages",
+        ),
+        (["--platform", "linux/riscv64"], "usage: scripts/images build"),
+        (["robot-arm"], "usage: scripts/images build"),
+    ],
+)
+def test_what_it_can_not_build_is_refused(words: list[str], said: str) -> None:
+    refused = scripts_images("build", *words)
+    assert refused.returncode != 0
+    assert said in refused.stderr
+    assert not refused.stdout
