@@ -197,6 +197,8 @@ class _Cockpit:
                     self._call(self._stop("by the driver's keyboard"))
                 case Action.RESET:
                     self._call(self._reset())
+                case Action.RELEASE:
+                    self._controls.release()
         self._hold(hands)
 
     def _hold(self, hands: Hands) -> None:

@@ -48,6 +48,11 @@ class Controls:
             raise self._pad.error
         return self._pad.take_stop()
 
+    def release(self) -> None:
+        """Releases the gamepad; what is still held counts only after it was let go."""
+        if self._pad:
+            self._pad.forget()
+
     def advice(self) -> str:
         """Returns how to drive now."""
         pad = self._pad.name if self._pad else ""

@@ -127,6 +127,26 @@ def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot
         assert screen.process.wait(20) == 0
 
 
+def test_a_terminal_that_loses_the_focus_releases_the_gamepad_as_well(robot: DrivenRobot) -> None:
+    words = ["drive", "--input", "gamepad", "--target", robot.target]
+    with terminal_with(
+        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=160
+    ) as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(PLAIN_ANSWER)
+        screen.wait_for("hold a shoulder button of")
+        screen.process.send_signal(signal.SIGUSR1)
+        wait_until(lambda: robot.base.moves, "the base moves")
+        screen.press("\x1b[O")
+        wait_until(lambda: not robot.base.moves, "the base is at rest", 2)
+        before = len(robot.base.heard)
+        screen.press("\x1b[I")
+        time.sleep(0.5)
+        assert not any(each.moves for each in robot.base.heard[before:]), "it counts when it is held anew"
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
 def test_without_a_terminal_it_says_so(robot: DrivenRobot) -> None:
     refused = robotctl_process("drive", "--target", robot.target)
     assert refused.returncode == 1
