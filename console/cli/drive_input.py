@@ -53,9 +53,11 @@ class Controls:
         if self._pad:
             self._pad.forget()
 
-    def advice(self) -> str:
+    def advice(self, keys: Hands) -> str:
         """Returns how to drive now."""
         pad = self._pad.name if self._pad else ""
+        if self._choice is not Input.GAMEPAD and not keys.answers(time.monotonic()):
+            return "the terminal does not answer: no key counts until it does, and is pressed anew"
         if self._choice is Input.GAMEPAD:
             return (
                 f"hold a shoulder button of {pad} to drive, B stops, x ends" if pad else "plug a gamepad in"
