@@ -233,7 +233,8 @@ class _Cockpit:
             return
         line = self._driving.reasons()
         if self._begun:
-            line = _line(state, self._driving, self._note or self._controls.advice(hands))
+            note = self._controls.problem(hands) or self._note or self._controls.advice()
+            line = _line(state, self._driving, note)
         if line != self._shown:
             self._shown = line
             width = self._session.out.width - 1

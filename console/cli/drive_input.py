@@ -53,11 +53,15 @@ class Controls:
         if self._pad:
             self._pad.forget()
 
-    def advice(self, keys: Hands) -> str:
+    def problem(self, keys: Hands) -> str:
+        """Returns why what is held does not count any more; empty without such a reason."""
+        if self._choice is not Input.GAMEPAD and not keys.answers(time.monotonic()):
+            return "the terminal does not answer: a key counts when it does, and the key is pressed anew"
+        return self._pad.problem() if self._pad else ""
+
+    def advice(self) -> str:
         """Returns how to drive now."""
         pad = self._pad.name if self._pad else ""
-        if self._choice is not Input.GAMEPAD and not keys.answers(time.monotonic()):
-            return "the terminal does not answer: no key counts until it does, and is pressed anew"
         if self._choice is Input.GAMEPAD:
             return (
                 f"hold a shoulder button of {pad} to drive, B stops, x ends" if pad else "plug a gamepad in"

@@ -46,6 +46,9 @@ class Pad(Protocol):
     def description(self) -> str:
         """Returns which gamepad there is, or why there is none."""
 
+    def problem(self) -> str:
+        """Returns why what is held does not count any more, for people; empty without such a reason."""
+
     def steering(self) -> Steering | None:
         """Returns how it steers; None while it does not hold."""
 

@@ -43,8 +43,13 @@ class PlayedPad:
     stop: bool = False
     forgotten: int = 0
 
+    why_not: str = ""
+
     def description(self) -> str:
         return "played & tested"
+
+    def problem(self) -> str:
+        return self.why_not
 
     def steering(self) -> Steering | None:
         return self.steers
@@ -301,6 +306,14 @@ def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None
     # Before that, a window that waits for a processor may have it at rest for a moment.
     until(lambda: "STOPPED" in seat.shown(), "the phase")
     seat.rests()
+
+
+def test_a_gamepad_that_holds_no_more_is_reported_once(seat: Seat) -> None:
+    pad = PlayedPad(why_not="it has fallen asleep")
+    seat.window.driving.hands.pad = pad
+    seat.note("it has fallen asleep")
+    let_pass(0.5)
+    assert sum("it has fallen asleep" in note.text for note in seat.window.toasts.notes) == 1
 
 
 def test_stop_is_for_anyone_and_the_latch_that_is_shown_is_reset(seat: Seat) -> None:

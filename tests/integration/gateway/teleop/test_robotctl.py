@@ -9,6 +9,7 @@ import pytest
 
 from console.cli.drive_keys import KNOWN_FOR_S
 from console.cli.loop_signals import ENDING
+from console.gamepad.silence import HELD_FOR_S
 from tests.support.driven_robot import DrivenRobot
 from tests.support.kitty import robotctl_on_kitty
 from tests.support.robotctl import robotctl, robotctl_process
@@ -167,11 +168,35 @@ def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot
         screen.press("w")
         screen.process.send_signal(signal.SIGUSR1)
         wait_until(lambda: robot.base.moves, "the base moves")
+        screen.process.send_signal(signal.SIGUSR1)
         time.sleep(1.0)
         assert robot.base.moves, "as long as it is held"
         screen.process.send_signal(signal.SIGUSR2)
         at_rest(robot)
         screen.wait_for("plug a gamepad in")
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
+def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: DrivenRobot) -> None:
+    """As one out of range: the computer keeps its last values for seconds."""
+    words = ["drive", "--input", "gamepad", "--target", robot.target]
+    with terminal_with(
+        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=260
+    ) as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(PLAIN_ANSWER)
+        screen.wait_for("hold a shoulder button of")
+        screen.process.send_signal(signal.SIGUSR1)
+        held_s = time.monotonic()
+        wait_until(lambda: robot.base.moves, "the base moves")
+        wait_until(lambda: not robot.base.moves, "the base is at rest", HELD_FOR_S + 1.0)
+        assert time.monotonic() - held_s < HELD_FOR_S + 0.5
+        screen.wait_for("nothing new")
+        before = len(robot.base.heard)
+        screen.process.send_signal(signal.SIGUSR1)
+        time.sleep(0.5)
+        assert not any(each.moves for each in robot.base.heard[before:]), "it is back, and still held"
         screen.press("x")
         assert screen.process.wait(20) == 0
 
