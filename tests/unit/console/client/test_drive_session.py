@@ -1,13 +1,14 @@
 """What a driver's session sends: when a hold lapses, and when another one begins."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from functools import partial
 from itertools import count
 
 import pytest
 
+from console.client.blocking import BlockingDriveSession
 from console.client.driving import (
     COMMANDS_PER_S,
     HOLD_COUNTS_S,
@@ -18,6 +19,7 @@ from console.client.driving import (
     LaneItem,
 )
 from console.client.errors import Refused, Unreachable
+from console.client.loop_thread import LoopThread
 from console.client.mapping.methods import Method
 from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState
 from omniseer.gateway.v1 import teleop_pb2
@@ -277,3 +279,36 @@ async def test_a_velocity_that_is_no_number_is_refused_and_holds_nothing() -> No
         with pytest.raises(ValueError, match="finite"):
             session.hold(float("nan"))
         assert not any(await more_commands(robot, 5))
+
+
+@contextmanager
+def driving_in_a_thread(robot: Robot) -> Iterator[BlockingDriveSession]:
+    loop = LoopThread()
+    try:
+        with BlockingDriveSession(loop, DriveSession(robot.connect, DriveOptions(), 5.0)) as session:
+            session.ready(within_s=5.0)
+            yield session
+    finally:
+        loop.stop()
+
+
+def test_blocking_code_sees_what_the_loop_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Robot()
+    with driving_in_a_thread(robot) as session:
+        states = session.states()
+        first, second = next(states), next(states)
+        assert first.monotonic_ns < second.monotonic_ns
+        assert session.is_ready
+        assert session.state_age_s < 5.0
+        assert session.open_lanes == LANES
+        session.hold(SPEED_MPS)
+        next(state for state in states if robot.held)
+        have_holds_count_for(monkeypatch, HOLD_COUNTS_S)
+        next(state for state in states if not robot.held)
+        session.hold(SPEED_MPS)
+        assert (session.lapsed, session.error) == (True, None)
+        robot.ends_with = Refused("taken over")
+        with pytest.raises(Refused, match="taken over"):
+            for _ in states:
+                pass
+        assert session.error is robot.ends_with
