@@ -39,10 +39,13 @@ LETTERS: Final = {
 
 
 def steering_of(down: Collection[Direction]) -> Steering | None:
-    """Returns what the keys that are down amount to; None with no key down. Opposite ones cancel out."""
+    """Returns what the keys that are down amount to; None with no key down.
+
+    Opposite ones cancel out. Two keys of one direction are no more than one.
+    """
     if not down:
         return None
-    return Steering(*(sum(parts) for parts in zip(*(key.value for key in down), strict=True)))
+    return Steering(*(sum(parts) for parts in zip(*(key.value for key in set(down)), strict=True)))
 
 
 class Speeds(NamedTuple):

@@ -1,20 +1,17 @@
 """robotctl drive: drives the robot by the keys of this terminal or by a gamepad, within sight of it."""
 
 import asyncio
-import signal
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, Any, Final
 
 import typer
 
 from common.errors import UserError
-from console.cli import drive_keys
+from console.cli import drive_terminal
 from console.cli.drive_input import Controls, Input, controls
 from console.cli.drive_keys import Action, Hands
 from console.cli.keyboard import Keyboard, has_keyboard
+from console.cli.loop_signals import ENDING, handled
 from console.cli.session import Session, print_json, with_session
 from console.client import (
     AsyncGatewayClient,
@@ -32,8 +29,6 @@ from console.steering import Speeds, permitted
 _TICK_S: Final = 0.02
 _DRAW_EVERY: Final = 10
 """Ticks between two lines on the terminal."""
-_ANSWER_WITHIN_S: Final = 0.2
-"""How long a terminal may take to say which keyboard protocol it speaks."""
 
 
 TakeOverOption = Annotated[
@@ -146,39 +141,36 @@ class _Cockpit:
         keyboard = Keyboard()
         keyboard.take()
         try:
-            releases = await _reports_releases(keyboard)
-            hands = Hands(releases=releases)
-            with self._until_signalled(), _reading(keyboard, self._take, hands), _modes(releases):
-                ticks = 0
-                while not self._ending:
-                    self._driving.check()
-                    if self._controls.take_stop():
-                        hands.release()
-                        self._call(self._stop("by the driver's gamepad"))
-                    self._hold(hands)
-                    if ticks % _DRAW_EVERY == 0:
-                        self._show()
-                    ticks += 1
-                    await asyncio.sleep(_TICK_S)
+            with handled(dict.fromkeys(ENDING, self._end)):
+                async with drive_terminal.reporting_keys(keyboard) as liveness:
+                    hands = Hands(releases=liveness is not None, liveness=liveness)
+                    with drive_terminal.reading(keyboard, lambda typed: self._take(typed, hands)):
+                        await self._drive(hands)
         finally:
-            self._driving.release()
             keyboard.give_back()
             for call in self._calls:
                 call.cancel()
             if not self._session.as_json:
                 print(file=self._session.out.file)
 
-    @contextmanager
-    def _until_signalled(self) -> Iterator[None]:
-        """Has SIGINT, SIGTERM and SIGHUP end the driving in order while the block lasts."""
-        loop, numbers = asyncio.get_running_loop(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        for number in numbers:
-            loop.add_signal_handler(number, self._end)
+    async def _drive(self, hands: Hands) -> None:
+        """Drives until the end; then releases first: a terminal that is frozen may hold up all else."""
+        ticks = 0
         try:
-            yield
+            while not self._ending:
+                self._driving.check()
+                if self._controls.take_stop():
+                    hands.release()
+                    self._call(self._stop("by the driver's gamepad"))
+                if hands.ask(time.monotonic()):
+                    drive_terminal.ask()
+                self._hold(hands)
+                if ticks % _DRAW_EVERY == 0:
+                    self._show(hands)
+                ticks += 1
+                await asyncio.sleep(_TICK_S)
         finally:
-            for number in numbers:
-                loop.remove_signal_handler(number)
+            self._driving.release()
 
     def _end(self) -> None:
         self._ending = True
@@ -197,6 +189,8 @@ class _Cockpit:
                     self._call(self._stop("by the driver's keyboard"))
                 case Action.RESET:
                     self._call(self._reset())
+                case Action.RELEASE:
+                    self._controls.release()
         self._hold(hands)
 
     def _hold(self, hands: Hands) -> None:
@@ -227,7 +221,7 @@ class _Cockpit:
         except GatewayError as error:
             self._note = str(error)
 
-    def _show(self) -> None:
+    def _show(self, hands: Hands) -> None:
         state = self._driving.state
         if state is None:
             return
@@ -239,7 +233,8 @@ class _Cockpit:
             return
         line = self._driving.reasons()
         if self._begun:
-            line = _line(state, self._driving, self._note or self._controls.advice())
+            note = self._controls.problem(hands) or self._note or self._controls.advice()
+            line = _line(state, self._driving, note)
         if line != self._shown:
             self._shown = line
             width = self._session.out.width - 1
@@ -251,52 +246,3 @@ def _line(state: DriveState, driving: DriveSession, note: str) -> str:
     moves = state.phase in {DrivePhase.ARMED, DrivePhase.DRIVING, DrivePhase.STOPPING} and not state.inhibits
     words = note if moves else driving.reasons()
     return f"{state.phase.value}  {speeds}  {words}"
-
-
-async def _reports_releases(keyboard: Keyboard) -> bool:
-    """Returns whether the terminal reports releases, as far as it says so in time."""
-    print(drive_keys.ASK_FOR_RELEASES, end="", file=sys.stderr, flush=True)
-    answer, loop = "", asyncio.get_running_loop()
-    until_s = loop.time() + _ANSWER_WITHIN_S
-    while (found := drive_keys.reports_releases(answer)) is None and loop.time() < until_s:
-        readable = loop.create_future()
-        loop.add_reader(keyboard.fileno, _wake, readable)
-        try:
-            async with asyncio.timeout_at(until_s):
-                await readable
-        except TimeoutError:
-            break
-        finally:
-            loop.remove_reader(keyboard.fileno)
-        answer += keyboard.typed() or ""
-    return bool(found)
-
-
-def _wake(readable: "asyncio.Future[None]") -> None:
-    if not readable.done():
-        readable.set_result(None)
-
-
-@contextmanager
-def _reading(keyboard: Keyboard, take: Any, hands: Hands) -> Iterator[None]:
-    loop = asyncio.get_running_loop()
-    loop.add_reader(keyboard.fileno, lambda: take(keyboard.typed(), hands))
-    try:
-        yield
-    finally:
-        loop.remove_reader(keyboard.fileno)
-
-
-@contextmanager
-def _modes(releases: bool) -> Iterator[None]:
-    """Has the terminal report releases, where it can, and its focus, while the block lasts.
-
-    On standard error, which is the terminal also where standard output is a file.
-    """
-    begin = drive_keys.BEGIN if releases else drive_keys.FOCUS_BEGIN
-    print(begin, end="", file=sys.stderr, flush=True)
-    try:
-        yield
-    finally:
-        end = drive_keys.END if releases else drive_keys.FOCUS_END
-        print(end, end="", file=sys.stderr, flush=True)

@@ -48,6 +48,17 @@ class Controls:
             raise self._pad.error
         return self._pad.take_stop()
 
+    def release(self) -> None:
+        """Releases the gamepad; what is still held counts only after it was let go."""
+        if self._pad:
+            self._pad.forget()
+
+    def problem(self, keys: Hands) -> str:
+        """Returns why what is held does not count any more; empty without such a reason."""
+        if self._choice is not Input.GAMEPAD and not keys.answers(time.monotonic()):
+            return "the terminal does not answer: a key counts when it does, and the key is pressed anew"
+        return self._pad.problem() if self._pad else ""
+
     def advice(self) -> str:
         """Returns how to drive now."""
         pad = self._pad.name if self._pad else ""

@@ -3,9 +3,10 @@
 Most terminals report that a key was pressed, and never that it was released: there each press moves the robot
 for a moment (TAP_S), and a key that is held repeats. Terminals with the kitty keyboard protocol
 (https://sw.kovidgoyal.net/kitty/keyboard-protocol) report releases: there a key moves the robot as long as it
-is down.
+is down and the terminal answers: one that is frozen or cut off reports no release.
 """
 
+import math
 import re
 from enum import Enum
 from typing import Final
@@ -15,31 +16,49 @@ from console.steering import LETTERS, Direction, Steering, steering_of
 TAP_S: Final = 0.3
 """How long a press counts where releases are not reported: beyond the usual interval of repeats (30 a
 second), and short of the delay before the first."""
+ASK_EVERY_S: Final = 0.1
+"""Between two requests for a sign of life."""
+KNOWN_FOR_S: Final = 0.5
+"""How long a key counts as down after the newest request that the terminal has answered. Beyond ASK_EVERY_S
+and the round trips of most networks."""
 
-ASK_FOR_RELEASES: Final = "\x1b[?u\x1b[c"
-"""Requests the protocol's flags, and then what every terminal answers (DA1), so that silence is an answer."""
-BEGIN: Final = "\x1b[>11u\x1b[?1004h"
-"""Escape codes for all keys, with their releases (1 + 2 + 8); then reports of the focus (xterm)."""
-END: Final = "\x1b[?1004l\x1b[<u"
+ASK: Final = "\x1b[?u"
+"""Requests the protocol's flags that are in force."""
+ASK_ALL: Final = f"{ASK}\x1b[c"
+"""Requests the flags, and then what every terminal answers (DA1), so that silence is an answer."""
+RELEASES_BEGIN: Final = "\x1b[>15u"
+"""Escape codes for all keys, with their releases and their places on the keyboard (1 + 2 + 4 + 8)."""
+RELEASES_END: Final = "\x1b[<u"
 FOCUS_BEGIN: Final = "\x1b[?1004h"
+"""Reports of the focus (xterm)."""
 FOCUS_END: Final = "\x1b[?1004l"
 
 _SEQUENCE: Final = re.compile(
-    r"\x1b\[(?P<parameters>[0-9:;?]*)(?P<final>[@-~])|\x1bO(?P<application>[A-Z])|(?P<character>.)", re.DOTALL
+    r"\x1b\[(?P<parameters>[0-9:;?]{0,64})(?P<final>[@-~])|\x1bO(?P<application>[A-Z])|(?P<character>.)",
+    re.DOTALL,
 )
-_UNFINISHED: Final = re.compile(r"\x1b(?:\[[0-9:;?]*|O)$")
+_UNFINISHED: Final = re.compile(r"\x1b(?:\[[0-9:;?]{0,64}|O)$")
+_FLAGS: Final = re.compile(r"\x1b\[\?([0-9]+)u")
+_ATTRIBUTES: Final = re.compile(r"\x1b\[\?[0-9;]*c")
+_NEEDED: Final = 2 | 8
+"""Flags with which the release of a letter is reported."""
+_PRESSED: Final = ("", "1")
 _RELEASED: Final = "3"
-"""The protocol's type of event; 1 is a press, 2 a repeat."""
+"""The protocol's types of events; 2 is a repeat."""
 _CONTROL: Final = 4
-"""Bit of the protocol's modifiers, which are 1 more than their bits."""
+_COMMANDING: Final = 2 | _CONTROL | 8 | 16 | 32
+"""Alt, Control, Super, Hyper, Meta: with them a key means something else. Bits of the protocol's modifiers,
+which are 1 more than their bits."""
 
 
 class Action(Enum):
-    """What a key does once, when it is pressed."""
+    """What is to be done once."""
 
     STOP = "stop"
     RESET = "reset"
     QUIT = "quit"
+    RELEASE = "release"
+    """The terminal has lost the focus: whatever steers is released."""
 
 
 _ARROWS: Final = {
@@ -50,18 +69,64 @@ _ARROWS: Final = {
 }
 ACTIONS: Final = {
     " ": Action.STOP,
+    "\x00": Action.STOP,
     "r": Action.RESET,
     "x": Action.QUIT,
     "\x1b": Action.QUIT,
     "\x03": Action.QUIT,
 }
+"""By what a key types; Control with Space types NUL."""
 
 
-def reports_releases(answer: str) -> bool | None:
-    """Returns what an answer to ASK_FOR_RELEASES says; None before it is complete."""
-    if re.search(r"\x1b\[\?[0-9;]*c", answer) is None:
-        return None
-    return re.search(r"\x1b\[\?[0-9]+u", answer) is not None
+def is_complete(answer: str) -> bool:
+    """Returns whether the terminal has answered all of ASK_ALL."""
+    return _ATTRIBUTES.search(answer) is not None
+
+
+def flags_in(answer: str) -> int | None:
+    """Returns the newest flags in an answer; None where the terminal does not speak the protocol."""
+    found = _FLAGS.findall(answer)
+    return int(found[-1]) if found else None
+
+
+def report_releases(flags: int | None) -> bool:
+    """Returns whether a terminal with these flags in force reports the release of every key."""
+    return flags is not None and flags & _NEEDED == _NEEDED
+
+
+class Liveness:
+    """Until when the keys are known: a terminal that is frozen or cut off reports no release.
+
+    It is asked for its flags again and again, one request at a time. Its answer comes after the keys'
+    events from before: it makes them known as of the moment when the request was sent, however late it is.
+
+    Args:
+        now_s: When the terminal has answered last.
+    """
+
+    def __init__(self, now_s: float) -> None:
+        self._known_s = now_s
+        self._asked_s: float | None = None
+        """When the request was sent that is not answered yet."""
+        self._ask_s = now_s
+        """When the next one is due."""
+
+    def ask(self, now_s: float) -> bool:
+        """Returns whether a request is to be sent now."""
+        if self._asked_s is not None or now_s < self._ask_s:
+            return False
+        self._asked_s, self._ask_s = now_s, now_s + ASK_EVERY_S
+        return True
+
+    def take(self, flags: int) -> None:
+        """Takes an answer. Without the flags for releases nothing is known."""
+        if self._asked_s is not None:
+            self._known_s = self._asked_s if report_releases(flags) else -math.inf
+            self._asked_s = None
+
+    def lasts(self, now_s: float) -> bool:
+        """Returns whether the terminal has answered in time."""
+        return now_s - self._known_s <= KNOWN_FOR_S
 
 
 class Hands:
@@ -69,12 +134,16 @@ class Hands:
 
     Args:
         releases: Whether the terminal reports releases.
+        liveness: Of a terminal that does; is given its answers.
     """
 
-    def __init__(self, *, releases: bool) -> None:
+    def __init__(self, *, releases: bool, liveness: Liveness | None = None) -> None:
         self._releases = releases
-        self._down: dict[Direction, float] = {}
-        """When each was pressed, or repeated, last."""
+        self._liveness = liveness
+        self._down: dict[str, Direction] = {}
+        """By the place on the keyboard: what a key means may change before it is released."""
+        self._taps: dict[Direction, float] = {}
+        """When each was pressed last whose release is not reported."""
         self._unfinished = ""
 
     def take(self, typed: str, now_s: float) -> list[Action]:
@@ -84,59 +153,98 @@ class Hands:
         self._unfinished = unfinished[0] if unfinished else ""
         actions = []
         for found in _SEQUENCE.finditer(typed[: len(typed) - len(self._unfinished)]):
-            action = self._key(found, now_s)
+            action = self._take(found, now_s)
             if action:
                 actions.append(action)
         return actions
 
     def release(self) -> None:
-        """Releases all keys."""
+        """Releases all keys. What is still down counts only when it is pressed anew."""
         self._down.clear()
+        self._taps.clear()
 
     def steering(self, now_s: float) -> Steering | None:
         """Returns what the keys that are down amount to; None with no key down."""
-        if not self._releases:
-            self._down = {key: at_s for key, at_s in self._down.items() if now_s - at_s < TAP_S}
-        return steering_of(self._down)
+        if not self.answers(now_s):
+            self._down.clear()
+        self._taps = {key: at_s for key, at_s in self._taps.items() if now_s - at_s < TAP_S}
+        return steering_of({*self._down.values(), *self._taps})
 
-    def _key(self, found: "re.Match[str]", now_s: float) -> Action | None:
+    def ask(self, now_s: float) -> bool:
+        """Returns whether a sign of life is to be requested now (ASK)."""
+        return self._liveness is not None and self._liveness.ask(now_s)
+
+    def answers(self, now_s: float) -> bool:
+        """Returns whether the terminal answers, so that a key that is down counts."""
+        return self._liveness is None or self._liveness.lasts(now_s)
+
+    def _take(self, found: "re.Match[str]", now_s: float) -> Action | None:
         if found["character"]:
-            return self._press(found["character"], now_s)
+            return self._character(found["character"].lower(), now_s)
         if found["application"]:
-            self._move(_ARROWS.get(found["application"]), now_s, released=False)
+            self._tap(_ARROWS.get(found["application"]), now_s)
             return None
         return self._sequence(found["parameters"], found["final"], now_s)
 
+    def _character(self, character: str, now_s: float) -> Action | None:
+        """Takes a key without its protocol: no release will follow."""
+        self._tap(LETTERS.get(character), now_s)
+        return ACTIONS.get(character)
+
     def _sequence(self, parameters: str, final: str, now_s: float) -> Action | None:
+        if parameters.startswith("?"):
+            self._answer(parameters[1:], final)
+            return None
         if final == "O" and not parameters:
-            self.release()  # The terminal has lost the focus: releases go elsewhere.
-            return None
-        code, _, modifiers = parameters.partition(";")
-        bits, _, event = modifiers.partition(";")[0].partition(":")
-        released = event == _RELEASED
+            self.release()  # Releases go elsewhere now.
+            return Action.RELEASE
+        key, _, rest = parameters.partition(";")
+        number, event = rest.partition(";")[0].partition(":")[::2]
+        modifiers = int(number) - 1 if number.isdigit() else 0
         if final in _ARROWS:
-            self._move(_ARROWS[final], now_s, released=released)
+            self._steer(final, _ARROWS[final], event, modifiers, now_s)
             return None
-        number = code.partition(":")[0]
-        if final != "u" or not number.isdigit():
+        if final != "u":
             return None
-        character = chr(int(number)) if int(number) < 0x110000 else ""
-        if bits.isdigit() and (int(bits) - 1) & _CONTROL:
-            return Action.QUIT if character == "c" else None
-        if released:
-            self._move(LETTERS.get(character), now_s, released=True)
-            return None
-        return self._press(character, now_s, repeated=event == "2")
+        code, _, alternates = key.partition(":")
+        character = _character_of(code)
+        place = _character_of(alternates.partition(":")[2]) or character
+        self._steer(place, LETTERS.get(character), event, modifiers, now_s)
+        return _action(character, event, modifiers)
 
-    def _press(self, character: str, now_s: float, *, repeated: bool = False) -> Action | None:
-        lowered = character.lower()
-        self._move(LETTERS.get(lowered), now_s, released=False)
-        return None if repeated else ACTIONS.get(lowered)
+    def _answer(self, parameters: str, final: str) -> None:
+        if final == "u" and parameters.isdigit() and self._liveness:
+            self._liveness.take(int(parameters))
 
-    def _move(self, direction: Direction | None, now_s: float, *, released: bool) -> None:
-        if direction is None:
+    def _steer(
+        self, place: str, direction: Direction | None, event: str, modifiers: int, now_s: float
+    ) -> None:
+        """Takes an event of a key; a repeat begins nothing."""
+        if event == _RELEASED:
+            self._down.pop(place, None)
+            if direction:
+                self._taps.pop(direction, None)
+        elif direction is None or modifiers & _COMMANDING:
             return
-        if released:
-            self._down.pop(direction, None)
-        else:
-            self._down[direction] = now_s
+        elif not self._releases:
+            self._tap(direction, now_s)
+        elif event in _PRESSED:
+            self._down[place] = direction
+
+    def _tap(self, direction: Direction | None, now_s: float) -> None:
+        if direction:
+            self._taps[direction] = now_s
+
+
+def _character_of(code: str) -> str:
+    """Returns a key's character, the same with Shift and without; empty for what is none."""
+    return chr(int(code)).lower() if code.isdigit() and 0 < int(code) < 0x110000 else ""
+
+
+def _action(character: str, event: str, modifiers: int) -> Action | None:
+    action = ACTIONS.get(character)
+    if modifiers & _CONTROL and character == "c":
+        return Action.QUIT
+    if event not in _PRESSED or (modifiers & _COMMANDING and action is not Action.STOP):
+        return None
+    return action

@@ -8,7 +8,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from console.client.aio import AsyncGatewayClient
 from console.client.driving import DriveOptions, DriveSession
-from console.client.errors import Cancelled
+from console.client.errors import Cancelled, GatewayError
 from console.client.loop_thread import LoopThread, shared_loop
 from console.client.options import ClientOptions
 from console.client.results import DriveLimits, DriveState
@@ -38,20 +38,24 @@ def _iterating(
 
     @functools.wraps(method)
     def iterate(self: "GatewayClient", /, *args: P.args, **kwargs: P.kwargs) -> Iterator[ResultT]:
-        items = method(self._client, *args, **kwargs)
-        try:
-            while True:
-                try:
-                    item = self._loop.run(_next(items))
-                except StopAsyncIteration:
-                    return
-                yield item
-        finally:
-            # Not waited for: the garbage collector may close this iterator in the loop's own thread.
-            with suppress(Cancelled):
-                self._loop.submit(_close(items))
+        yield from _items_of(method(self._client, *args, **kwargs), self._loop)
 
     return iterate
+
+
+def _items_of(stream: AsyncIterator[ResultT], loop: LoopThread) -> Iterator[ResultT]:
+    """Yields the items of an asyncio stream, which runs in that loop."""
+    try:
+        while True:
+            try:
+                item = loop.run(_next(stream))
+            except StopAsyncIteration:
+                return
+            yield item
+    finally:
+        # Not waited for: the garbage collector may close this iterator in the loop's own thread.
+        with suppress(Cancelled):
+            loop.submit(_close(stream))
 
 
 class BlockingDriveSession:
@@ -74,6 +78,35 @@ class BlockingDriveSession:
     def limits(self) -> DriveLimits | None:
         """What the robot accepts."""
         return self._session.limits
+
+    @property
+    def error(self) -> GatewayError | None:
+        """Why the session has ended; None while it lasts."""
+        return self._session.error
+
+    @property
+    def lapsed(self) -> bool:
+        """Whether a hold was not renewed in time: until a release, no other counts."""
+        return self._session.lapsed
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a hold would move the robot."""
+        return self._session.is_ready
+
+    @property
+    def state_age_s(self) -> float:
+        """Time since the newest state has arrived; infinite before the first."""
+        return self._session.state_age_s
+
+    @property
+    def open_lanes(self) -> int:
+        """Lanes that are connected."""
+        return self._session.open_lanes
+
+    def states(self) -> Iterator[DriveState]:
+        """As `DriveSession.states`."""
+        return _items_of(self._session.states(), self._loop)
 
     def ready(self, within_s: float = 2.0) -> DriveState:
         """As `DriveSession.ready`."""

@@ -135,6 +135,8 @@ class DriveSession:
         self._hold: _Hold | None = None
         self._lapsed = False
         """Whether the hold was not renewed in time; until a release, no other counts."""
+        self._let_go = False
+        """Whether the driver has released since the last command was made; it is then no hold in any case."""
         self._released = True
         """Whether a command that is no hold has left since the last hold: only then a new one begins."""
         self._sequence = 0
@@ -231,7 +233,10 @@ class DriveSession:
     def release(self) -> None:
         """Releases: the robot stops. Sent at once, and with every command until the next hold."""
         self._lapsed = False
-        held, self._hold = self._hold, None
+        held = self._hold
+        if held:
+            self._let_go = True
+        self._hold = None
         if held and self._loop and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._send_now)
 
@@ -319,8 +324,8 @@ class DriveSession:
 
     def _make_command(self) -> None:
         now_s, hold = time.monotonic(), self._hold
-        if self._lapsed or self._unrenewed(now_s):
-            hold = None
+        if self._let_go or self._lapsed or self._unrenewed(now_s):
+            self._let_go, hold = False, None
         if hold is None and self._command_holds:
             self._released = False
         if hold and not self._command_holds and not self._released:

@@ -1,6 +1,6 @@
 """What a gamepad holds: a shoulder button is hold-to-run, the sticks steer. Pure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from console.gamepad.shaping import is_neutral, shaped
 from console.steering import Steering
@@ -16,6 +16,8 @@ class PadInput:
         right_x: right stick, sideways.
         shoulder: whether a shoulder button is down.
         stop: whether the button for STOP is down.
+        wireless: whether it may be out of range without being unplugged.
+        values: all that it reports, whatever it stands for.
     """
 
     left_x: float = 0.0
@@ -23,6 +25,8 @@ class PadInput:
     right_x: float = 0.0
     shoulder: bool = False
     stop: bool = False
+    wireless: bool = field(default=False, compare=False)
+    values: tuple[int, ...] = field(default=(), compare=False)
 
     @property
     def sticks(self) -> tuple[float, float, float]:

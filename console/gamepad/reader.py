@@ -9,6 +9,7 @@ from typing import Final, Protocol
 from common.errors import UserError
 from console.gamepad.hands import PadHands, PadInput
 from console.gamepad.sdl import SdlPad, library
+from console.gamepad.silence import SILENT, Silence
 from console.printable import printable
 from console.steering import Steering
 
@@ -36,6 +37,7 @@ class _Reading:
     steering: Steering | None
     name: str
     at_s: float
+    silent: bool = False
 
 
 class GamepadReader:
@@ -48,6 +50,7 @@ class GamepadReader:
     def __init__(self, device: Callable[[], PadDevice] = SdlPad) -> None:
         self._device = device
         self._hands, self._lock = PadHands(), threading.Lock()
+        self._silence = Silence()
         self._newest = _Reading(None, "", 0.0)
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, name="gamepad", daemon=True)
@@ -66,6 +69,10 @@ class GamepadReader:
     def description(self) -> str:
         """Returns which gamepad there is, or why there is none, for people."""
         return str(self.error or "") or self.name or "no gamepad is plugged in"
+
+    def problem(self) -> str:
+        """Returns why what is held does not count any more, for people; empty without such a reason."""
+        return SILENT if self._newest.silent else ""
 
     def steering(self) -> Steering | None:
         """Returns how it steers; None while it does not hold, and when the last reading is too old."""
@@ -97,14 +104,20 @@ class GamepadReader:
             return
         try:
             while not self._ending.wait(PERIOD_S):
-                pad = device.read()
-                with self._lock:
-                    self._hands.take(pad)
-                    name = printable(device.name) if pad else ""
-                    self._newest = _Reading(self._hands.steering, name, time.monotonic())
+                self._take(device.read(), device.name)
         finally:
             self._newest = _Reading(None, "", 0.0)
             device.close()
+
+    def _take(self, pad: PadInput | None, name: str) -> None:
+        now_s = time.monotonic()
+        with self._lock:
+            self._hands.take(pad)
+            silent = self._silence.take(pad, now_s)
+            ended = silent and (self._hands.steering is not None or self._newest.silent)
+            if ended:
+                self._hands.forget()
+            self._newest = _Reading(self._hands.steering, printable(name) if pad else "", now_s, ended)
 
 
 def installed_reader() -> GamepadReader:

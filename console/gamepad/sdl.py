@@ -11,6 +11,8 @@ from console.gamepad.hands import PadInput
 
 _FULL: Final = 32767
 """Largest value of an axis (SDL_GameControllerGetAxis)."""
+_BUS_USB: Final = 0x03
+"""First byte of a GUID of SDL's, from the kernel's input.h; the second is 0."""
 _INSTALL: Final = (
     "Type: sudo apt install libsdl2-2.0-0, then, in a clone of the project: scripts/install-console"
 )
@@ -74,6 +76,8 @@ class SdlPad:
             shoulder=self._is_down(sdl.SDL_CONTROLLER_BUTTON_LEFTSHOULDER)
             or self._is_down(sdl.SDL_CONTROLLER_BUTTON_RIGHTSHOULDER),
             stop=self._is_down(sdl.SDL_CONTROLLER_BUTTON_B),
+            wireless=self._is_wireless(),
+            values=self._values(),
         )
 
     def close(self) -> None:
@@ -100,3 +104,23 @@ class SdlPad:
 
     def _is_down(self, button: int) -> bool:
         return bool(self._sdl.SDL_GameControllerGetButton(self._pad, button))
+
+    def _is_wireless(self) -> bool:
+        """Whether no cable is known of. A radio receiver on USB is one, unless it knows of a battery."""
+        sdl, stick = self._sdl, self._stick()
+        wired = (sdl.SDL_JOYSTICK_POWER_UNKNOWN, sdl.SDL_JOYSTICK_POWER_WIRED)
+        bus = sdl.SDL_JoystickGetGUID(stick).data[0]
+        return bus != _BUS_USB or sdl.SDL_JoystickCurrentPowerLevel(stick) not in wired
+
+    def _values(self) -> tuple[int, ...]:
+        """Returns all that the device reports, also what SDL's layout does not have."""
+        sdl, stick = self._sdl, self._stick()
+        kinds = (
+            (sdl.SDL_JoystickNumAxes, sdl.SDL_JoystickGetAxis),
+            (sdl.SDL_JoystickNumButtons, sdl.SDL_JoystickGetButton),
+            (sdl.SDL_JoystickNumHats, sdl.SDL_JoystickGetHat),
+        )
+        return tuple(value(stick, number) for count, value in kinds for number in range(count(stick)))
+
+    def _stick(self) -> Any:
+        return self._sdl.SDL_GameControllerGetJoystick(self._pad)

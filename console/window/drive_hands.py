@@ -33,7 +33,6 @@ _LEAVING: Final = (
 )
 """With the hiding of the window itself. A part that hides takes no one away, unless it has the focus."""
 _TEXT_FIELDS: Final = (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)
-_NO_MODIFIER: Final = Qt.KeyboardModifier.NoModifier
 _PLAIN: Final = (
     Qt.KeyboardModifier.ShiftModifier
     | Qt.KeyboardModifier.KeypadModifier
@@ -46,6 +45,9 @@ class Pad(Protocol):
 
     def description(self) -> str:
         """Returns which gamepad there is, or why there is none."""
+
+    def problem(self) -> str:
+        """Returns why what is held does not count any more, for people; empty without such a reason."""
 
     def steering(self) -> Steering | None:
         """Returns how it steers; None while it does not hold."""
@@ -76,7 +78,8 @@ class DriveHands(QObject):
         self._window, self._driver, self.pad = window, driver, pad
         self.driveable = False
         """Whether the robot can be driven, so that Space is STOP. Stays as it was while no robot answers."""
-        self._down: dict[int, Direction] = {}
+        self._down: dict[tuple[int, int], Direction] = {}
+        """By the place on the keyboard (`_place`)."""
         self._ticked_s = 0.0
         self._begun = False
         """Whether the robot was ready once in this session: a hold before would have no beginning."""
@@ -116,24 +119,36 @@ class DriveHands(QObject):
 
     def _take_key(self, event: QKeyEvent) -> bool:
         """Returns whether the key was ours. A shortcut with the same key must not act as well."""
-        key, direction = event.key(), _KEYS.get(Qt.Key(event.key()))
-        if key == Qt.Key.Key_Space and event.modifiers() == _NO_MODIFIER and self.driveable:
-            if event.type() is QEvent.Type.KeyPress and not event.isAutoRepeat():
+        kind, direction = event.type(), _KEYS.get(Qt.Key(event.key()))
+        if kind is QEvent.Type.KeyRelease and not event.isAutoRepeat():
+            self._let_go(event)
+        if self._is_stop(event):
+            if kind is QEvent.Type.KeyPress and not event.isAutoRepeat():
                 self.stopped.emit()
-        elif direction is None or not self._driver.view().open:
+        elif direction is None or kind is QEvent.Type.KeyRelease or not self._is_for_driving(event):
             return False
-        elif event.type() is QEvent.Type.KeyRelease:
-            if key in self._down and not event.isAutoRepeat():
-                del self._down[key]
-                self._pass_on()
-            return False
-        elif event.modifiers() & ~_PLAIN or isinstance(QApplication.focusWidget(), _TEXT_FIELDS):
-            return False
-        elif event.type() is QEvent.Type.KeyPress and not event.isAutoRepeat() and self._counts():
-            self._down[key] = direction
+        elif kind is QEvent.Type.KeyPress and not event.isAutoRepeat() and self._counts():
+            self._down[_place(event)] = direction
             self._pass_on()
         event.accept()
         return True
+
+    def _is_for_driving(self, event: QKeyEvent) -> bool:
+        """Whether a letter or arrow steers, and is neither a command nor text."""
+        return self._driver.view().open and not (event.modifiers() & ~_PLAIN or _in_text())
+
+    def _let_go(self, event: QKeyEvent) -> None:
+        """Takes a release, whatever the key means now, and whatever else is down."""
+        if self._down.pop(_place(event), None):
+            self._pass_on()
+
+    def _is_stop(self, event: QKeyEvent) -> bool:
+        """Whether the key is Space, with any modifier; with one it is text where there is a field for it."""
+        return (
+            event.key() == Qt.Key.Key_Space
+            and self.driveable
+            and (event.modifiers() == Qt.KeyboardModifier.NoModifier or not _in_text())
+        )
 
     def _is_ours(self, watched: QObject) -> bool:
         """Whether an object belongs to this window, or to a menu or dialog of it."""
@@ -176,3 +191,17 @@ class DriveHands(QObject):
             self._driver.release()
         else:
             self._driver.hold(steering, "gamepad" if by_pad else "keyboard")
+
+
+def _place(event: QKeyEvent) -> tuple[int, int]:
+    """Returns which key of the keyboard it is; what it means may change before it is released.
+
+    With AltGr, Shift, NumLock or another layout the same key is another one to Qt. Where the platform has no
+    codes of keys there is only its meaning.
+    """
+    code = event.nativeScanCode()
+    return (code, 0) if code else (0, event.key())
+
+
+def _in_text() -> bool:
+    return isinstance(QApplication.focusWidget(), _TEXT_FIELDS)

@@ -11,6 +11,8 @@ from console.monitor.driver import DriverView
 from console.monitor.monitor_state import MonitorState
 from console.monitor.worker import Worker
 from console.presentation.drive_display import DriveDisplay, own_display, watched_display
+from console.presentation.preview_switch import Note
+from console.presentation.severity_style import SeverityStyle
 from console.window.bottom_strip import BottomStrip
 from console.window.drive_hands import TICK_MS, DriveHands, Pad
 from console.window.picture_area import PictureArea
@@ -42,6 +44,8 @@ class Driving(QObject):
         self._strip, self._picture = strip, picture
         self.hands = DriveHands(window, worker.driver, pad)
         self._ticks = 0
+        self._pad_problem = ""
+        """The one that was shown last."""
         place = strip.driving
         self.hands.stopped.connect(self.stop)
         self.hands.ticked.connect(self._tick)
@@ -60,7 +64,7 @@ class Driving(QObject):
             self.hands.driveable = teleop.state is not TeleopState.UNKNOWN
             display = _display(teleop, view, known=not state.outdated(time.monotonic()))
             if self.hands.pad:
-                self._strip.driving.show_pad(self.hands.pad.description())
+                self._show_pad(self.hands.pad)
             self._strip.show_teleop(teleop, view, _latch(display))
             self._picture.show_driving(display)
 
@@ -93,6 +97,13 @@ class Driving(QObject):
         """Releases, and ends driving."""
         self.hands.close()
         self._driver.end()
+
+    def _show_pad(self, pad: Pad) -> None:
+        self._strip.driving.show_pad(pad.description())
+        problem = pad.problem()
+        if problem and problem != self._pad_problem:
+            self._picture.toasts.show_passing(Note(f"Not driving: {problem}", SeverityStyle.WARNING))
+        self._pad_problem = problem
 
     def _tick(self) -> None:
         """Draws more often than the status comes, while this window drives."""

@@ -44,6 +44,38 @@ def test_sticks_and_buttons_are_those_of_sdls_layout(pad: VirtualPad, place: Sdl
     assert read(place).shoulder, "either shoulder holds"
 
 
+def test_whatever_changes_is_seen_and_no_cable_is_known_of(pad: VirtualPad, place: SdlPad) -> None:
+    seen = {read(place).values}
+    assert read(place).wireless
+    pad.deflect(right_y=0.5)
+    seen.add(read(place).values)
+    pad.button(sdl2.SDL_CONTROLLER_BUTTON_DPAD_UP, down=True)
+    seen.add(read(place).values)
+    assert len(seen) == 3
+    assert read(place).values in seen
+
+
+@pytest.mark.usefixtures("pad")
+@pytest.mark.parametrize(
+    ("bus", "power", "wireless"),
+    [
+        (0x03, sdl2.SDL_JOYSTICK_POWER_UNKNOWN, False),
+        (0x03, sdl2.SDL_JOYSTICK_POWER_WIRED, False),
+        (0x03, sdl2.SDL_JOYSTICK_POWER_MEDIUM, True),
+        (0x05, sdl2.SDL_JOYSTICK_POWER_UNKNOWN, True),
+    ],
+    ids=["USB", "USB, charging", "a receiver on USB", "Bluetooth"],
+)
+def test_a_cable_is_usb_without_a_battery(
+    place: SdlPad, monkeypatch: pytest.MonkeyPatch, bus: int, power: int, wireless: bool
+) -> None:
+    monkeypatch.setattr(
+        sdl2, "SDL_JoystickGetGUID", lambda _stick: sdl2.SDL_JoystickGUID((sdl2.Uint8 * 16)(bus))
+    )
+    monkeypatch.setattr(sdl2, "SDL_JoystickCurrentPowerLevel", lambda _stick: power)
+    assert read(place).wireless is wireless
+
+
 def read(place: SdlPad) -> PadInput:
     found = place.read()
     assert found, "there is a gamepad"

@@ -43,8 +43,13 @@ class PlayedPad:
     stop: bool = False
     forgotten: int = 0
 
+    why_not: str = ""
+
     def description(self) -> str:
         return "played & tested"
+
+    def problem(self) -> str:
+        return self.why_not
 
     def steering(self) -> Steering | None:
         return self.steers
@@ -126,6 +131,77 @@ def test_a_key_moves_the_robot_while_it_is_down(seat: Seat) -> None:
     assert seat.robot.teleop.holder
     press(seat.window, Qt.Key.Key_T)
     until(lambda: not seat.robot.teleop.holder, "the lease is given back")
+
+
+PLACE = 26
+"""Of E on a keyboard of a PC under X11."""
+EURO_SIGN, CYRILLIC_U = Qt.Key(0x20AC), Qt.Key(0x0423)
+"""Qt names characters by their code points."""
+PLAIN, SHIFT = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
+ALT_GR = Qt.KeyboardModifier.GroupSwitchModifier
+CONTROL, ALT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.AltModifier
+META, KEYPAD = Qt.KeyboardModifier.MetaModifier, Qt.KeyboardModifier.KeypadModifier
+MEANINGS = [
+    pytest.param(Qt.Key.Key_E, PLAIN, EURO_SIGN, ALT_GR, id="AltGr"),
+    pytest.param(Qt.Key.Key_E, PLAIN, CYRILLIC_U, PLAIN, id="another layout"),
+    pytest.param(Qt.Key.Key_Up, KEYPAD, Qt.Key.Key_8, KEYPAD, id="NumLock"),
+    pytest.param(Qt.Key.Key_E, PLAIN, Qt.Key.Key_E, CONTROL | SHIFT, id="Control and Shift"),
+]
+
+
+@pytest.mark.parametrize(("pressed", "with_", "released", "then_with"), MEANINGS)
+def test_a_key_whose_meaning_has_changed_is_released(
+    seat: Seat,
+    pressed: Qt.Key,
+    with_: Qt.KeyboardModifier,
+    released: Qt.Key,
+    then_with: Qt.KeyboardModifier,
+) -> None:
+    seat.ready()
+    for kind, key, modifiers in (
+        (QEvent.Type.KeyPress, pressed, with_),
+        (QEvent.Type.KeyRelease, released, then_with),
+    ):
+        target = QApplication.focusWidget() or seat.window
+        QApplication.sendEvent(target, QKeyEvent(kind, key, modifiers, PLACE, 0, 0))
+        if kind is QEvent.Type.KeyPress:
+            seat.moves()
+    until(lambda: not seat.robot.base.moves, "the base is at rest", 2)
+    seat.rests()
+
+
+def test_another_key_that_goes_up_releases_none(seat: Seat) -> None:
+    seat.ready()
+    target = QApplication.focusWidget() or seat.window
+    for place in (PLACE, PLACE + 1):
+        QApplication.sendEvent(target, QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_W, PLAIN, place, 0, 0))
+    seat.moves()
+    for place in (PLACE, PLACE + 2):
+        QApplication.sendEvent(target, QKeyEvent(QEvent.Type.KeyRelease, Qt.Key.Key_W, PLAIN, place, 0, 0))
+    let_pass(0.3)
+    assert seat.robot.base.moves
+    QApplication.sendEvent(target, QKeyEvent(QEvent.Type.KeyRelease, Qt.Key.Key_W, PLAIN, PLACE + 1, 0, 0))
+    seat.rests()
+
+
+@pytest.mark.parametrize("modifiers", [SHIFT, CONTROL, ALT, META, KEYPAD, ALT_GR, SHIFT | CONTROL])
+def test_space_stops_whatever_else_is_down(seat: Seat, modifiers: Qt.KeyboardModifier) -> None:
+    seat.ready()
+    seat.key(Qt.Key.Key_W, down=True)
+    seat.moves()
+    QTest.keyPress(QApplication.focusWidget() or seat.window, Qt.Key.Key_Space, modifiers)
+    until(lambda: seat.robot.teleop.HasField("stop"), "a stop")
+    seat.rests()
+
+
+def test_shift_and_space_are_a_space_in_a_text(seat: Seat) -> None:
+    seat.window.search_events()
+    search = until(lambda: seat.window.side.events_tab.search, "the field")
+    until(search.hasFocus, "it has the focus")
+    QTest.keyClick(search, Qt.Key.Key_Space, SHIFT)
+    assert search.text() == " "
+    let_pass(0.3)
+    assert not seat.robot.teleop.HasField("stop")
 
 
 def leaves_for_a_text(seat: Seat) -> None:
@@ -230,6 +306,14 @@ def test_a_gamepad_drives_while_it_holds_and_stops_the_robot(seat: Seat) -> None
     # Before that, a window that waits for a processor may have it at rest for a moment.
     until(lambda: "STOPPED" in seat.shown(), "the phase")
     seat.rests()
+
+
+def test_a_gamepad_that_holds_no_more_is_reported_once(seat: Seat) -> None:
+    pad = PlayedPad(why_not="it has fallen asleep")
+    seat.window.driving.hands.pad = pad
+    seat.note("it has fallen asleep")
+    let_pass(0.5)
+    assert sum("it has fallen asleep" in note.text for note in seat.window.toasts.notes) == 1
 
 
 def test_stop_is_for_anyone_and_the_latch_that_is_shown_is_reset(seat: Seat) -> None:

@@ -4,10 +4,12 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from common.errors import UserError
 from console.gamepad.hands import PadInput
 from console.gamepad.reader import READING_COUNTS_S, GamepadReader
+from console.gamepad.silence import HELD_FOR_S
 from tests.support.waiting import wait_until
 
 
@@ -84,6 +86,35 @@ def test_what_is_forgotten_counts_again_after_it_was_up() -> None:
         assert reader.steering() is None
         device.input = PadInput(stop=True)
         wait_until(reader.take_stop, "STOP")
+
+
+def test_one_without_a_cable_that_reports_nothing_new_is_released_until_it_was_up() -> None:
+    device, up = PlayedDevice(), PadInput(wireless=True, values=(0,))
+    held = replace(up, shoulder=True, values=(1,))
+    device.input = up
+    with reading(device) as reader:
+        device.input = held
+        wait_until(lambda: reader.steering() is not None, "it holds")
+        assert not reader.problem()
+        wait_until(lambda: reader.steering() is None, "it is released", HELD_FOR_S + 1.0)
+        assert "2 s" in reader.problem()
+        device.input = replace(held, values=(2,))
+        wait_until(lambda: not reader.problem(), "it reports again")
+        assert reader.steering() is None
+        device.input = up
+        device.seen()
+        device.input = held
+        wait_until(lambda: reader.steering() is not None, "it holds anew")
+
+
+def test_one_that_nobody_touches_keeps_nothing_from_being_held() -> None:
+    device, up = PlayedDevice(), PadInput(wireless=True, values=(0,))
+    device.input = up
+    with reading(device) as reader:
+        time.sleep(HELD_FOR_S + 0.2)
+        assert not reader.problem()
+        device.input = replace(up, shoulder=True, values=(1,))
+        wait_until(lambda: reader.steering() is not None, "it holds")
 
 
 def test_a_device_that_does_not_start_is_no_gamepad() -> None:

@@ -7,15 +7,19 @@ import time
 
 import pytest
 
+from console.cli.drive_keys import KNOWN_FOR_S
+from console.cli.loop_signals import ENDING
+from console.gamepad.silence import HELD_FOR_S
 from tests.support.driven_robot import DrivenRobot
+from tests.support.kitty import robotctl_on_kitty
 from tests.support.robotctl import robotctl, robotctl_process
 from tests.support.terminal import Terminal, robotctl_on_terminal, terminal_with
 from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.ros
-KITTY_ANSWER = "\x1b[?0u\x1b[?62;c"
 PLAIN_ANSWER = "\x1b[?62;c"
-W_DOWN, W_UP = "\x1b[119;1:1u", "\x1b[119;1:3u"
+W_DOWN, W_REPEATED, W_UP = "\x1b[119;1:1u", "\x1b[119;1:2u", "\x1b[119;1:3u"
+EVENT_TYPES = 2
 
 
 def begin(screen: Terminal, answer: str) -> None:
@@ -69,9 +73,7 @@ def pressed_anew(screen: Terminal, robot: DrivenRobot) -> bool:
 
 
 def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(robot: DrivenRobot) -> None:
-    with robotctl_on_terminal("drive", "--target", robot.target, "--json") as screen:
-        screen.wait_for("\x1b[?u")
-        screen.press(KITTY_ANSWER)
+    with robotctl_on_kitty("drive", "--target", robot.target, "--json") as screen:
         screen.wait_for('"phase": "armed"')
         # The key goes up and down until the robot was ready for it; then it stays down.
         wait_until(lambda: pressed_anew(screen, robot), "the base moves")
@@ -82,6 +84,54 @@ def test_a_key_moves_the_robot_while_it_is_down_where_the_terminal_reports_that(
         screen.press("\x1b[120;1:1u")
         assert screen.process.wait(20) == 0
         assert "\x1b[<u" in screen.read()
+
+
+def test_a_terminal_that_freezes_releases_its_keys(robot: DrivenRobot) -> None:
+    """As one does at whose end of an SSH connection the cable is cut: no release can come."""
+    with robotctl_on_kitty("drive", "--target", robot.target) as screen:
+        screen.wait_for("hold w a s d")
+        wait_until(lambda: pressed_anew(screen, robot), "the base moves")
+        screen.freeze()
+        frozen_s = time.monotonic()
+        wait_until(lambda: not robot.base.moves, "the base is at rest", KNOWN_FOR_S + 1.0)
+        assert time.monotonic() - frozen_s < KNOWN_FOR_S + 0.5
+        before = len(robot.base.heard)
+        screen.press(W_REPEATED)
+        screen.thaw()
+        screen.press(W_REPEATED)
+        time.sleep(0.5)
+        assert not any(each.moves for each in robot.base.heard[before:]), "the key is still down"
+        wait_until(lambda: pressed_anew(screen, robot), "a new press moves it")
+        screen.press("\x1b[99;5:1u")
+        assert screen.process.wait(20) == 0
+
+
+@pytest.mark.parametrize("knows", [0, 1, 13], ids=["nothing", "escape codes", "all but releases"])
+def test_a_terminal_that_speaks_the_protocol_without_releases_is_one_of_taps(
+    robot: DrivenRobot, knows: int
+) -> None:
+    assert not knows & EVENT_TYPES
+    with robotctl_on_kitty("drive", "--target", robot.target, knows=knows) as screen:
+        screen.wait_for("hold w a s d")
+        wait_until(lambda: not screen.kitty.pushed, "it is as before")
+        wait_until(lambda: tap(screen, robot), "the base moves")
+        wait_until(lambda: not robot.base.moves, "the base is at rest", 2)
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
+@pytest.mark.parametrize("number", ENDING, ids=lambda each: each.name)
+def test_a_signal_leaves_the_terminal_as_it_was(robot: DrivenRobot, number: signal.Signals) -> None:
+    with robotctl_on_kitty("drive", "--target", robot.target) as screen:
+        screen.wait_for("hold w a s d")
+        assert screen.kitty.flags & EVENT_TYPES
+        wait_until(lambda: pressed_anew(screen, robot), "the base moves")
+        screen.process.send_signal(number)
+        assert screen.process.wait(20) == 0
+        at_rest(robot)
+        wait_until(lambda: not screen.kitty.pushed, "the protocol is as before")
+        assert "\x1b[?1004l" in screen.read()
+        assert not screen.key_by_key()
 
 
 def test_space_stops_and_the_stop_is_reset_by_its_number(robot: DrivenRobot) -> None:
@@ -118,11 +168,55 @@ def test_a_gamepad_drives_while_its_shoulder_is_held_until_it_is_unplugged(robot
         screen.press("w")
         screen.process.send_signal(signal.SIGUSR1)
         wait_until(lambda: robot.base.moves, "the base moves")
+        screen.process.send_signal(signal.SIGUSR1)
         time.sleep(1.0)
         assert robot.base.moves, "as long as it is held"
         screen.process.send_signal(signal.SIGUSR2)
         at_rest(robot)
         screen.wait_for("plug a gamepad in")
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
+def test_a_gamepad_without_a_cable_that_reports_nothing_new_is_released(robot: DrivenRobot) -> None:
+    """As one out of range: the computer keeps its last values for seconds."""
+    words = ["drive", "--input", "gamepad", "--target", robot.target]
+    with terminal_with(
+        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=260
+    ) as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(PLAIN_ANSWER)
+        screen.wait_for("hold a shoulder button of")
+        screen.process.send_signal(signal.SIGUSR1)
+        held_s = time.monotonic()
+        wait_until(lambda: robot.base.moves, "the base moves")
+        wait_until(lambda: not robot.base.moves, "the base is at rest", HELD_FOR_S + 1.0)
+        assert time.monotonic() - held_s < HELD_FOR_S + 0.5
+        screen.wait_for("nothing new")
+        before = len(robot.base.heard)
+        screen.process.send_signal(signal.SIGUSR1)
+        time.sleep(0.5)
+        assert not any(each.moves for each in robot.base.heard[before:]), "it is back, and still held"
+        screen.press("x")
+        assert screen.process.wait(20) == 0
+
+
+def test_a_terminal_that_loses_the_focus_releases_the_gamepad_as_well(robot: DrivenRobot) -> None:
+    words = ["drive", "--input", "gamepad", "--target", robot.target]
+    with terminal_with(
+        [sys.executable, "-m", "tests.support.padded_robotctl", *words], columns=160
+    ) as screen:
+        screen.wait_for("\x1b[?u")
+        screen.press(PLAIN_ANSWER)
+        screen.wait_for("hold a shoulder button of")
+        screen.process.send_signal(signal.SIGUSR1)
+        wait_until(lambda: robot.base.moves, "the base moves")
+        screen.press("\x1b[O")
+        wait_until(lambda: not robot.base.moves, "the base is at rest", 2)
+        before = len(robot.base.heard)
+        screen.press("\x1b[I")
+        time.sleep(0.5)
+        assert not any(each.moves for each in robot.base.heard[before:]), "it counts when it is held anew"
         screen.press("x")
         assert screen.process.wait(20) == 0
 

@@ -2,8 +2,25 @@
 
 import pytest
 
-from console.cli.drive_keys import ACTIONS, TAP_S, Action, Hands, reports_releases
-from console.steering import LETTERS
+from console.cli.drive_keys import (
+    ACTIONS,
+    ASK_EVERY_S,
+    KNOWN_FOR_S,
+    TAP_S,
+    Action,
+    Hands,
+    Liveness,
+    flags_in,
+    is_complete,
+    report_releases,
+)
+from console.steering import LETTERS, Steering
+
+W_DOWN, W_REPEATED, W_UP = "\x1b[119;1:1u", "\x1b[119;1:2u", "\x1b[119;1:3u"
+ANSWER = "\x1b[?15u"
+CONTROL = 5
+MODIFIERS = (2, 3, CONTROL, 9, 17, 33, 65, 129, 255)
+"""Shift, Alt, Control, Super, Hyper, Meta, the two locks, nearly all: in the protocol's form."""
 
 
 def test_without_releases_a_press_counts_for_a_moment() -> None:
@@ -97,15 +114,178 @@ def test_no_key_has_two_meanings() -> None:
     assert not LETTERS.keys() & ACTIONS.keys()
 
 
+@pytest.mark.parametrize("modifiers", MODIFIERS)
 @pytest.mark.parametrize(
-    ("answer", "reports"),
+    ("press", "release"), [(W_DOWN, "\x1b[119;{}:3u"), ("\x1b[A", "\x1b[1;{}:3A")], ids=["letter", "arrow"]
+)
+def test_a_release_counts_whatever_else_is_down(press: str, release: str, modifiers: int) -> None:
+    hands = Hands(releases=True)
+    hands.take(press, 0.0)
+    assert hands.steering(0.0) == (1, 0, 0)
+    hands.take(release.format(modifiers), 1.0)
+    assert hands.steering(1.0) is None
+
+
+@pytest.mark.parametrize("modifiers", [3, CONTROL, 9, 17, 33])
+def test_a_press_that_means_something_else_steers_nothing(modifiers: int) -> None:
+    hands = Hands(releases=True)
+    assert hands.take(f"\x1b[119;{modifiers}:1u\x1b[1;{modifiers}:1A\x1b[114;{modifiers}:1u", 0.0) == []
+    assert hands.steering(0.0) is None
+
+
+def test_control_with_a_key_that_is_down_keeps_it_down_no_longer() -> None:
+    hands = Hands(releases=True)
+    hands.take(f"{W_DOWN}\x1b[57442;{CONTROL}:1u\x1b[119;{CONTROL}:3u\x1b[57442;1:3u", 0.0)
+    assert hands.steering(0.0) is None
+
+
+@pytest.mark.parametrize("modifiers", MODIFIERS)
+def test_space_stops_whatever_else_is_down(modifiers: int) -> None:
+    hands = Hands(releases=True)
+    assert hands.take(f"\x1b[32;{modifiers}:1u", 0.0) == [Action.STOP]
+    assert hands.take(f"\x1b[32;{modifiers}:2u\x1b[32;{modifiers}:3u", 0.0) == []
+
+
+@pytest.mark.parametrize("typed", ["\x00", "\x1b "], ids=["control", "alt"])
+def test_space_stops_with_a_modifier_where_releases_are_not_reported(typed: str) -> None:
+    assert Action.STOP in Hands(releases=False).take(typed, 0.0)
+
+
+def test_text_without_a_key_is_no_key() -> None:
+    assert Hands(releases=True).take("\x1b[0;;32u\x1b[1114112u\x1b[99999999u", 0.0) == []
+
+
+def test_a_key_whose_meaning_has_changed_is_released_by_its_place() -> None:
+    hands = Hands(releases=True)
+    hands.take(W_DOWN, 0.0)
+    hands.take("\x1b[1094::119;1:3u", 1.0)
+    assert hands.steering(1.0) is None, "a Cyrillic layout"
+    hands.take("\x1b[119:87;2:1u", 2.0)
+    assert hands.steering(2.0) == (1, 0, 0), "with Shift"
+    hands.take(W_UP, 3.0)
+    assert hands.steering(3.0) is None
+    hands.take("\x1b[87;2:1u", 4.0)
+    hands.take(W_UP, 5.0)
+    assert hands.steering(5.0) is None, "a terminal that reports the letter with Shift"
+
+
+def test_two_keys_of_one_direction_are_one_and_each_has_its_release() -> None:
+    hands = Hands(releases=True)
+    hands.take(f"{W_DOWN}\x1b[A", 0.0)
+    assert hands.steering(0.0) == (1, 0, 0)
+    hands.take(W_UP, 1.0)
+    assert hands.steering(1.0) == (1, 0, 0)
+    hands.take("\x1b[1;1:3A", 2.0)
+    assert hands.steering(2.0) is None
+
+
+@pytest.mark.parametrize("released_by", ["focus", "stop"])
+def test_a_repeat_does_not_press_a_released_key_again(released_by: str) -> None:
+    hands = Hands(releases=True)
+    hands.take(W_DOWN, 0.0)
+    if released_by == "focus":
+        assert hands.take("\x1b[O", 1.0) == [Action.RELEASE]
+    else:
+        hands.release()
+    hands.take(W_REPEATED, 2.0)
+    assert hands.steering(2.0) is None
+    hands.take(W_UP + W_DOWN, 3.0)
+    assert hands.steering(3.0) == (1, 0, 0)
+
+
+def test_a_key_without_its_protocol_counts_for_a_moment_even_where_releases_are_reported() -> None:
+    for typed in ("w", "\x1bOA"):
+        hands = Hands(releases=True)
+        hands.take(typed, 0.0)
+        assert hands.steering(TAP_S - 0.01) == (1, 0, 0)
+        assert hands.steering(TAP_S) is None
+
+
+@pytest.mark.parametrize(
+    ("answer", "complete", "flags"),
     [
-        ("", None),
-        ("\x1b[?1u", None),
-        ("\x1b[?62;c", False),
-        ("\x1b[?0u\x1b[?62;4c", True),
-        ("\x1b[?62;22c\x1b[?1u", True),
+        ("", False, None),
+        ("\x1b[?1u", False, 1),
+        ("\x1b[?62;c", True, None),
+        ("\x1b[?0u\x1b[?62;4c", True, 0),
+        ("\x1b[?62;22c\x1b[?1u", True, 1),
+        ("w\x1b[?0u\x1b[?15u\x1b[?62;c", True, 15),
     ],
 )
-def test_a_terminal_says_whether_it_reports_releases(answer: str, reports: bool | None) -> None:
-    assert reports_releases(answer) is reports
+def test_a_terminal_says_which_flags_are_in_force(answer: str, complete: bool, flags: int | None) -> None:
+    assert (is_complete(answer), flags_in(answer)) == (complete, flags)
+
+
+@pytest.mark.parametrize(
+    ("flags", "reports"),
+    [(None, False), (0, False), (1, False), (2, False), (8, False), (10, True), (15, True)],
+)
+def test_releases_are_reported_only_with_their_flags_in_force(flags: int | None, reports: bool) -> None:
+    assert report_releases(flags) is reports
+
+
+def watched(now_s: float = 0.0) -> Hands:
+    """At a terminal that has answered now."""
+    return Hands(releases=True, liveness=Liveness(now_s))
+
+
+def test_a_key_counts_as_long_as_the_terminal_answers() -> None:
+    hands, now_s = watched(), 0.0
+    hands.take(W_DOWN, now_s)
+    while now_s < 60.0:
+        now_s += ASK_EVERY_S
+        assert hands.ask(now_s)
+        assert not hands.ask(now_s), "one request at a time"
+        hands.take(ANSWER, now_s + 0.05)
+        assert not hands.ask(now_s + 0.06), "nor sooner than necessary"
+        assert hands.steering(now_s + 0.06) == (1, 0, 0)
+
+
+def test_a_terminal_that_does_not_answer_any_more_releases() -> None:
+    hands = watched()
+    hands.take(W_DOWN, 0.0)
+    assert hands.ask(0.1)
+    assert hands.steering(KNOWN_FOR_S) == (1, 0, 0)
+    assert hands.steering(KNOWN_FOR_S + 0.001) is None
+    hands.take(W_REPEATED + ANSWER, KNOWN_FOR_S + 0.002)
+    assert hands.ask(KNOWN_FOR_S + 0.002)
+    hands.take(ANSWER + W_REPEATED, KNOWN_FOR_S + 0.003)
+    assert hands.answers(KNOWN_FOR_S + 0.003)
+    assert hands.steering(KNOWN_FOR_S + 0.003) is None, "it is still down, and counts when it is pressed anew"
+    hands.take(W_UP + W_DOWN, 1.0)
+    assert hands.steering(1.0) == (1, 0, 0)
+
+
+def test_an_answer_that_was_held_up_says_nothing_of_now() -> None:
+    """After a cut the events arrive late and in bursts: the release of a key may still be on its way."""
+    hands = watched()
+    assert hands.ask(0.1)
+    hands.take(W_DOWN + ANSWER, 5.0)
+    assert hands.steering(5.0) is None
+    assert hands.ask(5.0)
+    hands.take(W_UP + W_DOWN, 5.2)
+    assert hands.steering(5.2) is None, "that may be as old"
+    hands.take(ANSWER, 5.25)
+    assert hands.steering(5.25) is None
+    hands.take(W_UP + W_DOWN, 5.3)
+    assert hands.steering(5.3) == (1, 0, 0)
+
+
+def test_an_answer_that_was_not_requested_says_nothing() -> None:
+    hands = watched()
+    hands.take(W_DOWN + ANSWER, 0.4)
+    assert hands.steering(KNOWN_FOR_S + 0.001) is None
+
+
+def test_a_terminal_whose_flags_are_taken_away_releases() -> None:
+    hands = watched()
+    hands.take(W_DOWN, 0.0)
+    assert hands.ask(0.1)
+    hands.take("\x1b[?0u", 0.1)
+    assert hands.steering(0.1) is None
+
+
+def test_taps_need_no_answer() -> None:
+    hands = watched()
+    hands.take("w", 10.0)
+    assert hands.steering(10.1) == Steering(1, 0, 0)

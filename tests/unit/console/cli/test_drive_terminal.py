@@ -1,0 +1,116 @@
+"""What robotctl drive asks of a terminal, on a real pseudoterminal, and how it leaves it."""
+
+import asyncio
+import os
+import pty
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from console.cli import drive_terminal
+from console.cli.keyboard import Keyboard
+from tests.support.eventually import eventually
+from tests.support.kitty import ALL_FLAGS, Kitty
+
+
+class Screen:
+    """The other end, where the keys are."""
+
+    def __init__(self, master: int, kitty: Kitty | None) -> None:
+        self._master, self.kitty = master, kitty
+        self.written = ""
+
+    def read(self) -> None:
+        """Reads what the program has written, and answers."""
+        written = os.read(self._master, 4096).decode()
+        self.written += written
+        if self.kitty:
+            os.write(self._master, self.kitty.answer(written).encode())
+
+
+@asynccontextmanager
+async def screen(monkeypatch: pytest.MonkeyPatch, kitty: Kitty | None) -> AsyncIterator[Screen]:
+    """The terminal of this process, while the block lasts; without `kitty` it answers nothing."""
+    master, slave = pty.openpty()
+    loop = asyncio.get_running_loop()
+    shown = Screen(master, kitty)
+    with os.fdopen(slave, "r+b", buffering=0) as raw, monkeypatch.context() as patch:
+        for name, mode in (("stdin", "r"), ("stderr", "w")):
+            patch.setattr(f"sys.{name}", os.fdopen(os.dup(raw.fileno()), mode))
+        loop.add_reader(master, shown.read)
+        try:
+            yield shown
+        finally:
+            loop.remove_reader(master)
+            os.close(master)
+
+
+async def has(shown: Screen, code: str, *, pushed: bool = False) -> None:
+    """Waits until this has arrived, and flags are in force or not."""
+
+    async def found() -> tuple[bool, bool]:
+        return code in shown.written, bool(shown.kitty and shown.kitty.pushed)
+
+    await eventually(found, lambda found: found == (True, pushed), f"{code!r}, flags in force: {pushed}")
+
+
+@pytest.mark.parametrize("knows", [ALL_FLAGS, 10, 13, 0])
+async def test_it_reports_releases_while_the_block_lasts_where_it_says_so(
+    monkeypatch: pytest.MonkeyPatch, knows: int
+) -> None:
+    kitty = Kitty(knows)
+    async with screen(monkeypatch, kitty) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard) as liveness:
+            assert (liveness is not None) == (knows & 10 == 10)
+            await has(shown, "\x1b[?1004h", pushed=liveness is not None)
+        keyboard.give_back()
+        await has(shown, "\x1b[?1004l")
+
+
+async def test_a_terminal_that_does_not_speak_the_protocol_gets_none_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with screen(monkeypatch, None) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard) as liveness:
+            assert liveness is None
+        keyboard.give_back()
+        await has(shown, "\x1b[?1004l")
+        assert shown.written == "\x1b[?u\x1b[c\x1b[?1004h\x1b[?1004l"
+
+
+async def test_an_error_leaves_the_terminal_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    kitty = Kitty()
+
+    async def fail() -> None:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard):
+            assert kitty.pushed
+            raise ValueError("whatever")
+
+    async with screen(monkeypatch, kitty) as shown:
+        with pytest.raises(ValueError, match="whatever"):
+            await fail()
+        await has(shown, "\x1b[?1004l")
+
+
+async def test_a_terminal_that_falls_silent_when_it_is_asked_again_gets_its_flags_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Silent(Kitty):
+        def answer(self, written: str) -> str:
+            answer = super().answer(written)
+            return "" if self.pushed else answer
+
+    kitty = Silent()
+    async with screen(monkeypatch, kitty) as shown:
+        keyboard = Keyboard()
+        keyboard.take()
+        async with drive_terminal.reporting_keys(keyboard) as liveness:
+            assert liveness is None
+        await has(shown, "\x1b[?1004l")

@@ -1,0 +1,314 @@
+"""What a driver's session sends: when a hold lapses, and when another one begins."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from functools import partial
+from itertools import count
+
+import pytest
+
+from console.client.blocking import BlockingDriveSession
+from console.client.driving import (
+    COMMANDS_PER_S,
+    HOLD_COUNTS_S,
+    LANES,
+    MAX_UNACKNOWLEDGED,
+    DriveOptions,
+    DriveSession,
+    LaneItem,
+)
+from console.client.errors import Refused, Unreachable
+from console.client.loop_thread import LoopThread
+from console.client.mapping.methods import Method
+from console.client.results import DriveLimits, DriveOpened, DrivePhase, DriveState
+from omniseer.gateway.v1 import teleop_pb2
+from tests.support.eventually import eventually
+
+LIMITS = DriveLimits(
+    max_vx_mps=0.35,
+    max_vy_mps=0.25,
+    max_wz_rad_s=0.8,
+    acceleration_mps2=0.5,
+    acceleration_rad_s2=1.0,
+    max_picture_age_ms=600,
+    picture_travel_m=0.1,
+    line_of_sight=True,
+    line_of_sight_mps=0.15,
+    line_of_sight_rad_s=0.4,
+)
+SPEED_MPS = 0.125
+PATIENT_S = 60.0
+
+
+def have_holds_count_for(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    monkeypatch.setattr("console.client.driving.HOLD_COUNTS_S", seconds)
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine this process may stand still for longer than a hold counts."""
+    have_holds_count_for(monkeypatch, PATIENT_S)
+
+
+class Robot:
+    """Opens lanes, keeps what comes on them, and acknowledges it as long as it `answers`."""
+
+    def __init__(self) -> None:
+        self.answers = True
+        self.ends_with: Refused | None = None
+        self.commands: list[teleop_pb2.DriveCommand] = []
+        """Each once, in order: the first copy counts."""
+        self.finished = 0
+        self._monotonic_ns = count(10**9, 10**6)
+
+    def connect(self) -> "PlayedTransport":
+        return PlayedTransport(self)
+
+    def take(self, request: bytes) -> None:
+        message = teleop_pb2.DriveRequest.FromString(request)
+        if message.HasField("command") and message.command.sequence > self.newest:
+            self.commands.append(message.command)
+
+    @property
+    def newest(self) -> int:
+        return self.commands[-1].sequence if self.commands else 0
+
+    @property
+    def held(self) -> bool:
+        return bool(self.commands) and self.commands[-1].held
+
+    def state(self) -> DriveState:
+        return DriveState(
+            monotonic_ns=next(self._monotonic_ns),
+            newest_sequence=self.newest,
+            phase=DrivePhase.ARMED,
+            inhibits=(),
+            vx_mps=0.0,
+            vy_mps=0.0,
+            wz_rad_s=0.0,
+            command_age_ms=0,
+            loop_age_ms=0,
+            picture_age_ms=None,
+            speed_limit_mps=0.0,
+            stop=None,
+            problems=(),
+        )
+
+
+class PlayedLane:
+    def __init__(self, robot: Robot) -> None:
+        self._robot, self._opened = robot, False
+        self._finished = asyncio.Event()
+
+    async def write(self, request: bytes) -> None:
+        self._robot.take(request)
+
+    async def read(self) -> LaneItem:
+        if not self._opened:
+            self._opened = True
+            return DriveOpened(session_id="a session", run_id="a run", limits=LIMITS)
+        while True:
+            if self._robot.ends_with:
+                raise self._robot.ends_with
+            if self._finished.is_set():
+                raise Unreachable("the lane has ended")
+            await asyncio.sleep(1 / COMMANDS_PER_S)
+            if self._robot.answers:
+                return self._robot.state()
+
+    async def finish(self) -> None:
+        self._robot.finished += 1
+        self._finished.set()
+
+    def cancel(self) -> None:
+        self._finished.set()
+
+
+class PlayedTransport:
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+
+    def open_both_ways(self, method: Method[LaneItem]) -> PlayedLane:  # noqa: ARG002  # there is one
+        return PlayedLane(self._robot)
+
+    async def close(self) -> None:
+        pass
+
+
+@asynccontextmanager
+async def driving(robot: Robot) -> AsyncIterator[DriveSession]:
+    async with DriveSession(robot.connect, DriveOptions(), opens_within_s=5.0) as session:
+        await session.ready(within_s=5.0)
+        yield session
+
+
+async def until(condition: Callable[[], object], what: str) -> None:
+    async def ask() -> object:
+        return condition()
+
+    await eventually(ask, bool, what)
+
+
+async def more_commands(robot: Robot, number: int, each: Callable[[], None] = lambda: None) -> list[bool]:
+    """Calls `each` until the robot has so many more commands; returns which of them held."""
+    before = len(robot.commands)
+
+    def enough() -> bool:
+        each()
+        return len(robot.commands) >= before + number
+
+    await until(enough, f"{number} commands")
+    return [command.held for command in robot.commands[before:]]
+
+
+async def test_a_hold_that_is_renewed_goes_on_and_a_release_ends_it() -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        holds = await more_commands(robot, 20, partial(session.hold, SPEED_MPS))
+        assert holds[-10:] == [True] * 10
+        assert robot.commands[-1].vx_mps == SPEED_MPS
+        session.release()
+        await until(lambda: not robot.held, "the release")
+        assert not any(await more_commands(robot, 5))
+        assert robot.commands[-1].vx_mps == 0.0
+        assert not session.lapsed
+
+
+async def test_a_hold_that_is_not_renewed_lapses_and_no_other_counts_until_a_release(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        session.hold(SPEED_MPS)
+        await until(lambda: robot.held, "the hold")
+        have_holds_count_for(monkeypatch, HOLD_COUNTS_S)
+        await until(lambda: not robot.held, "it has lapsed")
+        session.hold(SPEED_MPS)
+        await until(lambda: session.lapsed, "it says so")
+        assert "release, then hold again" in session.reasons()
+        have_holds_count_for(monkeypatch, PATIENT_S)
+        assert not any(await more_commands(robot, 10, partial(session.hold, SPEED_MPS)))
+        session.release()
+        assert not session.lapsed
+        holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        assert holds[-5:] == [True] * 5
+
+
+async def test_a_hold_that_comes_too_late_does_not_go_on_although_no_command_was_due_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        session.hold(SPEED_MPS)
+        await until(lambda: robot.held, "the hold")
+        have_holds_count_for(monkeypatch, 0.0)
+        session.hold(SPEED_MPS)
+        have_holds_count_for(monkeypatch, PATIENT_S)
+        assert session.lapsed
+        assert not any(await more_commands(robot, 10, partial(session.hold, SPEED_MPS)))
+
+
+async def test_a_release_and_a_hold_at_once_are_two_holds() -> None:
+    """Without a command in between that is no hold, the robot would see one that goes on."""
+    robot = Robot()
+    async with driving(robot) as session:
+        await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        session.release()
+        holds = await more_commands(robot, 10, partial(session.hold, -SPEED_MPS))
+        assert not holds[0]
+        assert holds[-5:] == [True] * 5
+
+
+async def test_no_hold_begins_before_the_release_has_left() -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        robot.answers = False
+
+        def holds_for(commands: int) -> Callable[[], bool]:
+            until_sequence = session._sequence + commands
+
+            def enough() -> bool:
+                session.hold(SPEED_MPS)
+                return session._sequence > until_sequence
+
+            return enough
+
+        await until(holds_for(2 * MAX_UNACKNOWLEDGED), "the lanes are full")
+        stuck = len(robot.commands)
+        session.release()
+        await until(holds_for(5), "held again, for some commands")
+        assert len(robot.commands) == stuck, "nothing has left since the release"
+        robot.answers = True
+        holds = await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        assert not holds[0]
+        assert holds[-3:] == [True] * 3
+
+
+async def test_the_last_command_is_a_release_on_every_lane() -> None:
+    robot = Robot()
+
+    async def fail() -> None:
+        async with driving(robot) as session:
+            await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        await fail()
+    assert not robot.held
+    assert robot.finished == LANES
+
+
+async def test_what_ends_the_session_ends_the_hold() -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        await more_commands(robot, 10, partial(session.hold, SPEED_MPS))
+        session.check()
+        robot.ends_with = Refused("taken over")
+        await until(lambda: session.error, "it has ended")
+        assert session.error is robot.ends_with
+        assert session._hold is None
+        with pytest.raises(Refused, match="taken over"):
+            session.check()
+
+
+async def test_a_velocity_that_is_no_number_is_refused_and_holds_nothing() -> None:
+    robot = Robot()
+    async with driving(robot) as session:
+        with pytest.raises(ValueError, match="finite"):
+            session.hold(float("nan"))
+        assert not any(await more_commands(robot, 5))
+
+
+@contextmanager
+def driving_in_a_thread(robot: Robot) -> Iterator[BlockingDriveSession]:
+    loop = LoopThread()
+    try:
+        with BlockingDriveSession(loop, DriveSession(robot.connect, DriveOptions(), 5.0)) as session:
+            session.ready(within_s=5.0)
+            yield session
+    finally:
+        loop.stop()
+
+
+def test_blocking_code_sees_what_the_loop_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Robot()
+    with driving_in_a_thread(robot) as session:
+        states = session.states()
+        first, second = next(states), next(states)
+        assert first.monotonic_ns < second.monotonic_ns
+        assert session.is_ready
+        assert session.state_age_s < 5.0
+        assert session.open_lanes == LANES
+        session.hold(SPEED_MPS)
+        next(state for state in states if robot.held)
+        have_holds_count_for(monkeypatch, HOLD_COUNTS_S)
+        next(state for state in states if not robot.held)
+        session.hold(SPEED_MPS)
+        assert (session.lapsed, session.error) == (True, None)
+        robot.ends_with = Refused("taken over")
+        with pytest.raises(Refused, match="taken over"):
+            for _ in states:
+                pass
+        assert session.error is robot.ends_with
