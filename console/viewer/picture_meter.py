@@ -65,6 +65,8 @@ class PictureMeter:
         self._viewer_id = secrets.token_hex(4)
         self._lock = threading.Lock()
         self._shown: deque[ShownPicture] = deque(maxlen=_KEPT)
+        self._latest: ShownPicture | None = None
+        """The picture on the screen; None while none is, or its age is unknown."""
         self._reported_s = 0.0
 
     def robot_now_ns(self) -> int | None:
@@ -86,11 +88,12 @@ class PictureMeter:
         picture = ShownPicture(now_s, max(0.0, age_ms), offset.error_s * _MS_PER_S, own_ms, frame.capture_ns)
         with self._lock:
             self._shown.append(picture)
+            self._latest = picture
 
     def forget(self) -> None:
-        """Notes that no picture is on the screen any more."""
+        """Notes that no picture is on the screen any more; history and summary keep those that were."""
         with self._lock:
-            self._shown.clear()
+            self._latest = None
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
@@ -99,7 +102,7 @@ class PictureMeter:
     def latest(self) -> ShownPicture | None:
         """Returns the latest picture of known age; None when none is on the screen."""
         with self._lock:
-            return self._shown[-1] if self._shown else None
+            return self._latest
 
     def capture_ns(self) -> int | None:
         """Returns when the picture on the screen was captured, on the robot's monotonic clock, in ns.
@@ -141,21 +144,21 @@ class PictureMeter:
         )
 
     def report(self) -> PictureReport | None:
-        """Returns the worst age since the last report; None without a picture of known age."""
+        """Returns the worst age since the last report; None when no picture of known age is on the screen."""
         now_s = time.monotonic()
         since_s, self._reported_s = self._reported_s, now_s
-        pictures = self._pictures()
-        if not pictures:
+        latest = self.latest()
+        if latest is None:
             return None
-        ages_ms = [age_now_ms(pictures[-1], now_s)]
-        ages_ms += [each.age_ms for each in takewhile(lambda each: each.at_s > since_s, reversed(pictures))]
+        since = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
+        ages_ms = [age_now_ms(latest, now_s), *(each.age_ms for each in since)]
         delivery = self._delivery()
         rtt_ms = delivery.rtt_ms if delivery else None
         direct = delivery is not None and delivery.kind is DeliveryChoice.DIRECT
         return PictureReport(
             viewer_id=self._viewer_id,
             picture_age_ms=min(_LONGEST_MS, round(max(ages_ms))),
-            picture_age_error_ms=min(_LONGEST_MS, round(pictures[-1].error_ms)),
+            picture_age_error_ms=min(_LONGEST_MS, round(latest.error_ms)),
             rtt_ms=None if rtt_ms is None else min(_LONGEST_MS, round(rtt_ms)),
             loss_percent=delivery.loss_percent if delivery else None,
             packets_held=delivery.waited if delivery else 0,
