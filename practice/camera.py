@@ -44,6 +44,8 @@ class CameraStream:
     ) -> None:
         self.delivery = Delivery(kind=DeliveryChoice.DIRECT)
         """As over a network that loses nothing."""
+        self.received_s: float | None = None
+        """Unknown: each frame is shown as soon as it comes."""
         self._queue = queue
         self._look, self._captured, self._network, self._paint = look, captured, network, paint
         self._on_their_way: deque[tuple[float, Frame]] = deque(maxlen=_MOST_ON_THEIR_WAY)

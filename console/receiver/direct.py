@@ -53,6 +53,11 @@ class DirectConnection:
         self._thread = threading.Thread(target=self._run, name="receiver", daemon=True)
         self._thread.start()
 
+    @property
+    def received_s(self) -> float | None:
+        """When the newest frame was received, on `time.monotonic()`; None before the first."""
+        return self._decoder.newest_s
+
     def close(self) -> None:
         """Disconnects. Afterwards nothing reaches the queue."""
         self._stopping.set()

@@ -43,6 +43,8 @@ class SrtConnection:
     ) -> None:
         self.delivery = Delivery(kind=DeliveryChoice.SRT, reason=reason)
         """The delivery in use."""
+        self.received_s: float | None = None
+        """Of direct delivery alone it is known when a frame was received."""
         self._address = address
         self._queue = queue
         self._options = options

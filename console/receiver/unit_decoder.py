@@ -43,6 +43,8 @@ class UnitDecoder:
         """Over all connections: the decoder's time must not go back."""
         self._received_s: dict[int, float] = {}
         """When the access units that are in the decoder were received, by PTS in ns."""
+        self.newest_s: float | None = None
+        """When the newest access unit was received, decoded or not."""
         self._pipeline = Gst.Pipeline.new(None)
         self._recorder: Any = None
         self._release = ExitStack()
@@ -67,6 +69,7 @@ class UnitDecoder:
         Raises:
             UndecodableError: an element for its codec is not installed.
         """
+        self.newest_s = time.monotonic()
         if unit.codec != self._codec:
             self._change_codec(unit.codec)
         if self._source.get_property("current-level-buffers") >= _MOST_WAITING:

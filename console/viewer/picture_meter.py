@@ -13,7 +13,14 @@ from typing import Final
 from console.client import Offset, PictureDelivery, PictureReport, PreviewStatus
 from console.receiver.delivery import Delivery, DeliveryChoice
 from console.receiver.frame import Frame
-from console.viewer.picture_reading import AgeCause, PictureReading, ShownPicture, age_now_ms, reading
+from console.viewer.picture_reading import (
+    AgeCause,
+    PictureReading,
+    ShownPicture,
+    age_now_ms,
+    link_age_ms,
+    reading,
+)
 
 _KEPT: Final = 3600
 """Pictures: a minute at 60 frames/s."""
@@ -51,6 +58,7 @@ class PictureMeter:
         clock_offset: returns the offset of the robot's clock; None while it is not known.
         delivery: returns how packets are delivered.
         preview: returns the robot's latest status; None before the first.
+        received: returns when the newest picture was received; None if unknown.
     """
 
     def __init__(
@@ -58,10 +66,12 @@ class PictureMeter:
         clock_offset: Callable[[], Offset | None],
         delivery: Callable[[], Delivery | None] = lambda: None,
         preview: Callable[[], PreviewStatus | None] = lambda: None,
+        received: Callable[[], float | None] = lambda: None,
     ) -> None:
         self._clock_offset = clock_offset
         self._delivery = delivery
         self._preview = preview
+        self._received = received
         self._viewer_id = secrets.token_hex(4)
         self._lock = threading.Lock()
         self._shown: deque[ShownPicture] = deque(maxlen=_KEPT)
@@ -97,7 +107,8 @@ class PictureMeter:
 
     def reading(self) -> PictureReading:
         """Returns the reading of this moment."""
-        return reading(self.latest(), self._delivery(), self._preview(), time.monotonic())
+        shown, now_s = self.latest(), time.monotonic()
+        return reading(shown, self._delivery(), self._preview(), now_s, self._received())
 
     def latest(self) -> ShownPicture | None:
         """Returns the latest picture of known age; None when none is on the screen."""
@@ -150,20 +161,22 @@ class PictureMeter:
         latest = self.latest()
         if latest is None:
             return None
-        since = takewhile(lambda each: each.at_s > since_s, reversed(self._pictures()))
-        ages_ms = [age_now_ms(latest, now_s), *(each.age_ms for each in since)]
+        since = list(takewhile(lambda each: each.at_s > since_s, reversed(self._pictures())))
+        age_ms = max([age_now_ms(latest, now_s), *(each.age_ms for each in since)])
+        of_link_ms = max([link_age_ms(latest, now_s, self._received()), *(each.link_ms for each in since)])
         delivery = self._delivery()
         rtt_ms = delivery.rtt_ms if delivery else None
         direct = delivery is not None and delivery.kind is DeliveryChoice.DIRECT
         return PictureReport(
             viewer_id=self._viewer_id,
-            picture_age_ms=min(_LONGEST_MS, round(max(ages_ms))),
+            picture_age_ms=min(_LONGEST_MS, round(age_ms)),
             picture_age_error_ms=min(_LONGEST_MS, round(latest.error_ms)),
             rtt_ms=None if rtt_ms is None else min(_LONGEST_MS, round(rtt_ms)),
             loss_percent=delivery.loss_percent if delivery else None,
             packets_held=delivery.waited if delivery else 0,
             packets_given_up=delivery.given_up if delivery else 0,
             delivery=PictureDelivery.DIRECT if direct else PictureDelivery.SRT_LATENCY,
+            link_age_ms=min(_LONGEST_MS, round(of_link_ms)),
         )
 
     def _pictures(self) -> tuple[ShownPicture, ...]:

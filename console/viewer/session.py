@@ -41,6 +41,10 @@ class OpenConnection(Protocol):
     def delivery(self) -> Delivery:
         """The delivery in use, with its figures."""
 
+    @property
+    def received_s(self) -> float | None:
+        """When the newest frame was received, decoded or not, on `time.monotonic()`; None if unknown."""
+
     def close(self) -> None:
         """Disconnects; afterwards nothing reaches the queue."""
 
@@ -165,6 +169,11 @@ class VideoSession:
         """Returns how packets are delivered, with the figures of the latest connection; None before one."""
         connection = self._connection
         return connection.delivery if connection else None
+
+    def received_s(self) -> float | None:
+        """Returns when the newest frame was received, decoded or not; None if unknown."""
+        connection = self._connection
+        return connection.received_s if connection else None
 
     def close(self, timeout_s: float = 2.0) -> bool:
         """Disconnects. Returns whether the thread ended in time. Closing again does nothing."""

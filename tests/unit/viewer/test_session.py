@@ -29,6 +29,7 @@ class Exchange:
     calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
     delivery: Delivery = field(default_factory=lambda: Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=7.0))
+    received_s: float | None = 12.5
     options: list[ReceiverOptions] = field(default_factory=list)
 
     def connect(self, address: StreamAddress, queue: FrameQueue, options: ReceiverOptions) -> "Exchange":
