@@ -16,8 +16,10 @@ from console.capture_time import CaptureClock
 from console.receiver import reception
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import DeliveryChoice
+from console.receiver.direct import DirectConnection
 from console.receiver.errors import StreamEndedError, StreamRefusedError
 from console.receiver.frame import Frame
+from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
 from console.receiver.options import ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
@@ -31,6 +33,8 @@ pytestmark = pytest.mark.gst
 PATIENCE_S = 20
 FRAMES = 90
 FRAME_S = 1 / 30
+SLOW_FRAME_S = 0.1
+KEY_FRAME_EVERY = 15
 CLOSED_WITHIN_S = 1.0
 AFTERWARDS = 15
 NO_FRAME = bytes([0x47, 0x1F, 0xFF, 0x10]) + bytes(184)
@@ -147,6 +151,46 @@ def test_no_torn_frame_is_shown_where_packets_are_given_up(
     assert any(lost)
     assert 0 < len(frames) < FRAMES
     assert not any(frame.corrupt for frame in frames)
+
+
+class SlowQueue(FrameQueue):
+    """Takes as long for each frame as a slow decoder."""
+
+    def __init__(self) -> None:
+        super().__init__(FRAMES)
+        self.frames: list[Frame] = []
+
+    def put(self, frame: Frame) -> None:
+        time.sleep(SLOW_FRAME_S)
+        self.frames.append(frame)
+
+
+def test_a_decoder_that_is_too_slow_shows_newer_frames_and_bothers_nobody(port: int) -> None:
+    """At 10 of 30 frames per second; a key frame comes every 15."""
+    pieces = encode("h264", 3 * FRAMES, kbps=500, gop=KEY_FRAME_EVERY)
+    lost: list[int | None] = []
+
+    def request(newest_pts: int | None) -> bool:
+        lost.append(newest_pts)
+        return True
+
+    slow = SlowQueue()
+    with SrtSender(port) as sender:
+        options = ReceiverOptions(max_age_s=1000, on_picture_lost=request)
+        connection = DirectConnection(StreamAddress("127.0.0.1", port, latency_ms=125), slow, options)
+        try:
+            assert sender.viewer_joined.wait(PATIENCE_S)
+            play(sender, pieces)
+        finally:
+            connection.close()
+    waits_s = [frame.arrival_s - frame.received_s for frame in slow.frames if frame.received_s]
+    print(f"{len(waits_s)} frames, the longest wait {max(waits_s):.2f} s")
+    # 0.6 s at most, or up to the next key frame; and the frames that the decoder has at hand.
+    assert max(waits_s) < 0.6 + KEY_FRAME_EVERY * FRAME_S + 5 * SLOW_FRAME_S
+    assert connection.delivery.dropped_frames > FRAMES
+    assert connection.delivery.rejoins == 0
+    assert lost == []
+    assert not any(frame.corrupt for frame in slow.frames)
 
 
 def test_ten_viewers(port: int, pieces: list[bytes]) -> None:

@@ -40,6 +40,7 @@ class Played:
     received: int = 0
     lost_share: float = 0.0
     full_until_s: float = 0.0
+    dropped_units: int = 0
     stopping: threading.Event = field(default_factory=threading.Event)
     until_s: float = 110.0
 
@@ -68,7 +69,12 @@ class Played:
         taken = self.now_s > self.full_until_s
         if taken:
             self.units.append(unit)
+        else:
+            self.dropped_units += 1
         return taken
+
+    def feed(self) -> None:
+        pass
 
     def check(self) -> None:
         pass
@@ -194,6 +200,8 @@ def test_a_decoder_that_is_too_slow_skips_to_a_key_frame(played: Played) -> None
     assert played.shown == list(range(15, 30))
     assert played.units[0].first
     assert found.dropped_frames == 15
+    assert played.requests_s == [], "another key frame makes it no faster"
+    assert found.rejoins == 0
 
 
 @pytest.mark.parametrize("clock", [True, False], ids=["by the robot's clock", "by what has grown"])
