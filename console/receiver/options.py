@@ -29,6 +29,8 @@ class ReceiverOptions:
             none comes. Takes the PTS of the newest frame of which anything has arrived, in ticks; returns
             whether a request is made. On the receiver's thread, so it must only hand over. Without it, or
             where no request is made, the connection is made anew.
+        takes_requests: whether such a request still has a prospect; where it has not, the connection is made
+            anew without waiting for the key frame.
     """
 
     pixels: PixelFormat = PixelFormat.I420
@@ -38,3 +40,4 @@ class ReceiverOptions:
     capture: CaptureClock | None = None
     max_age_s: float = MAX_AGE_S
     on_picture_lost: RequestKeyFrame | None = None
+    takes_requests: Callable[[], bool] = lambda: True

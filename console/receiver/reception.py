@@ -130,6 +130,8 @@ class Reception:
         """Since when no frame can be shown."""
         self._request_s = 0.0
         """When a key frame is to be requested, while none can be shown."""
+        self._requested = False
+        """Whether the last request is on its way."""
         self.had_data = False
         """Whether anything has arrived."""
 
@@ -222,9 +224,12 @@ class Reception:
             self._torn_s = now_s
             # Before the first frame, the key frame that a new connection gets may be under way.
             self._request_s = now_s if shown else now_s + _REPEAT_S
+        if self._requested and not self._options.takes_requests():
+            self._request_s = now_s
         if now_s < self._request_s:
             return False
-        if request and request(stream.newest_pts):
+        self._requested = request is not None and request(stream.newest_pts)
+        if self._requested:
             self._request_s = now_s + _REPEAT_S
             return False
         return now_s - self._torn_s >= (_REJOIN_AFTER_S if shown else _FIRST_KEY_FRAME_S)

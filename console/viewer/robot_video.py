@@ -72,6 +72,7 @@ class RobotVideo:
             delivery=delivery,
             robot_now_ns=self.meter.robot_now_ns,
             on_picture_lost=self.worker.request_key_frame,
+            takes_requests=self.worker.takes_requests,
             connect=receive,
         )
 

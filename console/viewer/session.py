@@ -82,6 +82,7 @@ class VideoSession:
         robot_now_ns: reads the estimate of the robot's monotonic clock, in ns; None while there is none.
             Without it frames have no capture time.
         on_picture_lost: requests a key frame; see `ReceiverOptions`. Without it the receiver connects anew.
+        takes_requests: whether such a request still has a prospect.
         connect: opens connections; tests pass a double.
     """
 
@@ -94,6 +95,7 @@ class VideoSession:
         delivery: DeliveryChoice = DeliveryChoice.AUTO,
         robot_now_ns: RobotTime | None = None,
         on_picture_lost: RequestKeyFrame | None = None,
+        takes_requests: Callable[[], bool] = lambda: True,
         connect: Connect = open_connection,
     ) -> None:
         self._pixels = pixels
@@ -102,6 +104,7 @@ class VideoSession:
         self._delivery = delivery
         self._robot_now_ns = robot_now_ns
         self._on_picture_lost = on_picture_lost
+        self._takes_requests = takes_requests
         self._connect = connect
         self._connection: OpenConnection | None = None
         self._backoff = redial_backoff()
@@ -224,6 +227,7 @@ class VideoSession:
             self._delivery,
             capture,
             on_picture_lost=self._on_picture_lost,
+            takes_requests=self._takes_requests,
         )
 
     def _take_frames(

@@ -179,6 +179,20 @@ def test_where_no_request_is_made_the_connection_is_made_anew(played: Played) ->
     assert found.rejoins == 1
 
 
+def test_where_a_request_fails_the_connection_is_made_anew_at_once(played: Played) -> None:
+    """The answer comes 50 ms later: not allowed, for example."""
+    send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
+
+    def takes_requests() -> bool:
+        failed = played.requests_s and played.now_s > played.requests_s[0] + 0.05
+        played.takes_requests = not failed
+        return not failed
+
+    found = played.run(on_picture_lost=played.request, takes_requests=takes_requests)
+    assert played.now_s == pytest.approx(100 + 7 / 30 + FIRST_WAIT_S + 0.2, abs=0.03)
+    assert found.rejoins == 1
+
+
 def test_without_a_request_the_connection_is_made_anew(played: Played) -> None:
     send(played, 200, lose=lambda frame, packet: frame >= 7 and packet == 1)
     found = played.run()

@@ -196,6 +196,7 @@ def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> Non
         delivery=DeliveryChoice.SRT,
         robot_now_ns=lambda: 5_000_000_000,
         on_picture_lost=request,
+        takes_requests=lambda: not requests,
     )
     assert session.delivery() is None
     session.start()
@@ -209,6 +210,7 @@ def test_the_receiver_gets_what_the_session_was_given(exchange: Exchange) -> Non
     assert options.on_picture_lost
     assert options.on_picture_lost(90_000)
     assert requests == [90_000]
+    assert not options.takes_requests()
 
 
 def test_frames_get_capture_times_where_the_endpoint_has_an_offset(exchange: Exchange) -> None:
