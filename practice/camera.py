@@ -53,10 +53,11 @@ class CameraStream:
         self._thread = threading.Thread(target=self._run, name="practice-camera", daemon=True)
         self._thread.start()
 
-    def close(self) -> None:
-        """Ends the stream; afterwards nothing reaches the queue."""
+    def close(self) -> bool:
+        """Ends the stream; afterwards nothing reaches the queue. Returns whether it ended in time."""
         self._closed.set()
         self._thread.join(_ENDS_WITHIN_S)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._closed.wait(_PERIOD_S):

@@ -12,6 +12,8 @@ from console.receiver.recording import Recording
 RequestKeyFrame: TypeAlias = Callable[[int | None], bool]
 
 MAX_AGE_S: Final = 0.6
+CLOSES_WITHIN_S: Final = 2.0
+"""A connection that takes longer to close hangs."""
 
 
 @dataclass(frozen=True, slots=True)

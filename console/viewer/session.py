@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import replace
 from typing import Final, Protocol, TypeAlias
 
@@ -12,7 +11,7 @@ from console.capture_time import CaptureClock
 from console.client import GatewayError, PreviewState, PreviewStatus
 from console.receiver.address import StreamAddress
 from console.receiver.delivery import Delivery, DeliveryChoice
-from console.receiver.errors import StreamError, UndecodableError, no_frame_within
+from console.receiver.errors import StreamError, UndecodableError, hung_too_often, no_frame_within
 from console.receiver.frame import Frame, PixelFormat
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.options import ReceiverOptions, RequestKeyFrame
@@ -27,6 +26,8 @@ from console.viewer.redial import (
     redial_backoff,
 )
 
+_MOST_HUNG: Final = 3
+"""Connections that may be left behind: each keeps a thread, and maybe a driver."""
 _POLL_S: Final = 0.1
 """Period, while no frame comes, of checking whether the connection is still needed."""
 
@@ -45,8 +46,8 @@ class OpenConnection(Protocol):
     def received_s(self) -> float | None:
         """When the newest frame was received, decoded or not, on `time.monotonic()`; None if unknown."""
 
-    def close(self) -> None:
-        """Disconnects; afterwards nothing reaches the queue."""
+    def close(self) -> bool:
+        """Disconnects; afterwards nothing reaches the queue. Returns whether it ended in time."""
 
 
 Connect: TypeAlias = Callable[[StreamAddress, FrameQueue, ReceiverOptions], OpenConnection]
@@ -107,6 +108,8 @@ class VideoSession:
         self._takes_requests = takes_requests
         self._connect = connect
         self._connection: OpenConnection | None = None
+        self._hung = 0
+        """Connections that were left behind, because they could not be closed."""
         self._backoff = redial_backoff()
         self._changed = threading.Condition()
         self._inputs = PlaybackInputs()
@@ -195,6 +198,10 @@ class VideoSession:
             if address is None:
                 self._wait(lambda: self._address is not None)
                 continue
+            if self._hung >= _MOST_HUNG:
+                self._update(stream_error=hung_too_often(self._hung), blocked=True)
+                self._wait(lambda: self._address != address)  # noqa: B023 - called at once
+                continue
             error = self._receive(address)
             if self._closing or address != self._address:
                 continue
@@ -212,8 +219,13 @@ class VideoSession:
         except UserError as error:
             return error
         self._connection = connection
-        with closing(connection):
+        try:
             end = self._take_frames(connection, queue, address)
+        finally:
+            closed = connection.close()
+        if not closed:
+            self._hung += 1
+            return self._decoders.after_hang()
         return self._decoders.after_undecodable(end) if isinstance(end, UndecodableError) else end
 
     def _options(self, address: StreamAddress) -> ReceiverOptions:

@@ -2,6 +2,7 @@
 
 import random
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -15,18 +16,20 @@ from common.gst import Gst, stop
 from console.capture_time import CaptureClock
 from console.receiver import reception
 from console.receiver.address import StreamAddress
+from console.receiver.connection import connect
 from console.receiver.delivery import DeliveryChoice
 from console.receiver.direct import DirectConnection
 from console.receiver.errors import StreamEndedError, StreamRefusedError
 from console.receiver.frame import Frame
 from console.receiver.frame_queue import FrameQueue
 from console.receiver.libsrt import LibsrtMissingError
-from console.receiver.options import ReceiverOptions
+from console.receiver.options import CLOSES_WITHIN_S, ReceiverOptions
 from console.receiver.reorder import Delivered, Reorder
 from tests.support.free import free_udp_port
 from tests.support.receiver import NoFrameError, Receiver
 from tests.support.streams import SrtSender, encode
 from tests.support.udp_link import Impairment, UdpLink
+from tests.support.waiting import wait_until
 
 pytestmark = pytest.mark.gst
 
@@ -232,6 +235,67 @@ def test_it_stops_while_a_listener_does_not_answer() -> None:
         silent.bind(("127.0.0.1", 0))
         with closed_in_time(receiver(silent.getsockname()[1])) as viewer, pytest.raises(NoFrameError):
             viewer.next_frame(0.3)
+
+
+@pytest.fixture
+def stuck() -> Iterator[threading.Event]:
+    """What hangs waits for it; at the end everything goes on, so that no thread is left."""
+    released = threading.Event()
+    yield released
+    released.set()
+    wait_until(
+        lambda: (
+            not {"receiver", "receiver-close", "resolver"} & {each.name for each in threading.enumerate()}
+        ),
+        "the threads end",
+    )
+
+
+@pytest.mark.parametrize("delivery", [DeliveryChoice.DIRECT, DeliveryChoice.SRT])
+def test_a_resolver_that_hangs_keeps_nobody_waiting(
+    stuck: threading.Event, monkeypatch: pytest.MonkeyPatch, delivery: DeliveryChoice
+) -> None:
+    monkeypatch.setattr("console.name_lookup.socket.getaddrinfo", lambda *_args, **_more: stuck.wait() and [])
+    monkeypatch.setattr("console.receiver.direct._RESOLVES_WITHIN_S", 0.2)
+    monkeypatch.setattr("console.receiver.srt._RESOLVES_WITHIN_S", 0.2)
+    address = StreamAddress("robot.invalid", 7100, latency_ms=20)
+    with (
+        Receiver(address, options=ReceiverOptions(delivery=delivery)) as viewer,
+        pytest.raises(StreamRefusedError, match=r"robot.invalid"),
+    ):
+        viewer.next_frame(PATIENCE_S)
+
+
+def test_it_stops_while_a_resolver_hangs(stuck: threading.Event, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("console.name_lookup.socket.getaddrinfo", lambda *_args, **_more: stuck.wait() and [])
+    address = StreamAddress("robot.invalid", 7100, latency_ms=20)
+    with closed_in_time(Receiver(address)) as viewer, pytest.raises(NoFrameError):
+        viewer.next_frame(0.3)
+
+
+@pytest.mark.parametrize("delivery", [DeliveryChoice.DIRECT, DeliveryChoice.SRT])
+def test_a_driver_that_hangs_when_it_is_stopped_is_left_behind(
+    port: int,
+    pieces: list[bytes],
+    stuck: threading.Event,
+    monkeypatch: pytest.MonkeyPatch,
+    delivery: DeliveryChoice,
+) -> None:
+    def hang(pipeline: Any) -> None:
+        assert stuck.wait(PATIENCE_S)
+        stop(pipeline)
+
+    monkeypatch.setattr("console.receiver.unit_decoder.stop", hang)
+    monkeypatch.setattr("console.receiver.srt.stop", hang)
+    queue = FrameQueue(FRAMES)
+    with SrtSender(port) as sender:
+        address = StreamAddress("127.0.0.1", port, latency_ms=20)
+        connection = connect(address, queue, ReceiverOptions(delivery=delivery, max_age_s=1000))
+        assert sender.viewer_joined.wait(PATIENCE_S)
+        sender.send(pieces[0])
+        begun_s = time.monotonic()
+        assert not connection.close()
+        assert time.monotonic() - begun_s < 2 * CLOSES_WITHIN_S
 
 
 def test_a_listener_that_does_not_answer_is_reported() -> None:

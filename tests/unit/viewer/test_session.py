@@ -26,6 +26,7 @@ class Exchange:
     """Every connection that was made; a test puts frames and ends into the queues."""
 
     refuse: bool = False
+    hangs: bool = False
     calls: list[tuple[StreamAddress, FrameQueue]] = field(default_factory=list)
     open: int = 0
     delivery: Delivery = field(default_factory=lambda: Delivery(kind=DeliveryChoice.DIRECT, rtt_ms=7.0))
@@ -40,8 +41,9 @@ class Exchange:
             queue.end(from_srt(address, "Incorrect passphrase", had_data=False))
         return self
 
-    def close(self) -> None:
+    def close(self) -> bool:
         self.open -= 1
+        return not self.hangs
 
     def show(self) -> Frame:
         """A frame arrives over the latest connection."""
@@ -178,6 +180,38 @@ def test_what_cannot_be_decoded_blocks(session: VideoSession, exchange: Exchange
     exchange.calls[-1][1].end(UndecodableError("it sends video/mpeg", "Look at the port", final=True))
     wait_until(lambda: session.playback().state is PlaybackState.BLOCKED, "blocked")
     assert session.playback().remedy == "Look at the port"
+
+
+def test_a_connection_that_cannot_be_closed_is_left_behind_and_said_so(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    exchange.hangs = True
+    session.follow(preview(PreviewState.RUNNING))
+    for number in (1, 2):
+        called(exchange, number)
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
+        wait_until(lambda: "did not stop within 2 s" in session.playback().reason, "the reason")
+    exchange.hangs = False
+    called(exchange, 3)
+    exchange.show()
+    wait_until(lambda: session.playback().state is PlaybackState.LIVE, "the video goes on")
+
+
+def test_connections_that_cannot_be_closed_are_no_more_than_three(
+    session: VideoSession, exchange: Exchange
+) -> None:
+    """Each keeps a thread, and maybe a driver."""
+    exchange.hangs = True
+    session.follow(preview(PreviewState.RUNNING))
+    for number in (1, 2, 3):
+        called(exchange, number)
+        address, queue = exchange.calls[-1]
+        queue.end(ended(address, "lost"))
+    wait_until(lambda: session.playback().state is PlaybackState.BLOCKED, "no further one")
+    assert "3 receivers did not stop" in session.playback().reason
+    assert session.playback().remedy == "Close the window and open it again"
+    assert len(exchange.calls) == 3
 
 
 def test_a_session_that_never_began_can_be_closed() -> None:
