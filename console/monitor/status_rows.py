@@ -7,6 +7,7 @@ from console.client.results import Fault
 from console.monitor.alarm import Alarm, Occurrence, occurrence
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import age
+from console.presentation.own_stream import OwnStream
 from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.presentation.status_table import Row, View, table_rows
 
@@ -65,6 +66,14 @@ def component_rows(state: MonitorState, now_s: float) -> list[Row]:
         outdated=state.outdated(now_s),
     )
     return table_rows(view)
+
+
+def stream_rows(stream: OwnStream | None) -> list[Row]:
+    """Returns the row of the stream as this computer receives it; none before it does."""
+    if stream is None:
+        return []
+    mark, style = ("LATE", SeverityStyle.WARNING) if stream.is_fallback else ("direct", SeverityStyle.GOOD)
+    return [Row("Stream here", mark, style, stream.text)]
 
 
 def _fault_row(fault: Fault, snapshot_age_ms: int) -> Row:

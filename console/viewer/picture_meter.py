@@ -137,6 +137,14 @@ class PictureMeter:
                 worst[slot] = max(worst[slot] or 0.0, picture.age_ms)
         return worst
 
+    def worst_ms(self, within_s: float) -> float | None:
+        """Returns the largest age of the last `within_s` seconds; None when no picture is on the screen."""
+        now_s, latest = time.monotonic(), self.latest()
+        if latest is None:
+            return None
+        recent = takewhile(lambda each: each.at_s > now_s - within_s, reversed(self._pictures()))
+        return max([age_now_ms(latest, now_s), *(each.age_ms for each in recent)])
+
     def summary(self) -> AgeSummary | None:
         """Returns the ages of the last pictures; None without one of known age."""
         pictures = self._pictures()

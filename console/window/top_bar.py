@@ -16,6 +16,7 @@ from console.monitor.bar_items import (
 from console.monitor.link import LinkText
 from console.monitor.monitor_state import MonitorState
 from console.presentation.formatting import UNKNOWN
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge
 from console.robots.roster import Roster
 from console.window.battery_gauge import BatteryGauge
@@ -68,6 +69,8 @@ class TopBar(QWidget):
         now_s: float,
         age: PictureAge | None = None,
         frozen_s: float | None = None,
+        *,
+        stream: OwnStream | None = None,
     ) -> None:
         """Shows the latest state.
 
@@ -77,6 +80,7 @@ class TopBar(QWidget):
             now_s: on the monotonic clock.
             age: of the picture on the screen; None while it is unknown.
             frozen_s: how long the picture has been frozen; None while it is not.
+            stream: how the pictures of this window come; None before they do.
         """
         if state.snapshot:
             status = state.snapshot.status
@@ -86,8 +90,8 @@ class TopBar(QWidget):
         self.battery_gauge.show_item(battery)
         self.battery.show_item(battery)
         self.health.show_item(health_item(state, now_s))
-        self.link.show_item(link_item(state, link, now_s))
-        self.picture.show_item(picture_item(age, frozen_s))
+        self.link.show_item(link_item(state, link, now_s, stream))
+        self.picture.show_item(picture_item(age, frozen_s, stream))
         self.mode.show_item(mode_item(state))
         self.clock.show_item(clock_item())
 

@@ -16,6 +16,7 @@ from console.monitor.bar_items import (
 )
 from console.monitor.link import Link, LinkState, link_text
 from console.monitor.monitor_state import MonitorState
+from console.presentation.own_stream import OwnStream
 from console.presentation.picture_age import PictureAge, reported_age
 from console.presentation.severity_style import SeverityStyle
 from omniseer.gateway.v1 import overlay_pb2
@@ -82,6 +83,29 @@ def test_the_link_has_round_trip_loss_and_wifi() -> None:
     assert item.word == "connected"
     assert item.detail == "WEAK \u00b7 3 ms \u00b7 loss 0.4 % \u00b7 Wi-Fi -78 dBm"
     assert item.style is SeverityStyle.WARNING
+
+
+def test_the_loss_is_that_of_this_windows_stream_where_it_is_known() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.preview.measured.available, made.status.preview.measured.worst_loss_percent = True, 9.0
+
+    state = heard(snapshot(change))
+    link = link_text(state.link, "lab", NOW_S)
+    known = link_item(state, link, NOW_S, OwnStream("direct", loss_percent=0.4))
+    assert "loss 0.4 %" in known.detail
+    assert "packet loss of the video here" in known.tip
+    unknown = link_item(state, link, NOW_S, OwnStream("SRT latency"))
+    assert "loss 9.0 %" in unknown.detail
+    assert "of all viewers" in unknown.tip
+
+
+def test_the_tip_of_the_picture_has_cause_and_delivery() -> None:
+    stream = OwnStream("direct, round trip 20 ms, rejoined 2x")
+    assert picture_item(PictureAge(180, cause="longest part: link"), None, stream).tip == (
+        "longest part: link, direct, round trip 20 ms, rejoined 2x"
+    )
+    assert picture_item(None, None, stream).tip.startswith("the age is not known, direct")
+    assert picture_item(None, 2.0, stream).tip == stream.text
 
 
 def test_a_lost_link_says_what_is_the_matter() -> None:

@@ -149,6 +149,17 @@ def test_the_history_has_the_largest_age_of_each_half_second(played: Played) -> 
     assert set(played.meter.history()) == {None}
 
 
+def test_the_worst_age_of_a_moment_has_short_peaks_and_what_is_frozen(played: Played) -> None:
+    assert played.meter.worst_ms(0.5) is None
+    for age_ms in (300, 20, 90, 30):
+        played.show(age_ms)
+        played.now_s += 0.2
+    assert played.meter.worst_ms(0.5) == pytest.approx(230, abs=1), "30 ms old 0.2 s ago, and no newer one"
+    assert played.meter.worst_ms(0.9) == pytest.approx(300, abs=1e-3)
+    played.meter.forget()
+    assert played.meter.worst_ms(0.5) is None
+
+
 def test_the_summary_has_percentiles(played: Played) -> None:
     for number in range(100):
         played.show(10 + number)
