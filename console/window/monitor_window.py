@@ -21,7 +21,7 @@ from console.monitor.worker import Worker
 from console.presentation.own_stream import OwnStream  # noqa: TC001  # read by the type checker alone
 from console.presentation.picture_age import PictureAge, reported_age
 from console.presentation.preview_switch import Note
-from console.presentation.severity_style import FAULT_STYLES
+from console.presentation.severity_style import FAULT_STYLES, SeverityStyle
 from console.robots.roster import RobotChoice, Roster
 from console.viewer.playback import PlaybackState
 from console.window import window_settings
@@ -260,6 +260,7 @@ class MonitorWindow(QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Ends driving, saves the settings, and waits for a file that is being written."""
         self.driving.close()
+        self.header.name.end_search()
         self._timer.stop()
         window_settings.save(self, Choices(self._panel_open, self.alarm.sound_on, str(self.recording.folder)))
         self.saver.job.wait(_SAVES_END_WITHIN_S)
@@ -337,5 +338,10 @@ class MonitorWindow(QWidget):
             self.toasts.show_passing(note)
 
     def _open_other(self, choice: RobotChoice) -> None:
+        if choice.login_command:
+            # Without one the next window could only say that the robot refuses it.
+            text = f"{choice.name} needs a login. In a terminal, type: {choice.login_command}"
+            self.toasts.show_passing(Note(text, SeverityStyle.WARNING))
+            return
         self.next_robot = choice
         self.close()

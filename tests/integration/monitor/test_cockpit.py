@@ -33,6 +33,7 @@ from tests.support.cockpit import (
     with_teleop,
     with_trouble,
 )
+from tests.support.found_robots import FoundRobots
 from tests.support.qt import keep_screenshot, let_pass, press, until
 
 pytestmark = pytest.mark.gst
@@ -91,7 +92,7 @@ class Cockpit:
 
 @contextmanager
 def in_front_of(robot: CockpitRobot) -> Iterator[Cockpit]:
-    roster = Roster(lambda: RobotsFile(Path("x"), {"lab2": Robot(target=OTHER.target)}), lambda: [FOUND])
+    roster = Roster(lambda: RobotsFile(Path("x"), {"lab2": Robot(target=OTHER.target)}), FoundRobots([FOUND]))
     with monitor(robot.target, roster=roster) as window:
         made = Cockpit(window, robot)
         made.sized(*WINDOW)
