@@ -63,7 +63,8 @@ def search(network: Network) -> Iterator[NetworkSearch]:
 def test_what_is_found_is_handed_over_and_stays_readable(network: Network, search: NetworkSearch) -> None:
     changes: list[int] = []
     search.begin(lambda: changes.append(1))
-    assert search.is_open
+    was_open = search.is_open
+    assert was_open
     network.robots.append(Found("lab", "10.0.0.1:1"))
     wait_until(lambda: search.robots == (RobotChoice("lab", "10.0.0.1:1", known=False),), "it is found")
     wait_until(lambda: changes == [1], "the change")
