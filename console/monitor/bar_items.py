@@ -66,7 +66,11 @@ def health_item(state: MonitorState, now_s: float) -> BarItem:
         *(plural(number, severity.value) for severity in _COUNTED if (number := severities.count(severity)))
     )
     detail = joined(counts, health.summary)
-    return BarItem(health.state.value.upper(), detail, HEALTH_STYLES[health.state], summary)
+    style = HEALTH_STYLES[health.state]
+    if counts and style is SeverityStyle.GOOD:
+        # The health may ignore a fault; a tick beside "1 error" would deny it.
+        style = SeverityStyle.WARNING
+    return BarItem(health.state.value.upper(), detail, style, summary)
 
 
 def battery_item(state: MonitorState, now_s: float) -> BatteryItem:
@@ -133,9 +137,11 @@ def picture_item(age: PictureAge | None, frozen_s: float | None, stream: OwnStre
     return BarItem(f"{age.age_ms:.0f}{error} ms", detail, found.style, joined(age.cause, delivery))
 
 
-def mode_item(state: MonitorState) -> BarItem:
+def mode_item(state: MonitorState, now_s: float) -> BarItem:
     """Returns the robot's mode; a mode that is published on change only stays valid when stale."""
     mode = state.snapshot.status.mission.mode if state.snapshot else None
+    if mode and state.outdated(now_s):
+        return BarItem(mode, "last known", tip="The robot does not answer: this was its mode")
     return BarItem(mode or UNKNOWN, "mode")
 
 

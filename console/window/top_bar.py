@@ -54,7 +54,7 @@ class TopBar(QWidget):
         self.battery = Cell("Battery", ("100 %", "LOW, 12.6 V"), self.battery_gauge)
         self.link = Cell("Link", _WIDEST_LINK, Marker())
         self.picture = Cell("Picture", ("1000 \u00b1 10 ms", "LATE, picture age"), Marker())
-        self.mode = Cell("Mode", ("autonomous", "mode"), None)
+        self.mode = Cell("Mode", ("autonomous", "last known"), None)
         self.clock = Cell("Time", ("23:59:59", "UTC+00:00"), None)
         self.panel_button = _button("Panel", "Side panel (F9)", checkable=True)
         self.help_button = _button("?", "Keys (F1)")
@@ -92,7 +92,7 @@ class TopBar(QWidget):
         self.health.show_item(health_item(state, now_s))
         self.link.show_item(link_item(state, link, now_s, stream))
         self.picture.show_item(picture_item(age, frozen_s, stream))
-        self.mode.show_item(mode_item(state))
+        self.mode.show_item(mode_item(state, now_s))
         self.clock.show_item(clock_item())
 
     def _lay_out(self) -> None:

@@ -205,6 +205,25 @@ def test_nothing_jumps(cockpit: Cockpit) -> None:
     until(window.banner.isHidden, "back again")
 
 
+def test_nothing_looks_alive_while_the_robot_does_not_answer(cockpit: Cockpit) -> None:
+    window, robot = cockpit.window, cockpit.robot.gateway
+    with_teleop(robot)
+    robot.status.preview.last_error = "the camera was busy"
+    place = window.strip.driving
+    until(lambda: place.state.text() == "Driving enabled" and place.drive.isEnabled(), "driving")
+    until(
+        lambda: [note.marker.severity for note in window.side.notes.shown] == [SeverityStyle.WARNING], "note"
+    )
+    robot.hold.clear()
+    until(lambda: place.state.text() == "Driving enabled, last known", "what was last known")
+    assert not place.drive.isEnabled()
+    assert place.stop_place.isEnabled(), "STOP works whatever is known"
+    assert window.header.mode.detail.text() == "last known"
+    assert [note.marker.severity for note in window.side.notes.shown] == [SeverityStyle.QUIET]
+    robot.hold.set()
+    until(lambda: place.state.text() == "Driving enabled" and place.drive.isEnabled(), "it answers again")
+
+
 def test_a_message_is_closed_with_esc(cockpit: Cockpit) -> None:
     cockpit.robot.gateway.accept = False
     cockpit.press(Qt.Key.Key_P)

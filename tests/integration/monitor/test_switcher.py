@@ -139,8 +139,11 @@ def trigger(window: MonitorWindow, words: str) -> None:
 def test_a_gateway_that_announces_itself_is_found_and_opened(
     application: QApplication, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings = {"sources": [], "discovery": {"advertise": True, "addresses": [LOOPBACK]}}
-    with resting_robot() as robot, gateway_program(tmp_path, name="lab & 7", **settings) as gateway:
+    announcing = {"advertise": True, "addresses": [LOOPBACK]}
+    with (
+        resting_robot() as robot,
+        gateway_program(tmp_path, name="lab & 7", sources=[], discovery=announcing) as gateway,
+    ):
         target = f"{LOOPBACK}:{gateway.port}"
 
         def connected() -> bool:

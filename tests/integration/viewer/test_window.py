@@ -157,7 +157,7 @@ def test_a_window_that_nobody_can_see_reports_no_age(
     ground.switch_on()
     with GatewayClient(ground.target) as client:
 
-        def reporting() -> int:
+        def reporting() -> int | None:
             return client.status().preview.measured.reporting_viewer_count
 
         until(reporting, "a report")

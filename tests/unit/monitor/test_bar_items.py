@@ -7,6 +7,7 @@ import pytest
 
 from console.client import Unreachable
 from console.monitor.bar_items import (
+    BarItem,
     battery_item,
     clock_item,
     health_item,
@@ -38,6 +39,15 @@ def test_the_health_begins_with_the_counts() -> None:
     item = health_item(heard(snapshot(troubled)), NOW_S)
     assert (item.word, item.style) == ("DEGRADED", SeverityStyle.WARNING)
     assert item.detail == "2 errors, 1 warning, odometry stopped coming"
+
+
+def test_no_tick_stands_beside_an_error_that_the_health_ignores() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.faults.add(id="preview.faulted", severity=3, active=True)
+
+    item = health_item(heard(snapshot(change)), NOW_S)
+    assert (item.word, item.style) == ("OK", SeverityStyle.WARNING)
+    assert item.detail.startswith("1 error")
 
 
 def test_a_silent_robots_health_is_not_known() -> None:
@@ -148,8 +158,16 @@ def test_the_mode_stays_valid() -> None:
         made.status.mission.available, made.status.mission.stale = True, True
         made.status.mission.mode = "manual"
 
-    assert mode_item(heard(snapshot(change))).word == "manual"
-    assert mode_item(EMPTY).word == "-"
+    assert mode_item(heard(snapshot(change)), NOW_S) == BarItem("manual", "mode")
+    assert mode_item(EMPTY, NOW_S).word == "-"
+
+
+def test_the_mode_of_a_silent_robot_is_the_last_known_one() -> None:
+    def change(made: overlay_pb2.OverlaySnapshot) -> None:
+        made.status.mission.available, made.status.mission.mode = True, "manual"
+
+    item = mode_item(heard(snapshot(change)), NOW_S + 60)
+    assert (item.word, item.detail, item.style) == ("manual", "last known", SeverityStyle.QUIET)
 
 
 @pytest.mark.parametrize(
