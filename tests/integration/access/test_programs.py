@@ -197,6 +197,26 @@ def test_a_login_is_stored_over_another_only_on_request(ground: Path) -> None:
     assert operator(ground, *words, "--replace").returncode == 0
 
 
+def test_a_login_in_a_pipe_over_another_one_is_not_lost_unnoticed(ground: Path) -> None:
+    credentials(ground, "init", "--host", "lab.local")
+    words = ("login", "lab", f"127.0.0.1:{port_of(ground)}")
+    with running(ground):
+        for number in (1, 2):
+            issued = credentials(ground, "add", "anna", "--role", "viewer")
+            with mock.patch.object(sys, "stdin", io.StringIO(issued)):
+                done = operator(ground, *words)
+            assert done.returncode == (0 if number == 1 else 2)
+        said = only_line(done.stderr)
+        assert "not stored, but stays valid" in said
+        assert "repeat the whole pipe, with --replace" in said
+        revoke = re.search(r"robot-gateway credentials (revoke [0-9a-f]{12});", said)
+        assert revoke, said
+        credentials(ground, *revoke[1].split())
+        states = {each["id"]: each["state"] for each in json.loads(credentials(ground, "list", "--json"))}
+        assert sorted(states.values()) == ["revoked", "valid"], "of the same name, the one in the pipe alone"
+        assert operator(ground, "status").returncode == 0
+
+
 def test_the_command_after_a_new_ca_is_complete(ground: Path) -> None:
     credentials(ground, "init")
     done = gateway(ground, "credentials", "rotate", "ca")
